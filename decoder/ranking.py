@@ -21,11 +21,10 @@ from decoder.exact import conversion
 from decoder.ordered import Ordered
 from decoder.transform import LARGEST_TRANSFORM, Transform
 from decoder.window import Scores, unrelated_score
-from generator.array.contract import SymbolArray
+from generator.array.contract import SymbolArray, on_torus
 from generator.array.fold import FoldedArray
 from generator.array.product import ProductArray
 from generator.array.sequence import Sequence
-from generator.array.torus import on_torus
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,10 +18,9 @@ from generator.array import FoldedArray, ProductArray, array_from
 from generator.array.contract import Labels
 from generator.array.lab_key import read_lab_key
 from generator.database.cells import faces_at, occupied_cells
-from generator.database.entries import list_objects
 from generator.database.lab import lab_key as stored_lab_key
 from generator.database.open import open_database
-from generator.database.read import read_array, read_object
+from generator.database.read import list_objects, read_array, read_object
 from generator.database.registered import RegisteredArray
 from generator.database.transaction import read_transaction
 

@@ -36,8 +36,7 @@ from probe.scan.kinesthetic import JointErrors
 from probe.scan.places import touch_at
 from probe.simulate.scene import Scene
 from probe.simulate.world.levels import LEVELS
-from probe.simulate.world.reading import read_sensor
-from probe.simulate.world.sensor_copy import draw_copy
+from probe.simulate.world.sensor import LevelSensor, sample_sensor
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist, WristPose, gripper_to_plate, plate_to_sensor
 from probe.wrist.springs import stiffness
@@ -158,7 +157,9 @@ class Bench:
         self.reader = Reader(open_lab(lab))
         self.joints = [model.joint(name).qposadr[0] for name in JOINTS]
         self.presses = 0
-        self.copy = draw_copy(self.reader.sensor, rng)
+        instance = sample_sensor(self.reader.sensor, rng)
+        level = LEVELS["typical"]
+        self.sensor = LevelSensor(self.reader.sensor, level, "mujoco", instance)
         hanging = WristPose(WRIST.travel_mm[1], 0.0, 0.0, np.zeros((3, 3)))
         self.T_gripper_sensor = gripper_to_plate(WRIST, hanging) @ plate_to_sensor(WRIST)
 
@@ -217,15 +218,13 @@ class Bench:
         T[:3, 3] = (T_face_base @ pose(self.data.site("sensor")))[:3, 3]
         touch = touch_at(T, self._force(), stiffness(WRIST))
         try:
-            counts, contact = read_sensor(
-                scene.under(touch).surface, self.reader.sensor, touch, LEVELS["typical"], self.rng,
-                "mujoco", copy=self.copy,
-            )  # fmt: skip
+            reading = self.sensor.read(scene, touch, self.rng)
         except ContactError:  # the plate tips over the edge
             return np.zeros((16, 16), np.uint16)
+        contact = reading.contact
         lean = Rotation.from_euler("ZXY", [touch.theta_rad, contact.tilt_x_rad, contact.tilt_y_rad])
         self._rest(pose(site), lean, np.array([touch.x_mm, touch.y_mm, contact.z_mm]))
-        return counts
+        return reading.counts
 
     def _rest(self, T_base_face: Array, lean: Rotation, at_mm: Array) -> None:
         """Let the plate hang as the symbols hold it: tilts, height, and where it was felt."""

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
 import zlib
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
+
+from encoded_objects.base.files import staged_file
 
 LARGEST_BYTES = 128 * 2**20  #: of one kind, together: 25 templates with their banks
 _CHECK_BYTES = 4
@@ -84,14 +85,9 @@ def _checked(file: Path) -> bytes | None:
 
 def _write(file: Path, content: bytes) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
-    handle, draft = tempfile.mkstemp(prefix=".", dir=file.parent)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(zlib.crc32(content).to_bytes(_CHECK_BYTES, "little") + content)
-        os.replace(draft, file)
-    except BaseException:
-        Path(draft).unlink(missing_ok=True)
-        raise
+    with staged_file(file) as draft:
+        draft.touch(0o600)
+        draft.write_bytes(zlib.crc32(content).to_bytes(_CHECK_BYTES, "little") + content)
 
 
 def _shrink(folder: Path, largest: int) -> None:

@@ -98,7 +98,7 @@ def run(
     from typer import BadParameter, Exit
 
     from encoded_objects.base import output
-    from encoded_objects.base.errors import EncodedObjectsError
+    from encoded_objects.base.errors import EncodedObjectsError, UsageError
 
     usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
     as_json = "--json" in arguments
@@ -115,15 +115,15 @@ def run(
         return BAD_INPUT if unsaid else code
     except Exit as leaving:
         return BAD_INPUT if unsaid else leaving.exit_code
-    except EncodedObjectsError as error:
-        output.error(error, as_json=as_json)
-        return error.exit_code
-    except usage_error as error:
+    except (usage_error, UsageError) as error:
         called = getattr(getattr(error, "ctx", None), "command_path", "")
         called = called or _command_path(name, app, arguments)
         problem = EncodedObjectsError(_misuse(error), fix=f"see {called} --help")
         output.error(problem, as_json=as_json)
         return BAD_INPUT
+    except EncodedObjectsError as error:
+        output.error(error, as_json=as_json)
+        return error.exit_code
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -197,7 +197,7 @@ def _command_path(name: str, app: Typer | None, arguments: list[str]) -> str:
 def _misuse(error: Exception) -> str:
     """Return what is wrong with an option, with the option's name."""
     if getattr(error, "param", None) is None:  # a message of our own, which names it
-        return str(getattr(error, "message", error))
+        return str(getattr(error, "message", getattr(error, "cause", error)))
     message = str(getattr(error, "format_message", error.__str__)())
     return message.replace("Invalid value for ", "").removesuffix(".")
 

@@ -4,6 +4,7 @@
 
     EncodedObjectsError       exit code 2
     ├── MissingExtraError     here
+    ├── UsageError            here
     ├── GeneratorError        generator.errors
     ├── DecoderError          decoder.errors
     ├── ProbeError            probe.errors
@@ -74,6 +75,10 @@ class EncodedObjectsError(Exception):
 
 class MissingExtraError(EncodedObjectsError):
     """A library that a plain install leaves out; the fix is the line that installs it."""
+
+
+class UsageError(EncodedObjectsError):
+    """Options that exclude each other, or a value that an option does not take."""
 
 
 def require(*modules: str, extra: str, purpose: str) -> None:

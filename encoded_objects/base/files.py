@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 from encoded_objects.base.errors import EncodedObjectsError
 
@@ -48,9 +50,18 @@ def file_exists_error(out: Path) -> EncodedObjectsError:
 @contextmanager
 def staged_file(out: Path) -> Iterator[Path]:
     """Yield a name beside `out` to write to; it becomes `out` when all went well."""
-    draft = out.with_name(f".{out.stem}.{os.getpid()}{out.suffix}")
+    draft = out.with_name(f".{out.stem}.{os.getpid()}-{threading.get_ident()}{out.suffix}")
     try:
         yield draft
         os.replace(draft, out)
     finally:
         draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole_file(out: Path) -> Iterator[IO[bytes]]:
+    """Yield a stream to write to; `out` appears when all of it is on the disk."""
+    with staged_file(out) as draft, draft.open("wb") as file:
+        yield file
+        file.flush()
+        os.fsync(file.fileno())

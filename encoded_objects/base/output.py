@@ -91,7 +91,8 @@ def pairs(values: dict[str, str]) -> None:
 
 def count_of(count: int, thing: str) -> str:
     """Return a count in words: 1 frame, 2,000 frames."""
-    return f"{count:,} {thing}" if count == 1 else f"{count:,} {thing}s"
+    plural = f"{thing}es" if thing.endswith("ch") else f"{thing}s"
+    return f"{count:,} {thing if count == 1 else plural}"
 
 
 def json_value(value: Any) -> Any:

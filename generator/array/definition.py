@@ -16,13 +16,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from generator.array.field import Field, field_of_order
-from generator.array.fold import FoldedArray
-from generator.array.notation import parse_polynomial
-from generator.array.primitive import primitive_polynomial
+from generator.array.field import Field, field_of_order, parse_polynomial
+from generator.array.fold import FoldedArray, nearest_sizes, require_foldable
+from generator.array.polynomial import primitive_polynomial
 from generator.array.product import ProductArray
 from generator.array.sequence import Sequence
-from generator.array.size import nearest_sizes, require_foldable
 from generator.errors import ArrayError
 
 FAMILIES = ("prbs", "prba", "prpa", "prmvs", "prmva", "prmvpa")

@@ -3,15 +3,38 @@
 Characters are Crockford's 32, without I, L, O and U: a key is read aloud, typed and copied by
 hand. They stand for the elements of GF(32); the check character makes sum A^k c_k = 0, which
 finds every single wrong character and every two that were exchanged.
+
+A lab's own array: published array + lab key -> polynomial, permutation of symbols, first cell.
+
+From a hash of key and published array. Taking every j-th term of an m-sequence, j coprime to
+its period N, gives an m-sequence of the same period, and all of them (M-sequences are counted
+by phi(N) / n: 288 of degree 6, 4,096 of degree 8 over GF(4)); so j is drawn until the array
+identifies every small view that the published one identifies. That is told by ranks of the
+published sequence itself: cells at offsets d of the new array have the rank that offsets j d
+have there, and no polynomial is made but the one that is taken. Two labs agree on a touch by
+chance only.
+
+MacWilliams, Sloane, The Theory of Error-Correcting Codes, chapters 4 and 14. Thesis 5.1, 5.2.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
+from collections.abc import Iterator
 from functools import reduce
+from itertools import count
+from math import gcd
 from secrets import token_bytes
 
+import numpy as np
+from numpy.typing import NDArray
+
 from generator.array.field import field_of_order
+from generator.array.fold import FoldedArray, translation
+from generator.array.sequence import Sequence
+from generator.array.window import echelon
 from generator.errors import LabKeyError
 
 CHARACTERS = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
@@ -79,3 +102,87 @@ def _check_label(labels: list[int]) -> int:
 def _text(labels: list[int]) -> str:
     typed = "".join(CHARACTERS[label] for label in labels)
     return "-".join(typed[k : k + GROUP] for k in range(0, LENGTH, GROUP))
+
+
+Cells = NDArray[np.int64]
+
+VIEW_SIDE = 4  #: cells: views are all blocks up to this side, and those without one corner
+
+
+def keyed_array(published: FoldedArray, lab_key: str) -> FoldedArray:
+    """Return a lab's own array of the size, the field and the window of a published one.
+
+    Parameters
+    ----------
+    published
+        The array without a key, as a profile has it.
+    lab_key
+        As `generator.array.lab_key` writes it; equal keys, equal arrays.
+
+    Examples
+    --------
+    >>> from generator.array.profiles import profile
+    >>> one = keyed_array(profile("one-touch").array(), "0123-4567-89AB-CDER")
+    >>> one.rows, one.columns, one.window, one.first
+    (63, 65, (3, 2), (4, 17))
+    """
+    numbers = _hash_numbers(published, lab_key)
+    sequence = published.sequence
+    step = _step(published, numbers)
+    return FoldedArray(
+        Sequence(sequence.field, decimated_polynomial(sequence, step)),
+        published.rows,
+        published.columns,
+        published.window,
+        permutation=translation(sequence.field, next(numbers) % sequence.field.order),
+        first=(next(numbers) % published.rows, next(numbers) % published.columns),
+    )
+
+
+def decimated_polynomial(sequence: Sequence, step: int) -> tuple[int, ...]:
+    """Return the polynomial of every `step`-th term, labels from x^0; `step` coprime to N.
+
+    2 n of these terms are 2 n - n equations for the n coefficients of their recurrence.
+    """
+    field, degree = sequence.field, sequence.degree
+    terms = sequence.symbols([step * k % sequence.period for k in range(2 * degree)])
+    states = np.lib.stride_tricks.sliding_window_view(terms, degree)[:degree]
+    solved, _ = echelon(field, np.column_stack([states, terms[degree:]]))
+    return (*field.negative[solved[:, -1]].tolist(), 1)
+
+
+def _step(published: FoldedArray, numbers: Iterator[int]) -> int:
+    """Return the first step whose array identifies what the published one does."""
+    sequence = published.sequence
+    offsets = [published.offsets(view[:, 0], view[:, 1]) for view in _views(published)]
+    ranks = [sequence.rank(view) for view in offsets]
+    for number in numbers:
+        step = number % sequence.period
+        if gcd(step, sequence.period) == 1 and all(
+            sequence.rank(step * offset for offset in view) >= rank
+            for view, rank in zip(offsets, ranks, strict=True)
+        ):
+            return step
+    raise AssertionError("the hash never ends")
+
+
+def _views(array: FoldedArray) -> Iterator[Cells]:
+    """Yield the window, and small blocks with and without a corner, as (k, 2) cells."""
+    sizes = {array.window}
+    sides = range(1, VIEW_SIDE + 1)
+    sizes |= {(a, b) for a in sides for b in sides if a <= array.rows and b <= array.columns}
+    for a, b in sorted(sizes):
+        block = np.argwhere(np.ones((a, b), dtype=bool))
+        yield block
+        if min(a, b) > 2:
+            for corner in ((0, 0), (0, b - 1), (a - 1, 0), (a - 1, b - 1)):
+                yield block[(block != corner).any(axis=1)]
+
+
+def _hash_numbers(published: FoldedArray, lab_key: str) -> Iterator[int]:
+    """Yield numbers below 2^256: SHA-256 of the key, the array and a counter, as one text."""
+    definition = {k: v for k, v in published.definition().items() if k != "window"}
+    array = json.dumps(definition, sort_keys=True, separators=(",", ":"))
+    for number in count():
+        text = f"{lab_key} {array} {number}"
+        yield int.from_bytes(hashlib.sha256(text.encode()).digest(), "big")

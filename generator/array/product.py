@@ -19,9 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from generator.array.contract import Labels
+from generator.array.contract import Labels, on_torus
 from generator.array.sequence import Sequence, sequence_definition
-from generator.array.torus import on_torus
 from generator.array.window import minimum_distance
 from generator.errors import ArrayError
 

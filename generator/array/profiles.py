@@ -14,10 +14,9 @@ from types import MappingProxyType
 from typing import Any
 
 from generator.array.definition import array_from
-from generator.array.fold import FoldedArray
-from generator.array.keyed import keyed_array
+from generator.array.fold import FoldedArray, nearest_sizes
+from generator.array.lab_key import keyed_array
 from generator.array.product import ProductArray
-from generator.array.size import nearest_sizes
 from generator.errors import ArrayError
 
 DEFAULT_PROFILE = "one-touch"
@@ -68,7 +67,7 @@ def _gf4(degree: int, polynomial: str, rows: int, columns: int) -> dict[str, Any
 
 _LARGE = _gf4(8, "x^8+x^7+A^2x^4+A^2x^3+x^2+A^2", 51, 1285)
 
-#: Above `large`, by degree; beyond them the most square folds (`generator.array.size`).
+#: Above `large`, by degree; beyond them the most square folds (`generator.array.definition`).
 _LARGER = {
     9: _gf4(9, "x^9+A^2x^6+x^2+A", 511, 513),
     10: _gf4(10, "x^10+Ax^9+Ax^8+Ax^7+x^6+A^2x^5+A^2x^4+Ax^3+A^2x^2+Ax+A", 825, 1271),

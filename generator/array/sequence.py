@@ -19,16 +19,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from generator.array.contract import on_torus
 from generator.array.factor import (
     LARGEST_PRIME_FACTOR,
     degrees_that_decode,
     period_factors,
 )
-from generator.array.field import Field, Labels
-from generator.array.notation import format_polynomial
+from generator.array.field import Field, Labels, format_polynomial
 from generator.array.polynomial import companion_powers, monic, norm
 from generator.array.residue import Digits, Powers, Residues, binary_rank, pack_words, rank_modulo
-from generator.array.torus import on_torus
 from generator.errors import ArrayError
 
 _REMEMBERED = 1 << 16  # offsets whose functionals are kept
@@ -75,7 +74,7 @@ class Sequence:
             raise ArrayError(
                 f"{given} is not primitive over GF({field.order}): its sequence repeats before "
                 f"{self.period} terms",
-                fix="take one on file (generator.array.primitive.primitive_polynomial("
+                fix="take one on file (generator.array.polynomial.primitive_polynomial("
                 f"{field.order}, {self.degree})) or leave polynomial: out",
             )
         start = (*[0] * (self.degree - 1), 1) if initial is None else tuple(initial)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 
 from encoded_objects.base import output
-from generator.database.url import without_password
+from generator.database.open import without_password
 
 if TYPE_CHECKING:
-    from generator.database.fullness import ArrayUse, Fullness, PitchUse
+    from generator.database.lab import ArrayUse, Fullness, PitchUse
 
 
 def print_lab(fullness: Fullness, url: str, *, as_json: bool) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 from encoded_objects.base import output
 from generator.command.next_step import next_step
 from generator.command.promise_report import face_values, promise_lines
-from generator.database.url import without_password
+from generator.database.open import without_password
 from generator.pipeline import Encoded, MadeObject
 from generator.pipeline.faces import FaceReport
 

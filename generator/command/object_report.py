@@ -12,15 +12,15 @@ from rich.markup import escape
 
 from encoded_objects.base import output
 from generator.command.lab_report import fullness_text, fullness_values
+from generator.database.open import without_password
 from generator.database.read import surfaces_of
-from generator.database.url import without_password
 
 if TYPE_CHECKING:
     from encoded_objects.base.sensor_type import SensorType
-    from generator.database.carry import CopyReport
-    from generator.database.fullness import Fullness
-    from generator.database.part_state import PartState
+    from generator.database.lab import Fullness
+    from generator.database.part_file import PartState
     from generator.database.registered import ObjectEntry, RegisteredObject
+    from generator.database.transfer import CopyReport
     from generator.layout.placement import FaceLayout, Placement
     from generator.layout.recognition_rate import RecognitionRate
 

@@ -37,9 +37,9 @@ def list_(database: Database = LAB, as_json: Json = False) -> Action:
 
     def action() -> int:
         from generator.command import object_report
-        from generator.database.entries import list_objects
-        from generator.database.fullness import read_fullness
+        from generator.database.lab import read_fullness
         from generator.database.open import open_database
+        from generator.database.read import list_objects
         from generator.database.transaction import read_transaction
         from generator.spec.option import database_option
 
@@ -62,7 +62,7 @@ def lab(database: Database = LAB, as_json: Json = False) -> Action:
 
     def action() -> int:
         from generator.command.lab_report import print_lab
-        from generator.database.fullness import read_fullness
+        from generator.database.lab import read_fullness
         from generator.database.open import open_database
         from generator.database.transaction import read_transaction
         from generator.spec.option import database_option
@@ -90,7 +90,7 @@ def show(
         from encoded_objects.base.sensor_type_file import sensor_type_named
         from generator.command import object_report
         from generator.database.open import open_database
-        from generator.database.part_state import part_state
+        from generator.database.part_file import part_state
         from generator.database.read import read_object
         from generator.database.transaction import read_transaction
         from generator.spec.option import database_option
@@ -126,9 +126,9 @@ def retire(
 
     def action() -> int:
         from generator.command import object_report
-        from generator.database import retire as change
+        from generator.database import register as change
         from generator.database.open import existing_database
-        from generator.database.race import in_turn
+        from generator.database.transaction import retry_on_conflict
         from generator.spec.option import database_option
 
         if free and undo:
@@ -139,7 +139,9 @@ def retire(
             _confirm(engine, names, as_json=as_json)
         do = change.remove if free else change.restore if undo else change.retire
         unique = tuple(dict.fromkeys(names))
-        entries = in_turn(engine, lambda connection: [do(connection, name) for name in unique])
+        entries = retry_on_conflict(
+            engine, lambda connection: [do(connection, name) for name in unique]
+        )
         done = "removed" if free else "restored" if undo else "retired"
         object_report.print_retired(entries, done, url, as_json=as_json)
         return 0
@@ -217,7 +219,7 @@ def import_(
 def _confirm(engine: Engine, names: list[str], *, as_json: bool) -> None:
     """Ask before cells are freed; leave when the answer is no."""
     from generator.command import object_report
-    from generator.database.entries import object_entry
+    from generator.database.read import object_entry
     from generator.database.transaction import read_transaction
 
     with read_transaction(engine) as connection:

@@ -1,4 +1,4 @@
-"""How prints came out, as touches found it: kept with the object, or with printer and material.
+"""How prints came out, as touches measured it: kept with the object, or with printer and material.
 
 A part of an object, an object, or all that a printer makes of a material -> scale, skew and
 stroke with their covariance. What is kept of an object goes when the object is replaced or

@@ -22,12 +22,15 @@ from pathlib import Path
 
 from sqlalchemy import URL, Connection, Engine
 
-from generator.database.carry import CopyReport, Origin, copy_objects
 from generator.database.migrate import snapshot
-from generator.database.open import database_exists, open_database
-from generator.database.race import in_turn
-from generator.database.transaction import place_of, read_transaction, write_transaction
-from generator.database.url import normal_url
+from generator.database.open import database_exists, normal_url, open_database
+from generator.database.transaction import (
+    place_of,
+    read_transaction,
+    retry_on_conflict,
+    write_transaction,
+)
+from generator.database.transfer import CopyReport, Origin, copy_objects
 from generator.errors import DatabaseError
 
 
@@ -133,25 +136,29 @@ def import_objects(
 
         if not database_exists(url):  # what is refused leaves no database behind
             with tempfile.TemporaryDirectory() as folder:
-                carried = in_turn(open_database(str(Path(folder) / "lab.db")), work)
+                carried = retry_on_conflict(open_database(str(Path(folder) / "lab.db")), work)
             if dry_run:
                 return carried
-        return _rehearse(open_database(url), work) if dry_run else in_turn(open_database(url), work)
+        return (
+            _undone(open_database(url), work)
+            if dry_run
+            else retry_on_conflict(open_database(url), work)
+        )
 
 
-class _RehearsedError(Exception):
-    """Undoes a transaction whose outcome is known."""
+class _UndoneError(Exception):
+    """Undoes the transaction of a dry run."""
 
 
-def _rehearse(engine: Engine, work: Callable[[Connection], CopyReport]) -> CopyReport:
+def _undone(engine: Engine, work: Callable[[Connection], CopyReport]) -> CopyReport:
     outcome: list[CopyReport] = []
 
-    def undone(target: Connection) -> None:
+    def work_and_undo(target: Connection) -> None:
         outcome.append(work(target))
-        raise _RehearsedError
+        raise _UndoneError
 
-    with suppress(_RehearsedError):
-        in_turn(engine, undone)
+    with suppress(_UndoneError):
+        retry_on_conflict(engine, work_and_undo)
     return outcome[-1]
 
 

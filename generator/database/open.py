@@ -6,18 +6,196 @@ refused, an older one is brought to today's.
 
 from __future__ import annotations
 
+import os
+import sqlite3
 from pathlib import Path
+from typing import Any
+from urllib.parse import quote
 
-from sqlalchemy import URL, Connection, Engine, insert, inspect, select, text
+from sqlalchemy import (
+    URL,
+    Connection,
+    Engine,
+    NullPool,
+    create_engine,
+    event,
+    insert,
+    inspect,
+    make_url,
+    select,
+    text,
+)
+from sqlalchemy.exc import ArgumentError
 from sqlalchemy.schema import CreateIndex, CreateTable
 
+from encoded_objects.base.errors import install_line
 from generator.array.lab_key import draw_lab_key
-from generator.database.engine import check_place, database_engine
 from generator.database.migrate import migrate
 from generator.database.tables import FORMAT, SCHEMA_VERSION, meta, metadata
-from generator.database.transaction import WAIT_S, place_of, read_transaction, write_transaction
-from generator.database.url import normal_url
+from generator.database.transaction import (
+    WAIT_S,
+    begin_sqlite,
+    place_of,
+    read_transaction,
+    write_transaction,
+)
 from generator.errors import DatabaseError
+
+
+def normal_url(url: str) -> URL:
+    """Return the URL of a file name, `sqlite:///file` or `postgresql://...`; checks no more.
+
+    Examples
+    --------
+    >>> normal_url("postgresql://lab@host/objects").drivername
+    'postgresql+psycopg'
+    """
+    if not url.strip():
+        raise DatabaseError("no database is named", fix="give a file such as lab.db")
+    if "://" not in url:
+        if url.startswith(("sqlite:", "postgresql:", "postgres:")):
+            fix = "write sqlite:///lab.db or postgresql://user@host:5432/name"
+            raise DatabaseError(f"'{url}' is half an address", fix=fix)
+        return URL.create("sqlite", database=str(Path(url).expanduser()))
+    try:
+        parsed = make_url(url)
+    except (ArgumentError, ValueError) as error:
+        fix = "write sqlite:///lab.db or postgresql://user@host:5432/name"
+        raise DatabaseError(f"'{url}' is not a database URL", fix=fix) from error
+    if parsed.drivername in ("sqlite", "sqlite+pysqlite"):
+        if parsed.host:
+            fix = f"write three strokes: sqlite:///{parsed.host}"
+            raise DatabaseError(f"'{url}' names a host and no file", fix=fix)
+        if not parsed.database or parsed.database == ":memory:":
+            fix = "give a file, such as sqlite:///lab.db"
+            raise DatabaseError(f"'{url}' names no file, so nothing would be kept", fix=fix)
+        if parsed.query:
+            fix = "write sqlite:///lab.db alone; a file with '?' in its name as a plain file name"
+            raise DatabaseError(f"'{url}' has settings that are not known", fix=fix)
+        return URL.create("sqlite", database=parsed.database)
+    if parsed.drivername in ("postgresql", "postgres", "postgresql+psycopg"):
+        return parsed.set(drivername="postgresql+psycopg")
+    raise DatabaseError(
+        f"cannot keep objects in '{parsed.drivername}'; allowed are sqlite and postgresql",
+        fix="write sqlite:///lab.db or postgresql://user@host:5432/name",
+    )
+
+
+def without_password(url: str) -> str:
+    """Return a database's address as it may be shown.
+
+    Examples
+    --------
+    >>> without_password("postgresql://lab:secret@host/objects")
+    'postgresql://lab:***@host/objects'
+    >>> without_password("sqlite:///lab.db")
+    'sqlite:///lab.db'
+    """
+    return make_url(url).render_as_string(hide_password=True)
+
+
+def part_file(url: URL, file: str) -> str:
+    """Return how a database names a part's file: from its own folder, absolute on a server.
+
+    A folder that holds a SQLite database and its parts can so be moved and copied.
+    """
+    path = Path(file).absolute()
+    if url.get_backend_name() != "sqlite":
+        return str(path)
+    return Path(os.path.relpath(path, Path(url.database or "").absolute().parent)).as_posix()
+
+
+def part_path(url: URL, file: str) -> Path:
+    """Return where a part's file is, from how the database names it: `part_file` undone."""
+    if url.get_backend_name() != "sqlite":
+        return Path(file)
+    return Path(os.path.normpath(Path(url.database or "").absolute().parent / file))
+
+
+# A server finds out within a minute that a bench has lost its power or its network, undoes
+# what the bench had begun and lets the next writer go on; by default it takes two hours.
+_POSTGRESQL = {
+    "connect_timeout": 10,
+    "client_encoding": "utf8",
+    "options": "-c tcp_keepalives_idle=20 -c tcp_keepalives_interval=10 -c tcp_keepalives_count=3",
+}
+
+
+def database_engine(url: URL, writable: bool, wait_s: float) -> Engine:
+    """Return an engine on a database of either kind.
+
+    Raises
+    ------
+    DatabaseError
+        A place that does not exist or may not be written, or a driver that is missing.
+    """
+    if url.get_backend_name() != "sqlite":
+        return _postgresql_engine(url, writable, wait_s)
+    path = Path(url.database or "").absolute()
+    check_place(path)
+    if writable:
+        _check_writable(path)
+    elif not path.exists():
+        fix = "register an object with encode-object first, or correct the file name"
+        raise DatabaseError("this database does not exist", fix=fix, place=str(path))
+    return _sqlite_engine(url, path, writable, wait_s)
+
+
+def check_place(path: Path) -> None:
+    """Refuse what SQLite would refuse later, or with fewer words."""
+    place = str(path)
+    if not path.parent.is_dir():
+        fix = f"make it with: mkdir -p {path.parent}"
+        raise DatabaseError(f"folder {path.parent} does not exist", fix=fix, place=place)
+    if path.is_dir():
+        fix = f"name a file in it, such as {path / 'lab.db'}"
+        raise DatabaseError("this is a folder, not a database file", fix=fix, place=place)
+
+
+def _sqlite_engine(url: URL, path: Path, writable: bool, wait_s: float) -> Engine:
+    # mode=rw also without `writable`: a reader must undo what a killed writer left behind.
+    uri = f"file:{quote(str(path))}?mode={'rwc' if writable else 'rw'}"
+
+    def connect() -> sqlite3.Connection:
+        connection = sqlite3.connect(
+            uri, uri=True, timeout=wait_s, isolation_level=None, check_same_thread=False
+        )
+        connection.execute("PRAGMA foreign_keys = ON")
+        if not writable:
+            connection.execute("PRAGMA query_only = ON")
+        return connection
+
+    engine = create_engine(url, creator=connect, poolclass=NullPool)
+    event.listen(engine, "begin", begin_sqlite)
+    return engine
+
+
+def _check_writable(path: Path) -> None:
+    # The journal stands beside the file, so the folder must be writable too.
+    for need in (path, path.parent) if path.exists() else (path.parent,):
+        if not os.access(need, os.W_OK, effective_ids=os.access in os.supports_effective_ids):
+            fix = "allow writing there, or choose another database with --database"
+            raise DatabaseError(f"{need} may not be written", fix=fix, place=str(path))
+
+
+def _postgresql_engine(url: URL, writable: bool, wait_s: float) -> Engine:
+    try:
+        engine = create_engine(
+            url,
+            poolclass=NullPool,
+            connect_args={name: _POSTGRESQL[name] for name in _POSTGRESQL if name not in url.query},
+            execution_options={"wait_s": wait_s},
+        )
+    except ImportError as error:
+        fix = install_line("postgres")
+        raise DatabaseError("psycopg is not installed", fix=fix, place=place_of(url)) from error
+    if not writable:
+        event.listen(engine, "connect", _read_only)
+    return engine
+
+
+def _read_only(connection: Any, _record: object) -> None:
+    connection.read_only = True
 
 
 def open_database(

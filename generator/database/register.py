@@ -2,7 +2,7 @@
 
 ::
 
-    with writing(engine) as connection:                 # nobody else writes from here on
+    with write_transaction(engine) as connection:                 # nobody else writes from here on
         known = find_object(connection, name)
         layout = lay_out(..., occupancy(connection, array))  # beside what is taken
         register(connection, ObjectRecord(...))
@@ -21,20 +21,17 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, delete, func, insert, select
+from sqlalchemy import Connection, delete, func, insert, select, update
 
 from generator.alphabet.known import Alphabet
 from generator.alphabet.outline import SymbolStyle
 from generator.array.contract import SymbolArray
 from generator.database import tables
-from generator.database.canonical import canonical, digest
-from generator.database.cells import array_key, cells_of
-from generator.database.entries import find_object
-from generator.database.insert import insert_rows
-from generator.database.occupancy import free_cells, take_cells
-from generator.database.read import read_layout
-from generator.database.registered import ObjectEntry, RegisteredPart
-from generator.database.rows import definition_number, layout_rows, polyhedron_rows
+from generator.database.cells import array_key, cells_of, free_cells, take_cells
+from generator.database.read import find_object, object_entry, read_layout
+from generator.database.registered import ObjectEntry, RegisteredPart, canonical, digest
+from generator.database.rows import definition_number, insert_rows, layout_rows, polyhedron_rows
+from generator.database.tables import objects
 from generator.database.transaction import place_of
 from generator.errors import DatabaseError
 from generator.layout.occupancy import Cells
@@ -289,3 +286,33 @@ def _insert_object(
     objects = tables.objects
     inserted = insert(objects).values(values).returning(objects.c.object_id)
     return array_id, connection.execute(inserted).scalar_one()
+
+
+def retire(connection: Connection, name: str) -> ObjectEntry:
+    """Mark an object as retired; one that is retired keeps its date. Returns its entry now.
+
+    Raises
+    ------
+    DatabaseError
+        When no object has this name; the fix lists names that are known.
+    """
+    if not object_entry(connection, name).retired_utc:
+        _mark(connection, name, datetime.now(UTC).isoformat(timespec="seconds"))
+    return object_entry(connection, name)
+
+
+def restore(connection: Connection, name: str) -> ObjectEntry:
+    """Bring a retired object back into use; raises as `retire`."""
+    _mark(connection, object_entry(connection, name).name, None)
+    return object_entry(connection, name)
+
+
+def remove(connection: Connection, name: str) -> ObjectEntry:
+    """Remove an object and free its cells; returns what its entry was. Raises as `retire`."""
+    entry = object_entry(connection, name)
+    remove_object(connection, entry.object_id)
+    return entry
+
+
+def _mark(connection: Connection, name: str, utc: str | None) -> None:
+    connection.execute(update(objects).where(objects.c.name == name).values(retired_utc=utc))

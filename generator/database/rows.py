@@ -5,17 +5,71 @@ Each function yields tables with their rows in an order that foreign keys allow.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import Connection, Table, insert, select
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection, Table, bindparam, func, insert, select
 
 from generator.database import tables
-from generator.database.face_type import face_type
-from generator.database.insert import Row, Rows
 from generator.layout.placement import FaceLayout, Layout
 from generator.polyhedron.frame import edge_length, face_area, face_polygon
 from generator.polyhedron.winged import Polyhedron
+
+Row = dict[str, Any]
+Rows = list[Row]
+
+
+def insert_rows(connection: Connection, table: Table, rows: Rows) -> None:
+    """Insert rows of one table, all of which name the same columns; none is well, too.
+
+    A server gets one statement with an array per column: a message per row costs it twice
+    the time, and its driver complains aloud when one of them is refused.
+    """
+    if not rows:
+        return
+    if connection.dialect.name != "postgresql":
+        connection.execute(insert(table), rows)
+        return
+    from sqlalchemy.dialects.postgresql import ARRAY
+
+    names = list(rows[0])
+    columns = [
+        bindparam(None, [row[name] for row in rows], type_=ARRAY(table.c[name].type))
+        for name in names
+    ]
+    connection.execute(insert(table).from_select(names, select(*map(func.unnest, columns))))
+
+
+_EQUAL = 1e-6  #: lengths that differ by less than this share are equal; angles, rad
+
+
+def face_type(polygon: Sequence[NDArray[np.float64]]) -> str:
+    """Return triangle, square, rectangle, quadrilateral or polygon.
+
+    Parameters
+    ----------
+    polygon
+        Loops (k, 2), mm, the outer one first; a face with holes is a polygon.
+
+    Examples
+    --------
+    >>> face_type([np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])])
+    'rectangle'
+    """
+    outer = polygon[0]
+    if len(polygon) > 1 or len(outer) > 4:
+        return "polygon"
+    if len(outer) == 3:
+        return "triangle"
+    sides = np.roll(outer, -1, axis=0) - outer
+    lengths = np.hypot(sides[:, 0], sides[:, 1])
+    following = np.roll(sides, -1, axis=0)
+    cosines = np.sum(sides * following, axis=1) / (lengths * np.roll(lengths, -1))
+    if np.abs(cosines).max() > _EQUAL:
+        return "quadrilateral"
+    return "square" if np.ptp(lengths) <= _EQUAL * lengths.max() else "rectangle"
 
 
 def polyhedron_rows(object_id: int, polyhedron: Polyhedron) -> Iterator[tuple[Table, Rows]]:

@@ -2,18 +2,32 @@
 
 Writers take turns from their first statement (SQLite: BEGIN IMMEDIATE, PostgreSQL: one
 advisory lock for the transaction), so that the occupied cells a writer reads stay what
-they are until it commits. Nobody waits longer than the engine's `wait_s`.
+they are until it commits. Nobody waits longer than the engine's `wait_s`. What is left to
+conflict: a layout made before the turn came, a writer that takes no turns, a deadlock on the
+server. The work is then undone and repeated on the state that the other writer left::
+
+    def placed_and_registered(connection: Connection) -> int:
+        taken = occupancy(connection, array)
+        return register(connection, ObjectRecord(..., layout=lay_out(..., taken)))
+
+    number = retry_on_conflict(engine, placed_and_registered)
+
+A connection that was not made has no error code: the words of libpq and of the server say why;
+a server that speaks another language than English is quoted as it is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
+import numpy as np
 from sqlalchemy import URL, Connection, Engine, text
 from sqlalchemy.exc import DBAPIError
 
-from generator.database.unreached import connection_error
 from generator.errors import DatabaseError
 
 WAIT_S = 60.0  #: how long a writer waits for its turn, and a reader for a commit to end
@@ -21,11 +35,8 @@ WAIT_S = 60.0  #: how long a writer waits for its turn, and a reader for a commi
 _TURN = int.from_bytes(b"encoded", "big")  #: the advisory lock of writers on PostgreSQL
 
 
-class LostRaceError(DatabaseError):
-    """Another writer was first; done again on the state it left, the work may succeed.
-
-    `generator.database.race.in_turn` does it again.
-    """
+class WriteConflictError(DatabaseError):
+    """Another writer was first; `retry_on_conflict` repeats the work on the state it left."""
 
 
 @contextmanager
@@ -96,16 +107,16 @@ def explain_error(error: DBAPIError, url: URL) -> DatabaseError:
             return DatabaseError(cause, fix=fix, place=place)
     if code in _RACES:
         fix = "run the same command again"
-        return LostRaceError("another writer was first", fix=fix, place=place)
+        return WriteConflictError("another writer was first", fix=fix, place=place)
     if code is not None and code.startswith(("SQLITE_CONSTRAINT", "23")):
         if code in _NOT_UNIQUE and "cells" in first_line:
-            return LostRaceError(
+            return WriteConflictError(
                 "the object needs cells of the array that another object holds",
                 fix="place it again on the cells that are free now",
                 place=place,
             )
         if code in _NOT_UNIQUE and "objects" in first_line:
-            return LostRaceError(
+            return WriteConflictError(
                 "an object of this name was registered meanwhile",
                 fix="run the same command again",
                 place=place,
@@ -149,5 +160,108 @@ _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
         ("SQLITE_FULL", "53100"),
         "no space is left for the database",
         "free some space, then run the same command again",
+    ),
+)
+
+
+Result = TypeVar("Result")
+
+TRIES = 8
+FIRST_PAUSE_S = 0.02  #: doubled after every conflict, shortened by chance to half at most
+
+
+def retry_on_conflict(
+    engine: Engine,
+    work: Callable[[Connection], Result],
+    *,
+    tries: int = TRIES,
+    rng: np.random.Generator | None = None,
+) -> Result:
+    """Return what `work` returns; its transaction is committed then.
+
+    Parameters
+    ----------
+    work
+        Called with the connection of a `write_transaction`; again after each conflict, so that
+        it must read the database itself and leave nothing behind that is not undone.
+    tries
+        How often in all.
+    rng
+        Lengths of the pauses; left out, the process number is the seed, so that two losers
+        do not meet again.
+
+    Raises
+    ------
+    WriteConflictError
+        The last of `tries` met a conflict, too.
+    DatabaseError
+        As `write_transaction`.
+    """
+    chance = np.random.default_rng(os.getpid()) if rng is None else rng
+    for number in range(tries - 1):
+        try:
+            with write_transaction(engine) as connection:
+                return work(connection)
+        except WriteConflictError:
+            time.sleep(FIRST_PAUSE_S * 2**number * chance.uniform(0.5, 1.0))
+    with write_transaction(engine) as connection:
+        return work(connection)
+
+
+def connection_error(said: str, url: URL, place: str) -> DatabaseError:
+    """Return the error for a connection that was not made.
+
+    Parameters
+    ----------
+    said
+        All that the driver says, one line per address that was tried.
+    url, place
+        The database, and how messages name it.
+    """
+    server = f"{url.host or 'this computer'}{f':{url.port}' if url.port else ''}"
+    for phrases, cause, fix in _CONNECTION_MEANINGS:
+        if any(phrase in said for phrase in phrases):
+            names = {"server": server, "name": url.database or "", "user": url.username or ""}
+            return DatabaseError(cause.format(**names), fix=fix.format(**names), place=place)
+    lines = said.strip().splitlines() or ["the server gives no reason"]
+    fix = "check that the server runs, and host, port, user and name in the URL"
+    return DatabaseError(f"cannot connect: {lines[0]}", fix=fix, place=place)
+
+
+_CONNECTION_MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
+    (
+        ("password authentication failed", "no password supplied"),
+        "the server refuses the user '{user}' or the password",
+        "correct them in the URL, or in PGUSER, PGPASSWORD and ~/.pgpass",
+    ),
+    (
+        ('role "', "pg_hba.conf"),
+        "the server does not let the user '{user}' in",
+        "correct the user in the URL, or have the server's administrator add it",
+    ),
+    (
+        ('database "',),
+        "the server has no database '{name}'",
+        "create it with: createdb {name}; or correct the name in the URL",
+    ),
+    (
+        ("failed to resolve", "could not translate host name"),
+        "there is no host '{server}'",
+        "correct the host in the URL",
+    ),
+    (
+        ("Connection refused", "No such file or directory"),
+        "no PostgreSQL server runs on {server}",
+        "start it, or correct host and port in the URL",
+    ),
+    (
+        ("timeout", "timed out", "unreachable", "No route to host"),
+        "the server on {server} does not answer",
+        "check the network and the firewall, or correct host and port in the URL",
+    ),
+    (
+        ("starting up", "shutting down", "too many clients", "remaining connection slots"),
+        "the server on {server} takes no more connections now",
+        "run the same command again in a moment",
     ),
 )

@@ -22,7 +22,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.export.settings import READ_BACK
+FOLDED_COS = -0.999  #: between neighbours, from which the exact test looks at them
 
 Vector = tuple[int, int, int]
 #: x, y, z and the common denominator, which is positive.
@@ -76,7 +76,7 @@ def perhaps_folded(points: NDArray[np.float64], triangles: NDArray[np.int64]) ->
     same = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
     one, other = owner[order][same], owner[order][same + 1]
     cosine = (normals[one] * normals[other]).sum(axis=1)
-    back = cosine <= READ_BACK.folded_cos * lengths[one] * lengths[other]
+    back = cosine <= FOLDED_COS * lengths[one] * lengths[other]
     return np.unique(np.concatenate([one[back], other[back], np.flatnonzero(lengths == 0)]))
 
 

@@ -75,21 +75,5 @@ class RasterSettings:
     triangles: int = 16_384  #: drawn at once: they stay in the cache
 
 
-@dataclass(frozen=True, slots=True)
-class ReadBackSettings:
-    """How near to exact what was written must be when it is read back."""
-
-    step_volume: float = 1e-9  #: greatest relative error of a volume in STEP
-    bent_volume: float = 1e-4
-    """The same of a part with round faces, whose symbols bend where those of the mesh break: in
-    cylinders and cones of 30 to 80 mm, tip and chamfer included, 2e-5 at most."""
-    stl_volume: float = 1e-5  #: the same in STL: 32-bit coordinates
-    fit_overlap_mm3: float = 1e-3  #: greatest volume that two panels may both fill
-    fit_rounding_mm: float = 1e-4  #: by which a gap may be smaller: 32-bit coordinates
-    fit_reach_mm: float = 1.0  #: up to which distances of panels are measured
-    folded_cos: float = -0.999  #: between neighbours, from which the exact test looks at them
-
-
 ARRAY_SVG = ArraySvgSettings()
 RASTER = RasterSettings()
-READ_BACK = ReadBackSettings()

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
-from generator.array.touches import touches_needed
+from generator.array.contract import touches_needed
 from generator.layout.footprint import Points
 from generator.layout.placement import FaceLayout
 from generator.plane.polygon import points_inside, signed_area

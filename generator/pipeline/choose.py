@@ -19,10 +19,8 @@ from sqlalchemy import Connection
 from generator.array.contract import SymbolArray
 from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, next_larger
 from generator.database.cells import occupancy
-from generator.database.entries import find_object
-from generator.database.fullness import LIMITS
-from generator.database.lab import LabArrays
-from generator.database.read import read_array
+from generator.database.lab import MOST_FILLED, LabArrays
+from generator.database.read import find_object, read_array
 from generator.database.registered import RegisteredArray
 from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
@@ -271,5 +269,5 @@ def _room(array: SymbolArray, connection: Connection | None) -> int:
     The first ones leave room for more.
     """
     taken = 0 if connection is None else occupancy(connection, array).used
-    room = max(0, int(LIMITS.full * array.rows * array.columns) - taken)
+    room = max(0, int(MOST_FILLED * array.rows * array.columns) - taken)
     return room if taken else int(CHOICE.first * room)

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from generator.array.touches import touches_needed
+from generator.array.contract import touches_needed
 from generator.layout.placement import Layout
 from generator.pipeline.faces import FaceReport
 from generator.pipeline.overhang import overhang_of
 from generator.pipeline.plan import ObjectPlan
 
 if TYPE_CHECKING:
-    from generator.export.fit_check import FitReport
+    from generator.export.check import FitReport
 
 
 @dataclass(frozen=True, slots=True)

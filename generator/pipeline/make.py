@@ -15,10 +15,10 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
-from generator.database.entries import find_object
+from generator.database.open import part_file
+from generator.database.read import find_object
 from generator.database.register import ObjectRecord, register
-from generator.database.transaction import LostRaceError, write_transaction
-from generator.database.url import part_file
+from generator.database.transaction import WriteConflictError, write_transaction
 from generator.export.atomic import Staging
 from generator.pipeline.files import BuiltParts, StagedObject, parts_of, stage
 from generator.pipeline.made import MadeObject, describe_object
@@ -79,10 +79,10 @@ def make_at(
             with write_transaction(engine) as connection:
                 known = find_object(connection, order.plan.spec.name)
                 if (known is not None) != (place.reused or place.replaces):
-                    raise LostRaceError("an object of this name came or went meanwhile")
+                    raise WriteConflictError("an object of this name came or went meanwhile")
                 _register(connection, order, place, files)
             return _finish(order, place, files, staging)
-    except LostRaceError:
+    except WriteConflictError:
         return make_under_lock(engine, order, progress)
 
 

@@ -11,8 +11,7 @@ import numpy as np
 from sqlalchemy import Connection
 
 from generator.database.cells import cells_of, find_array, occupancy
-from generator.database.entries import find_object
-from generator.database.read import read_layout
+from generator.database.read import find_object, read_layout
 from generator.database.register import require_same_spec
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Cells, Occupancy

@@ -26,8 +26,8 @@ from generator.polyhedron.front import Loop, covered_parts
 from generator.polyhedron.round import ROUND_SHAPES
 from generator.polyhedron.shapes import SHAPES
 from generator.printers import Printer
-from generator.solid.frame import edge_numbers
 from generator.solid.mitre import symbol_clearance_mm
+from generator.solid.part import edge_numbers
 from generator.solid.plate import cut_corners, plain_panels, top_insets_mm
 from generator.spec import LocatedSpec, ObjectSpec, ShapeSpec
 

@@ -28,7 +28,7 @@ from generator.pipeline.set_sheet import SetObject, SetPart, SetPlate, set_sheet
 from generator.solid import Part, box, volume
 
 if TYPE_CHECKING:
-    from generator.printed.sliced_plate import PlateCost
+    from generator.printed.slicer import PlateCost
 
 
 def write_set(
@@ -88,7 +88,7 @@ def write_set(
                 twin = staging.write(file, content.prusaslicer)
                 if slice_plates:
                     progress(f"slicing plate {number}", 0.9)
-                    from generator.printed.sliced_plate import slice_plate
+                    from generator.printed.slicer import slice_plate
 
                     costs[number - 1] = slice_plate(twin.staged)
         page = set_sheet(name, objects, sheets, folder, plates, costs)

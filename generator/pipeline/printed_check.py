@@ -19,9 +19,8 @@ from generator.pipeline.lab import lab_of
 from generator.pipeline.place import occupancy_of, occupancy_with, place_object
 from generator.pipeline.plan import ObjectPlan, plan_object
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
-from generator.printed.check import PrintedCheck, check_parts
+from generator.printed.check import PrintedCheck, check_parts, check_png
 from generator.printed.faults import PrintFaults
-from generator.printed.picture import check_png
 from generator.printed.profiles import print_profile, profile_of_printer
 from generator.printed.slicer import find_slicer
 from generator.solid import Part

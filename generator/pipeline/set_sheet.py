@@ -22,7 +22,7 @@ from generator.pipeline.sheet import layers_text, lies_text, material_text
 from generator.printers import Printer
 
 if TYPE_CHECKING:
-    from generator.printed.sliced_plate import PlateCost
+    from generator.printed.slicer import PlateCost
 
 
 @dataclass(frozen=True, slots=True)

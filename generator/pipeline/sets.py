@@ -16,13 +16,12 @@ from pathlib import Path
 from sqlalchemy import Connection, Engine
 
 from encoded_objects.base.errors import install_line
-from generator.database.entries import find_object, natural_key
-from generator.database.part_state import part_state
-from generator.database.read import read_layout, read_parts
+from generator.database.part_file import part_state
+from generator.database.read import find_object, natural_key, read_layout, read_parts
 from generator.database.register import require_in_use
 from generator.database.transaction import read_transaction
+from generator.export.formats import EXPORTERS
 from generator.export.overview import can_draw
-from generator.export.robot import ROBOT_FORMATS
 from generator.pipeline.made import MadeObject, describe_object
 from generator.pipeline.make import Order, Product, make_at
 from generator.pipeline.parallel import Engines, Task, Workers
@@ -143,7 +142,7 @@ def _intact_product(connection: Connection, order: Order) -> Product | None:
     What robots load is no part of a registered spec, and gzipped STEP is not registered, so both
     are always written anew.
     """
-    if not {*ROBOT_FORMATS, "stpz"}.isdisjoint(order.formats):
+    if not all(EXPORTERS[name].kept for name in order.formats):
         return None
     plan, url = order.plan, connection.engine.url
     known = find_object(connection, plan.spec.name)
@@ -153,8 +152,8 @@ def _intact_product(connection: Connection, order: Order) -> Product | None:
     stem, files = order.folder / plan.spec.name, []
     states = [part_state(url, part) for part in read_parts(connection, known.object_id)]
     states = [state for state in states if state.part.format in order.formats]
-    for kind in {"step", "stl"} & set(order.formats):
-        if not any(state.part.format == kind for state in states):
+    for kind in order.formats:
+        if EXPORTERS[kind].registered and not any(state.part.format == kind for state in states):
             return None
     here = order.folder.absolute()
     if any(state.state != "ok" or state.path.parent != here for state in states):

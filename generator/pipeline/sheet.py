@@ -26,7 +26,7 @@ from generator.printers import Printer
 from generator.solid import Part, box, volume
 
 if TYPE_CHECKING:
-    from generator.printed.sliced_plate import PlateCost
+    from generator.printed.slicer import PlateCost
 
 Floats = NDArray[np.float64]
 

@@ -5,21 +5,327 @@ coordinates, of Marlin, Klipper and RepRapFirmware, from PrusaSlicer, Cura, Bamb
 OrcaSlicer (see `dialect`). As in Klipper and PrusaSlicer, G91 makes E relative too and M83
 does so alone. M221, a machine's own correction of its extruder, is left out: the volume is
 what the slicer meant. A `.gcode.3mf` of Bambu Studio is opened, binary G-code is refused.
+
+A machine that follows G-code: line by line -> one row for each straight move.
+
+Absolute and relative coordinates, offsets, inches, arcs as chords, and what comments say of
+features, widths and heights. `gcode` makes a Toolpath of the rows. mm, machine frame.
+
+What slicers write in comments: features, widths, heights, the filament.
+
+Read: PrusaSlicer and its kin (`;TYPE:External perimeter`, `;WIDTH:0.45`, `;HEIGHT:0.2`), Cura
+(`;TYPE:WALL-OUTER`; it says neither width nor height), Bambu Studio and OrcaSlicer for Bambu
+printers (`; FEATURE: Outer wall`, `; LINE_WIDTH: 0.42`, `; LAYER_HEIGHT: 0.2`).
+
+Arcs of G-code (G2 clockwise, G3 counter-clockwise, in the plane of the bed) as chords.
+
+mm; a chord stays within `CHORD_MM` of its arc.
 """
 
 from __future__ import annotations
 
 import io
 import math
+import re
 import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from generator.errors import PrintError
-from generator.printed.dialect import dialect_of
-from generator.printed.machine import COLUMNS, Machine
-from generator.printed.toolpath import LEVEL_MM, Floats, Toolpath, role_number
+from generator.printed.toolpath import LEVEL_MM, ROLES, Floats, Toolpath, role_number
+
+CHORD_MM = 0.005
+_MOST = 100_000  # chords of one arc: a sound file has some hundreds
+_ROUND = 0.05  # mm by which the two radii of an arc may differ: files round to 0.001
+
+Point = tuple[float, float]
+
+
+class ArcError(ValueError):
+    """An arc that leads nowhere; says why."""
+
+
+def chords(start: Point, end: Point, words: dict[str, float], *, clockwise: bool) -> list[Point]:
+    """Return the points after `start` on an arc, `end` the last.
+
+    Parameters
+    ----------
+    start, end
+        mm; equal for a full circle.
+    words
+        I and J, from the start to the centre, or R, the radius, negative for the longer arc;
+        P further full turns.
+
+    Raises
+    ------
+    ArcError
+        Without centre or radius, or where these do not lead from start to end.
+
+    Examples
+    --------
+    >>> chords((1, 0), (0, 1), {"I": -1.0}, clockwise=False)[-1]
+    (0, 1)
+    """
+    centre = _centre(start, end, words, clockwise)
+    radius = math.dist(start, centre)
+    if radius <= 0 or abs(math.dist(end, centre) - radius) > _ROUND:
+        raise ArcError("the arc's centre is not as far from its end as from its start")
+    first = math.atan2(start[1] - centre[1], start[0] - centre[0])
+    last = math.atan2(end[1] - centre[1], end[0] - centre[0])
+    sweep = (first - last if clockwise else last - first) % (2 * math.pi)
+    if math.dist(start, end) < 1e-6:
+        sweep = 2 * math.pi
+    sweep += 2 * math.pi * max(0, int(words.get("P", 1)) - 1)
+    step = 2 * math.acos(max(0.0, 1 - CHORD_MM / radius))
+    count = max(1, math.ceil(sweep / max(step, 1e-9)))
+    if count > _MOST:
+        raise ArcError(f"an arc of radius {radius:g} mm with {count} chords")
+    sign = -1 if clockwise else 1
+    angles = (first + sign * sweep * k / count for k in range(1, count))
+    points = [(centre[0] + radius * math.cos(a), centre[1] + radius * math.sin(a)) for a in angles]
+    return [*points, end]
+
+
+def _centre(start: Point, end: Point, words: dict[str, float], clockwise: bool) -> Point:
+    if "I" in words or "J" in words:
+        return start[0] + words.get("I", 0.0), start[1] + words.get("J", 0.0)
+    if "R" not in words:
+        raise ArcError("an arc needs its centre (I, J) or its radius (R)")
+    radius, chord = words["R"], math.dist(start, end)
+    if not 0 < chord <= 2 * abs(radius) + _ROUND:
+        raise ArcError(f"an arc of radius {abs(radius):g} mm does not reach {chord:g} mm")
+    height = math.sqrt(max(0.0, radius * radius - chord * chord / 4))
+    side = height if (radius > 0) != clockwise else -height
+    x, y = (end[0] - start[0]) / chord, (end[1] - start[1]) / chord
+    return (start[0] + end[0]) / 2 - side * y, (start[1] + end[1]) / 2 + side * x
+
+
+#: A comment that says something of the moves after it, and what it says.
+NOTE = re.compile(
+    r";\s*(TYPE|FEATURE|WIDTH|LINE_WIDTH|HEIGHT|LAYER_HEIGHT|filament_diameter)\s*[:=]\s*(.+)"
+)
+ROLE_NOTES = ("TYPE", "FEATURE")
+WIDTH_NOTES = ("WIDTH", "LINE_WIDTH")
+HEIGHT_NOTES = ("HEIGHT", "LAYER_HEIGHT")
+
+#: Comments by which Cura says that E is a volume.
+VOLUMETRIC = (";FLAVOR:Marlin(Volumetric)", ";FLAVOR:UltiGCode")
+
+_DIALECTS = (
+    ("prusaslicer", "prusaslicer"),
+    ("superslicer", "prusaslicer"),
+    ("slic3r", "prusaslicer"),
+    ("bambustudio", "bambu"),
+    ("orcaslicer", "orca"),
+    ("cura_steamengine", "cura"),
+    ("flavor:", "cura"),
+)
+
+# The first entry whose words all stand in a feature's name names its role.
+_FEATURES = (
+    ("skirt", ("skirt",)),
+    ("skirt", ("brim",)),
+    ("support", ("support",)),
+    ("support", ("tower",)),
+    ("support", ("wipe",)),
+    ("support", ("prime",)),
+    ("custom", ("custom",)),
+    ("ironing", ("ironing",)),
+    ("overhang", ("overhang",)),
+    ("bridge", ("bridge",)),
+    ("gap fill", ("gap",)),
+    ("gap fill", ("thin wall",)),
+    ("outer wall", ("external perimeter",)),
+    ("outer wall", ("outer",)),
+    ("inner wall", ("perimeter",)),
+    ("inner wall", ("inner",)),
+    ("top", ("top",)),
+    ("solid", ("solid",)),
+    ("solid", ("bottom",)),
+    ("solid", ("skin",)),
+    ("infill", ("fill",)),
+    ("infill", ("sparse",)),
+)
+
+
+def dialect_of(comment: str) -> str:
+    """Return the dialect that a comment names, or nothing."""
+    text = comment.lower()
+    return next((dialect for mark, dialect in _DIALECTS if mark in text), "")
+
+
+def role_of(feature: str) -> int:
+    """Return the role of a feature by its name in any of the dialects.
+
+    >>> ROLES[role_of("External perimeter")], ROLES[role_of("WALL-OUTER")]
+    ('outer wall', 'outer wall')
+    """
+    text = feature.strip().lower()
+    for role, words in _FEATURES:
+        if all(word in text for word in words):
+            return ROLES.index(role)
+    return 0
+
+
+_INCH_MM = 25.4
+_AXES = "XYZ"
+_JOINED = re.compile(r"^[GgNn][\d.]+[A-Za-z]|^[Gg]\d.*[\d.][A-Za-z]")  # G1X10Y5: no spaces
+_BRACKETS = re.compile(r"\([^)]*\)")  # comments of another kind
+_SETTINGS = ("G18", "G19", "G20", "G21", "G28", "G90", "G91", "G92", "M82", "M83", "M200")
+
+#: What a row holds: start x, y, z; end x, y, z; filament fed, mm or mm3; height and width of the
+#: bead as announced, nan where they are not; speed mm/s; role; whether fed is a volume; whether
+#: a feature had been announced before.
+COLUMNS = 13
+
+
+class Machine:
+    """The state of a machine while it follows a file."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.line_number = 0
+        self.at = [0.0, 0.0, 0.0]  # mm, machine
+        self.offset = [0.0, 0.0, 0.0]  # mm, machine less what the file calls it
+        self.e = 0.0
+        self.unit = 1.0
+        self.relative = self.relative_e = False
+        self.volumetric = False
+        self.speed = 0.0
+        self.role, self.width, self.height = 0, math.nan, math.nan
+        self.filament = math.nan
+        self.features = False
+        self.rows: list[tuple[float, ...]] = []
+
+    def line(self, line: str) -> None:
+        """Follow one line."""
+        code, mark, comment = line.partition(";")
+        if mark:
+            self._note(mark + comment.rstrip())
+        if "(" in code:
+            code = _BRACKETS.sub("", code)
+        words = _split_words(code) if _JOINED.search(code) else code.split()
+        if not words:
+            return
+        if words[0][0] in "Nn":
+            words = words[1:]
+        command = words[0].upper() if words else ""
+        if command[:1] not in ("G", "M"):
+            return
+        if command in ("G0", "G1", "G00", "G01"):
+            self._move(self._values(words[1:]), "")
+        elif command in ("G2", "G3", "G02", "G03"):
+            self._move(self._values(words[1:]), command[-1])
+        elif command in _SETTINGS:
+            self._set(command, words[1:])
+
+    def _note(self, comment: str) -> None:
+        match = NOTE.match(comment)
+        if match is None:
+            self.volumetric |= comment.startswith(VOLUMETRIC)
+            return
+        key, value = match.groups()
+        if key in ROLE_NOTES:
+            self.features = True
+            self.role = role_of(value)
+            return
+        try:
+            number = float(value.split(",")[0])
+        except ValueError:
+            raise self._error(f"'{value}' is no number in '{comment.strip()}'") from None
+        if key in WIDTH_NOTES:
+            self.width = number
+        elif key in HEIGHT_NOTES:
+            self.height = number
+        elif number > 0:
+            self.filament = number
+
+    def _values(self, words: list[str]) -> dict[str, float]:
+        values = {}
+        for word in words:
+            if word[0] == "*":  # checksum
+                break
+            try:
+                value = float(word[1:].partition("*")[0])
+            except ValueError:
+                value = math.nan
+            if not math.isfinite(value):
+                raise self._error(f"'{word}' is no number")
+            values[word[0].upper()] = value
+        return values
+
+    def _set(self, command: str, words: list[str]) -> None:
+        if command == "G20":
+            self.unit = _INCH_MM
+        elif command == "G21":
+            self.unit = 1.0
+        elif command in ("G90", "G91"):
+            self.relative = command == "G91"
+        elif command in ("M82", "M83"):
+            self.relative_e = command == "M83"
+        elif command == "M200":
+            self.volumetric = self._values(words).get("D", 0.0) > 0
+        elif command in ("G18", "G19"):
+            raise self._error(f"{command}: arcs upright on the bed are not read")
+        elif command == "G28":
+            axes = [k for k in range(3) if any(word[0].upper() == _AXES[k] for word in words)]
+            for axis in axes or range(3):
+                self.at[axis] = self.offset[axis] = 0.0
+        elif command == "G92":
+            for letter, value in self._values(words).items():
+                if letter == "E":
+                    self.e = value * self.unit
+                elif letter in _AXES:
+                    k = _AXES.index(letter)
+                    self.offset[k] = self.at[k] - value * self.unit
+
+    def _move(self, words: dict[str, float], arc: str) -> None:
+        if "F" in words:
+            self.speed = words["F"] * self.unit / 60
+        target = list(self.at)
+        for k, axis in enumerate("XYZ"):
+            if axis in words:
+                base = self.at[k] if self.relative else self.offset[k]
+                target[k] = base + words[axis] * self.unit
+        fed = 0.0
+        if "E" in words:
+            fed = words["E"] * self.unit - (0.0 if self.relative or self.relative_e else self.e)
+            self.e += fed
+        start, end = (self.at[0], self.at[1]), (target[0], target[1])
+        points = [end]
+        if arc:
+            units = {key: words[key] * self.unit for key in "IJR" if key in words}
+            units |= {"P": words["P"]} if "P" in words else {}
+            try:
+                points = chords(start, end, units, clockwise=arc == "2")
+            except ArcError as error:
+                raise self._error(str(error)) from None
+        rise = (target[2] - self.at[2]) / len(points)
+        before, z = start, self.at[2]
+        total = sum(math.dist(a, b) for a, b in zip([start, *points], points, strict=False))
+        for k, point in enumerate(points):
+            after = target[2] if k + 1 == len(points) else z + rise
+            share = math.dist(before, point) / total if total > 0 else 0.0
+            # Plastic without a way is a retraction taken back.
+            volume = max(0.0, fed * share) if total > 0 else 0.0
+            self.rows.append(
+                (*before, z, *point, after, volume, self.height, self.width, self.speed,
+                 self.role, self.volumetric, self.features)
+            )  # fmt: skip
+            before, z = point, after
+        self.at = target
+
+    def _error(self, cause: str) -> PrintError:
+        place = f"{self.name}:{self.line_number}"
+        return PrintError(cause, fix="export the G-code again", place=place)
+
+
+def _split_words(code: str) -> list[str]:
+    """Return the words of a line without spaces."""
+    text = "".join(f" {c}" if c.isalpha() else c for c in code.upper().replace(" ", ""))
+    return text.split()
+
 
 FILAMENT_MM = 1.75  #: diameter where a file does not tell
 _HEAD = 4096  # characters of a file in which its slicer gives its name

@@ -9,6 +9,12 @@ A folder of prints holds what many runs share, by its content::
 A part is printed once for all its faces, in the frame of its own bed; scale and skew act about
 the middle of its box. Each surface is then moved so that the middle of its symbols stands where
 it was designed (`middle`). What a file holds follows from its name, whoever made it and when.
+
+Where the symbols of a printed face stand as a whole: PrintedSurface + Embossing -> mm.
+
+Backlash and the play of layers move a whole panel by some hundredths of a mm against its own
+edges, which no touch of its symbols can know. So places on a print are counted from the middle
+of its symbols. mm, face frame.
 """
 
 from __future__ import annotations
@@ -27,14 +33,50 @@ from generator.alphabet.outline import outlines
 from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
 from generator.printed.deposit import deposit
 from generator.printed.faults import PrintFaults, print_faults
-from generator.printed.middle import symbols_shift
 from generator.printed.profiles import PrintProfile, print_profile, settings_of
 from generator.printed.slicer import slice_part, slicer_version
-from generator.printed.surface import DEPTH_MM, MARGIN_MM, STEP_MM, Floats
-from generator.printed.surface_file import FORMAT, is_written, write_surface
+from generator.printed.surface import (
+    DEPTH_MM,
+    FORMAT,
+    MARGIN_MM,
+    STEP_MM,
+    Floats,
+    PrintedSurface,
+    is_written,
+    write_surface,
+)
+from generator.printed.survey import (
+    DesignLattice,
+    footprint_shift,
+    over_face,
+    symbol_designs,
+)
 from generator.printed.view import face_surface, is_seen
-from generator.solid.emboss import embossing_of
+from generator.solid.emboss import embossing_of, turn
 from generator.solid.part import Embossing
+
+#: A footprint of 10 mm2 has a thousand places then: its middle is known to some um.
+COARSE = DesignLattice(step_mm=0.1)
+
+
+def symbols_shift(
+    surface: PrintedSurface, embossing: Embossing, lattice: DesignLattice = COARSE
+) -> Floats:
+    """Return how far symbols stand from where they were designed, (2,) mm, on average.
+
+    Symbols of which nothing was printed do not count; without any symbol it is 0.
+    """
+    points, designs = symbol_designs(embossing, lattice)
+    R = turn(embossing.rotation_rad)
+    shifts = []
+    for centre, label in zip(embossing.centres_mm, embossing.labels.tolist(), strict=True):
+        design = designs[label]
+        found = surface.heights_mm(centre + points @ R.T).reshape(design.footprint.shape)
+        over, base = over_face(found, design)
+        if np.isfinite(base) and (over[~design.around] > design.height_mm / 2).any():
+            shifts.append(R @ footprint_shift(over, design, points))
+    return np.mean(shifts, axis=0) if shifts else np.zeros(2)
+
 
 GCODE, SURFACES = "gcode", "surfaces"
 

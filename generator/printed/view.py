@@ -2,6 +2,18 @@
 
 Faces that lie level and look up are seen from above, upright ones along the bed. Others are
 refused: they stand on supports or lean, and what a bead does there is not modelled. mm.
+
+Beads -> heights, seen along the bed: the surface of an upright face, with its steps.
+
+In every layer some levels are looked at. At one level a bead is a strip with round ends as
+wide as its section is there, and over each place along the face the outermost strip counts.
+View frame: t along the face (level with the bed), z up, n out of the face; mm.
+
+Beads -> heights, seen from above: the surface of what was printed facing up.
+
+Layer after layer from the top down, each bead is cut into the rows of the grid, and only
+those places of a row are worked out that no higher plastic covers: what lies hidden costs
+next to nothing. mm, part frame.
 """
 
 from __future__ import annotations
@@ -12,13 +24,186 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.errors import PrintError
-from generator.printed.above import heights_from_above
 from generator.printed.beads import Beads
 from generator.printed.deposit import Deposit
-from generator.printed.sideways import heights_sideways
 from generator.printed.surface import DEPTH_MM, MARGIN_MM, STEP_MM, Coverage, PrintedSurface
 
+Index = NDArray[np.int64]
+
+
+def expand_runs(first: Index, count: Index) -> tuple[Index, Index]:
+    """Return owner and number of first, first + 1, ... of each run of `count` numbers.
+
+    >>> [each.tolist() for each in expand_runs(np.array([5, 1]), np.array([2, 1]))]
+    [[0, 0, 1], [5, 6, 1]]
+    """
+    count = count.clip(0)
+    owner = np.repeat(np.arange(len(count)), count)
+    before = np.cumsum(count) - count
+    return owner, np.arange(len(owner)) + (first - before)[owner]
+
+
+def blocks(count: Index, size: int) -> list[Index]:
+    """Return the runs' numbers in blocks of about `size` numbers together."""
+    total = np.cumsum(count)
+    ends = np.arange(size, int(total[-1]) if len(total) else 0, size)
+    return np.split(np.arange(len(count)), np.searchsorted(total, ends) + 1)
+
+
 Floats = NDArray[np.float64]
+
+_BLOCK = 1 << 20  # places worked out at once: bounds the memory
+_UPRIGHT = 1e-9  # a bead whose run along t is less stands across the face
+
+
+def heights_sideways(
+    beads: Beads, low_mm: Floats, shape: tuple[int, int], step_mm: float
+) -> tuple[NDArray[np.float32], int]:
+    """Return n of the outermost plastic over a grid, (nz, nt), and the places worked out.
+
+    Parameters
+    ----------
+    beads
+        All that may show; their places are (t, n).
+    low_mm
+        (2,) t and z of the first place.
+    shape
+        nz, nt.
+    step_mm
+        Between two places.
+    """
+    nz, nt = shape
+    heights = np.full(shape, -np.inf, dtype=np.float32)
+    row0 = np.ceil((beads.top_mm - beads.height_mm - low_mm[1]) / step_mm)
+    row1 = np.floor((beads.top_mm - low_mm[1]) / step_mm) + 1
+    row0, row1 = (row.clip(0, nz).astype(np.int64) for row in (row0, row1))
+    owner, row = expand_runs(row0, row1 - row0)
+    r = beads.height_mm[owner] / 2
+    off = row * step_mm + low_mm[1] - (beads.top_mm[owner] - r)
+    half = beads.width_mm[owner] / 2 - r + np.sqrt((r * r - off * off).clip(0))
+    a, b = beads.start_mm[owner], beads.end_mm[owner]
+    first = np.ceil((np.minimum(a[:, 0], b[:, 0]) - half - low_mm[0]) / step_mm)
+    end = np.floor((np.maximum(a[:, 0], b[:, 0]) + half - low_mm[0]) / step_mm) + 1
+    first, end = (column.clip(0, nt).astype(np.int64) for column in (first, end))
+    count = (end - first).clip(0)
+    for part in blocks(count, _BLOCK):
+        strip, column = expand_runs(first[part], count[part])
+        t = column * step_mm + low_mm[0]
+        n = _highest_of_strips(a[part][strip], b[part][strip], half[part][strip], t)
+        np.maximum.at(heights.reshape(-1), row[part][strip] * nt + column, n.astype(np.float32))
+    return heights, int(count.sum())
+
+
+def _highest_of_strips(a: Floats, b: Floats, half: Floats, t: Floats) -> Floats:
+    """Return the highest n of strips at places t, -inf beside them."""
+    ends = []
+    for end in (a, b):
+        under = half**2 - (t - end[:, 0]) ** 2
+        ends.append(np.where(under >= 0, end[:, 1] + np.sqrt(under.clip(0)), -np.inf))
+    way = b - a
+    length = np.hypot(way[:, 0], way[:, 1])
+    along = np.abs(way[:, 0]) > _UPRIGHT * np.maximum(length, _UPRIGHT)
+    run = np.where(along, way[:, 0], 1.0)
+    lean = way[:, 1] / run  # dn/dt
+    # The long side that faces outwards: its foot on the middle line lies beside t.
+    foot = t + half * lean / np.hypot(1.0, lean)
+    beside = along & (foot >= np.minimum(a[:, 0], b[:, 0])) & (foot <= np.maximum(a[:, 0], b[:, 0]))
+    side = a[:, 1] + (t - a[:, 0]) * lean + half * np.hypot(1.0, lean)
+    return np.maximum(np.maximum(*ends), np.where(beside, side, -np.inf))
+
+
+_FLAT = 1e-9  # a bead whose rise is less of its length lies along the rows
+
+
+def heights_from_above(
+    beads: Beads, low_mm: Floats, shape: tuple[int, int], step_mm: float
+) -> tuple[NDArray[np.float32], int]:
+    """Return z of the highest plastic over a grid, (ny, nx), and the places worked out.
+
+    Parameters
+    ----------
+    beads
+        All that may show.
+    low_mm
+        (2,) x and y of the first place.
+    shape
+        ny, nx.
+    step_mm
+        Between two places.
+    """
+    heights = np.full(shape, -np.inf, dtype=np.float32)
+    order = np.argsort(-beads.top_mm, kind="stable")
+    tops = beads.top_mm[order]
+    worked = 0
+    # Beads of one layer differ by rounding alone; a blob or a string makes a layer of its own.
+    layers = np.flatnonzero(np.diff(np.round(tops / 0.01), prepend=np.inf))
+    for begin, end in zip(layers, np.append(layers, len(tops))[1:], strict=True):
+        layer = beads.chosen(order[begin:end])
+        worked += _lay(heights, layer, low_mm, step_mm)
+    return heights, worked
+
+
+def _lay(heights: NDArray[np.float32], beads: Beads, low: Floats, step: float) -> int:
+    """Raise the heights where beads of one layer are higher; return the places worked out."""
+    ny, nx = heights.shape
+    a, b = beads.start_mm - low, beads.end_mm - low
+    half = beads.width_mm / 2
+    row0 = np.ceil((np.minimum(a[:, 1], b[:, 1]) - half) / step).clip(0, ny).astype(np.int64)
+    row1 = np.floor((np.maximum(a[:, 1], b[:, 1]) + half) / step).clip(-1, ny - 1) + 1
+    owner, row = expand_runs(row0, row1.astype(np.int64) - row0)
+    if not len(owner):
+        return 0
+    first, end = _columns(a, b, half, owner, row.astype(np.float64) * step)
+    first = np.ceil(first / step).clip(0, nx).astype(np.int64)
+    end = (np.floor(end / step).clip(-1, nx - 1) + 1).astype(np.int64)
+    # Only places that are still lower than this layer's tops.
+    free = np.zeros((ny, nx + 1), np.int32)
+    np.cumsum(heights < beads.top_mm.max(), axis=1, out=free[:, 1:])
+    shows = (end > first) & (free[row, end.clip(0, nx)] > free[row, first.clip(0, nx)])
+    owner, row, first, count = owner[shows], row[shows], first[shows], (end - first)[shows]
+    worked = 0
+    for part in blocks(count, _BLOCK):
+        span, column = expand_runs(first[part], count[part])
+        rows, owners = row[part][span], owner[part][span]
+        place = rows * nx + column
+        lower = heights.ravel()[place] < beads.top_mm[owners]
+        place, owners = place[lower], owners[lower]
+        points = np.stack([column[lower] * step, rows[lower] * step], axis=1)
+        z = _profile(beads, a, b, owners, points)
+        np.maximum.at(heights.reshape(-1), place, z.astype(np.float32))
+        worked += len(place)
+    return worked
+
+
+def _columns(a: Floats, b: Floats, half: Floats, owner: Index, y: Floats) -> tuple[Floats, Floats]:
+    """Return between which x each bead may lie in a row: its box, cut by its two long sides."""
+    way = b - a
+    length = np.hypot(way[:, 0], way[:, 1])
+    slanted = np.abs(way[:, 1]) > _FLAT * np.maximum(length, _FLAT)
+    rise = np.where(slanted, way[:, 1], 1.0)
+    across = np.where(slanted, half * length / np.abs(rise), np.inf)
+    middle = a[owner, 0] + (y - a[owner, 1]) * (way[:, 0] / rise)[owner]
+    low = (np.minimum(a[:, 0], b[:, 0]) - half)[owner]
+    high = (np.maximum(a[:, 0], b[:, 0]) + half)[owner]
+    reach = across[owner]
+    return np.maximum(low, middle - reach), np.minimum(high, middle + reach)
+
+
+def _profile(beads: Beads, a: Floats, b: Floats, owner: Index, points: Floats) -> Floats:
+    """Return z of beads at points, -inf beside them."""
+    way = (b - a)[owner]
+    to = points - a[owner]
+    squared = (way * way).sum(axis=1)
+    t = ((to * way).sum(axis=1) / np.where(squared > 0, squared, 1.0)).clip(0, 1)
+    to -= t[:, None] * way
+    off = np.hypot(to[:, 0], to[:, 1])
+    r = beads.height_mm[owner] / 2
+    off -= beads.width_mm[owner] / 2 - r
+    np.maximum(off, 0.0, out=off)
+    under = r * r - off * off
+    z = beads.top_mm[owner] - r + np.sqrt(under.clip(0))
+    return np.where(under >= 0, z, -np.inf)
+
 
 _SQUARE = 1e-6  # of a unit normal
 

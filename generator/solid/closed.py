@@ -20,8 +20,7 @@ from generator.errors import SolidError
 from generator.plane.polygon import face_vector, points_inside
 from generator.plane.rings import boxes_inside, edges_cross
 from generator.solid.emboss import to_part, turn
-from generator.solid.frame import in_frame
-from generator.solid.part import Embossing, Part
+from generator.solid.part import Embossing, Part, in_frame
 from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]

@@ -21,11 +21,9 @@ from generator.plane.polygon import face_vector
 from generator.polyhedron.winged import Polyhedron
 from generator.printers import Printer
 from generator.solid.emboss import embossing_of
-from generator.solid.frame import edge_numbers, in_frame, plane_frame
-from generator.solid.mark_name import NameMark
-from generator.solid.marks import BackMarks, EdgeMark, marks_on
+from generator.solid.marks import BackMarks, EdgeMark, NameMark, marks_on
 from generator.solid.measure import box
-from generator.solid.part import Embossing, Part
+from generator.solid.part import Embossing, Part, edge_numbers, in_frame, plane_frame
 from generator.solid.plate import edge_loops, plain_panels
 from generator.solid.settings import EMBOSS
 from generator.solid.whole import move_part

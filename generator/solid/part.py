@@ -12,13 +12,95 @@ turn by rotation_rad and z the tier's height; `Tiers` tells how its loops run.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
-from generator.solid.analytic import AnalyticFace
+from generator.plane.polygon import plane_axes
+from generator.polyhedron.winged import Polyhedron
+
+Frame = NDArray[np.float64]  #: (4, 4), T_to_from
+
+
+def plane_frame(origin: NDArray[np.float64], ahead: NDArray[np.float64],
+                normal: NDArray[np.float64]) -> Frame:  # fmt: skip
+    """Return the frame at `origin` with z along `normal` and x along `ahead` in the plane."""
+    frame = np.eye(4)
+    frame[:3, :3] = np.stack(plane_axes(normal, ahead), axis=1)
+    frame[:3, 3] = origin
+    return frame
+
+
+def in_frame(T_to_from: Frame, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (n, 3) points given in the `to` frame in the `from` frame."""
+    result: NDArray[np.float64] = (points - T_to_from[:3, 3]) @ T_to_from[:3, :3]
+    return result
+
+
+def edge_numbers(polyhedron: Polyhedron) -> dict[tuple[int, int], int]:
+    """Return the edge number of every directed pair of neighbouring vertices."""
+    numbers: dict[tuple[int, int], int] = {}
+    for number, edge in enumerate(polyhedron.edges):
+        numbers[edge.start, edge.end] = number
+        numbers[edge.end, edge.start] = number
+    return numbers
+
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class BentSymbol:
+    """A symbol on a round face, in the frame of the face's axis."""
+
+    name: str  #: "r12c34"
+    z_mm: tuple[float, ...]  #: height of each tier
+    rings: tuple[tuple[tuple[Points, ...], ...], ...]
+    """[tier][ring][edge] (degree, 3): Bezier curve of an edge, without its end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rim:
+    """The arc of a circle that a round face ends in; at the tip of a cone radius 0."""
+
+    vertices: tuple[int, ...]  #: of the part, to the right; the first again where it is closed
+    radius_mm: float
+    height_mm: float  #: along the axis
+
+
+@dataclass(frozen=True, slots=True)
+class AnalyticFace:
+    """A cylinder or cone face of a part, in place of facets."""
+
+    name: str
+    facets: tuple[int, ...]  #: of the part, that it stands for
+    T_part_axis: Points  #: (4, 4); z along the axis from the lower rim to the upper, line 0 at x
+    low: Rim
+    high: Rim
+    angle_rad: float  #: from the first line to the last, about z
+    concave: bool
+    symbols: tuple[BentSymbol, ...]
+
+    @property
+    def closed(self) -> bool:
+        """Whether it goes all around the axis."""
+        return self.low.vertices[0] == self.low.vertices[-1]
+
+    @property
+    def slope(self) -> float:
+        """Radius that it gains for each mm along the axis; 0 for a cylinder."""
+        return (self.high.radius_mm - self.low.radius_mm) / (
+            self.high.height_mm - self.low.height_mm
+        )
+
+    def radius_at(self, height_mm: Points, z_mm: Points) -> Points:
+        """Return the radius of the face moved outward by z, at heights along the axis."""
+        moved = z_mm * math.hypot(1.0, self.slope) * (-1.0 if self.concave else 1.0)
+        radius: Points = self.low.radius_mm + self.slope * (height_mm - self.low.height_mm) + moved
+        return radius
 
 
 @dataclass(frozen=True, slots=True)

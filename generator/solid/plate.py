@@ -20,10 +20,9 @@ from generator.polyhedron.frame import dihedral, face_frame, face_polygon
 from generator.polyhedron.winged import Polyhedron
 from generator.printers import Printer
 from generator.solid.fit import fit_panels
-from generator.solid.frame import edge_numbers
 from generator.solid.inset import inset, regular, shared_insets
 from generator.solid.mitre import Mitre, mitre, top_inset_mm
-from generator.solid.part import Facet, Part
+from generator.solid.part import Facet, Part, edge_numbers
 from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]

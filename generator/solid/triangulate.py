@@ -5,26 +5,316 @@ the facet, the polygon less the union of these squares, is triangulated once in 
 of the lattice. Neighbouring squares share their corners by number, so nothing is welded
 by distance. A symbol whose square does not lie inside its facet, or that stands on no
 lattice, cuts its foot out of the facet instead. Points on a line are kept everywhere.
+
+A polygon with holes and islands into triangles, keeping every point, proven by its area.
+
+Which lattice squares of an embossing lie whole inside their facet, and their union's outline.
+
+Lattice frame: the facet frame turned into the symbols' axes; mm. Corners are numbered by
+their integer place, so neighbouring squares share them exactly.
 """
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
+from manifold3d import triangulate as ear_clipped
 from numpy.typing import NDArray
 
+from generator.alphabet.outline import Tiers, foot_half_mm
 from generator.errors import SolidError
-from generator.plane.polygon import face_vector
+from generator.plane.polygon import face_vector, signed_area, triangle_areas
+from generator.plane.rings import boxes_inside
 from generator.solid.emboss import to_part, turn
-from generator.solid.frame import in_frame, plane_frame
-from generator.solid.lattice import Squares, squares_of
-from generator.solid.part import Embossing, Facet, Part
-from generator.solid.polygon import triangulate_rings
+from generator.solid.part import Embossing, Facet, Part, in_frame, plane_frame
 from generator.solid.settings import EMBOSS
-from generator.solid.template import SymbolSolid, closed_template, template_of
 
+Ring = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+
+def triangulate_rings(
+    rings: Sequence[Ring], numbers: Index, name: str, flat: float = EMBOSS.flat
+) -> Index:
+    """Return the (m, 3) triangles of an area bounded by rings.
+
+    Parameters
+    ----------
+    rings
+        (k, 2) each; the area lies to the left of every edge, so outer loops run
+        counter-clockwise, holes clockwise.
+    numbers
+        (sum of k,) what to call the points, ring after ring.
+    name
+        Of the facet, for the error.
+    flat
+        Share of its longest side by which a triangle is flat, and avoided if it can be.
+
+    Raises
+    ------
+    SolidError
+        If the triangles do not cover the area exactly once.
+    """
+    points = np.concatenate(rings)
+    if len(points) == 3:
+        found: Index = np.array([[0, 1, 2]])
+    elif len(points) == 4 and len(rings) == 1 and _strictly_convex(points):
+        found = np.array([[0, 1, 2], [0, 2, 3]])
+    else:
+        found = _clip_ears(rings, points, flat)
+    if not _covers(rings, points, found):
+        raise SolidError(
+            "its outline, holes or symbols overlap, so it has no triangulation",
+            fix="keep symbols inside their face and apart from each other",
+            place=name,
+        )
+    named: Index = numbers[found]
+    return named
+
+
+def _clip_ears(rings: Sequence[Ring], points: Ring, flat: float) -> Index:
+    """Return triangles; rings whose points line up are turned until they come out right.
+
+    Ears are clipped from a bridge to each hole, which goes wrong now and then where many holes
+    have corners on one line, as the letters of a name do.
+    """
+    found: Index = np.zeros((0, 3), dtype=np.int64)
+    for angle in EMBOSS.clipping_turns_rad:
+        R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        turned = [ring @ R.T for ring in rings] if angle else list(rings)
+        # The fast path for convex rings makes triangles of three points on a line.
+        found = np.asarray(ear_clipped(turned, allow_convex=False), dtype=np.int64)
+        found = without_slivers(points, found, flat)
+        if _covers(rings, points, found):
+            break
+    return found
+
+
+def _covers(rings: Sequence[Ring], points: Ring, triangles: Index) -> bool:
+    """Whether triangles cover the area between rings exactly once."""
+    areas = triangle_areas(points[triangles])
+    size = float(np.ptp(points, axis=0).max()) ** 2
+    wanted = sum(signed_area(ring) for ring in rings)
+    if len(triangles) == 0 or areas.min() < -1e-12 * size:
+        return False
+    return bool(abs(areas.sum() - wanted) <= 1e-9 * size)
+
+
+def without_slivers(points: Ring, triangles: Index, share: float = EMBOSS.flat) -> Index:
+    """Return a triangulation in which triangles of three points on a line are flipped away.
+
+    Such a triangle has its longest side in common with another one; exchanging that side
+    for the other diagonal leaves two proper triangles. The outline stays.
+
+    Parameters
+    ----------
+    points
+        (n, 2).
+    triangles
+        (m, 3), counter-clockwise, flat ones included.
+    share
+        Of its longest side: a thinner triangle is flat.
+    """
+    flat = _is_sliver(points, triangles, share)
+    if not flat.any():
+        return triangles
+    faces = [tuple(face) for face in triangles.tolist()]
+    holder = {
+        (face[k], face[(k + 1) % 3]): number for number, face in enumerate(faces) for k in range(3)
+    }
+    waiting = np.flatnonzero(flat).tolist()
+    for _ in range(10 * len(faces)):
+        if not waiting:
+            break
+        number = waiting.pop()
+        face = faces[number]
+        if not _is_sliver(points, np.array([face]), share)[0]:
+            continue
+        sides = [(face[k], face[(k + 1) % 3]) for k in range(3)]
+        a, c = max(sides, key=lambda side: float(np.hypot(*(points[side[1]] - points[side[0]]))))
+        b = next(corner for corner in face if corner not in (a, c))
+        other = holder.get((c, a))
+        if other is None:
+            continue
+        d = next(corner for corner in faces[other] if corner not in (a, c))
+        for place, made in ((number, (a, d, b)), (other, (d, c, b))):
+            faces[place] = made
+            for k in range(3):
+                holder[made[k], made[(k + 1) % 3]] = place
+        waiting += [number, other]
+    return np.array(faces, dtype=np.int64)
+
+
+def _is_sliver(points: Ring, triangles: Index, share: float) -> NDArray[np.bool_]:
+    """Whether triangles are thinner than a share of their longest side."""
+    corners = points[triangles]
+    u = np.roll(corners, -1, axis=1) - corners
+    longest = (u**2).sum(axis=2).max(axis=1)
+    twice = u[:, 0, 0] * u[:, 1, 1] - u[:, 0, 1] * u[:, 1, 0]
+    thin: NDArray[np.bool_] = np.abs(twice) <= share * longest
+    return thin
+
+
+def _strictly_convex(ring: Ring) -> bool:
+    edge = np.roll(ring, -1, axis=0) - ring
+    ahead = np.roll(edge, -1, axis=0)
+    turn = edge[:, 0] * ahead[:, 1] - edge[:, 1] * ahead[:, 0]
+    return bool((turn > 1e-9 * np.hypot(*edge.T) * np.hypot(*ahead.T)).all())
+
+
+@dataclass(slots=True)
+class Squares:
+    """The full squares of one embossing."""
+
+    full: NDArray[np.bool_]  #: (n,) which symbols have theirs
+    corners: Index  #: (n, 4) numbers into `points`, counter-clockwise; -1 without a square
+    points: Ring  #: (c, 2) lattice frame
+    outline: list[Index]  #: loops of `points` around the union, the union to the right
+    first: int = 0  #: mesh number of the first of `points`
+
+
+def squares_of(embossing: Embossing, rings: Sequence[Ring]) -> Squares | None:
+    """Return the full squares of an embossing, or None if it has none.
+
+    Parameters
+    ----------
+    embossing
+        Symbols of one facet.
+    rings
+        The facet's loops in the lattice frame.
+    """
+    pitch = embossing.pitch_mm
+    if pitch <= 0 or not len(embossing.labels):
+        return None
+    centres = embossing.centres_mm @ turn(embossing.rotation_rad)
+    cells = np.rint((centres - centres[0]) / pitch).astype(np.int64)
+    on_lattice = (
+        np.abs(centres - centres[0] - cells * pitch).max(axis=1) <= EMBOSS.on_lattice * pitch
+    )
+    halves = np.array([foot_half_mm(tiers) for tiers in embossing.tiers])
+    full = on_lattice & (halves[embossing.labels] < pitch * (0.5 - EMBOSS.on_lattice))
+    full &= boxes_inside(centres, pitch * (0.5 + EMBOSS.on_lattice), rings)
+    cells -= cells.min(axis=0)
+    stride = int(cells[:, 1].max()) + 2
+    steps = np.array([0, stride, stride + 1, 1])  # lower left, lower right, upper right, upper left
+    keys = (cells[:, 0] * stride + cells[:, 1])[:, None] + steps
+    _, once = np.unique(keys[:, 0], return_index=True)
+    full &= np.isin(np.arange(len(full)), once)
+    _drop_pinches(full, keys)
+    if not full.any():
+        return None
+    known, numbers = np.unique(keys[full], return_inverse=True)
+    corners = np.full((len(full), 4), -1, dtype=np.int64)
+    corners[full] = numbers.reshape(-1, 4)
+    origin = centres[0] - pitch * np.rint((centres[0] - centres.min(axis=0)) / pitch)
+    places = np.stack([known // stride, known % stride], axis=1)
+    points = origin + (places - 0.5) * pitch
+    return Squares(full, corners, points, _outline(corners[full], len(known)))
+
+
+def _drop_pinches(full: NDArray[np.bool_], keys: Index) -> None:
+    """Take squares away until no two of them touch in a corner alone."""
+    while full.any():
+        chosen = np.flatnonzero(full)
+        known, numbers = np.unique(keys[chosen], return_inverse=True)
+        # Sums of 1, 2, 4, 8: which quarters around a corner are covered, exact as floats.
+        weights = np.tile([1.0, 2.0, 4.0, 8.0], len(chosen))
+        quarters = np.bincount(numbers.ravel(), weights, len(known))
+        pinched = (quarters == 5) | (quarters == 10)
+        if not pinched.any():
+            return
+        # Of the two, the one that has the corner at its lower side goes.
+        at = pinched[numbers.reshape(-1, 4)]
+        full[chosen[at[:, 0] | at[:, 1]]] = False
+
+
+def _outline(corners: Index, count: int) -> list[Index]:
+    """Return the loops around a union of squares, with the squares to the right."""
+    start = corners.ravel()
+    end = np.roll(corners, -1, axis=1).ravel()
+    border = ~np.isin(start * count + end, end * count + start)
+    after = np.full(count, -1, dtype=np.int64)
+    after[end[border]] = start[border]
+    ahead = after.tolist()
+    loops = []
+    for first in np.flatnonzero(after >= 0).tolist():
+        loop, at = [], first
+        while ahead[at] >= 0:
+            loop.append(at)
+            ahead[at], at = -1, ahead[at]
+        if loop:
+            loops.append(np.array(loop, dtype=np.int64))
+    return loops
+
+
+@dataclass(frozen=True, slots=True)
+class SymbolSolid:
+    """Points in the symbol's axes, tier after tier and ring after ring, and its triangles."""
+
+    points: NDArray[np.float64]  #: (k, 3) mm
+    own: Index  #: (m, 3) points: sides and top; with the foot where the symbol is a solid
+    base: Index  #: (b, 3) of the four corners of the square (0-3) and points (from 4): the facet
+    foot: tuple[Index, ...]  #: points of each ring in the facet
+
+
+@lru_cache(maxsize=256)  # some 10 KB each
+def template_of(tiers: Tiers, pitch_mm: float) -> SymbolSolid:
+    """Return the template of a symbol on a facet.
+
+    With a pitch it brings the facet inside its lattice square along, corners
+    counter-clockwise from the lower left; with pitch 0 the foot is cut out of the facet.
+    """
+    points, rings = _number_points(tiers)
+    base = np.zeros((0, 3), dtype=np.int64)
+    if pitch_mm > 0:
+        h = pitch_mm / 2
+        square = np.array([[-h, -h], [h, -h], [h, h], [-h, h]])
+        foot = [ring[::-1] for ring in tiers.rings[0]]
+        numbers = [np.arange(4), *(4 + ring[::-1] for ring in rings[0])]
+        base = triangulate_rings([square, *foot], np.concatenate(numbers), "a symbol's square")
+    own = np.concatenate([_sides(rings), _top(tiers, rings)])
+    return SymbolSolid(points, own, base, tuple(rings[0]))
+
+
+@lru_cache(maxsize=256)
+def closed_template(tiers: Tiers) -> SymbolSolid:
+    """Return the template of a symbol as a solid of its own, with its foot as a bottom."""
+    points, rings = _number_points(tiers)
+    bottom = triangulate_rings(tiers.rings[0], np.concatenate(rings[0]), "a symbol's foot")[:, ::-1]
+    own = np.concatenate([_sides(rings), _top(tiers, rings), bottom])
+    return SymbolSolid(points, own, np.zeros((0, 3), dtype=np.int64), tuple(rings[0]))
+
+
+def _number_points(tiers: Tiers) -> tuple[NDArray[np.float64], list[list[Index]]]:
+    """Return all points, and the numbers of each tier's rings."""
+    points, numbers, count = [], [], 0
+    for z, rings in zip(tiers.z_mm, tiers.rings, strict=True):
+        tier = []
+        for ring in rings:
+            points.append(np.c_[ring, np.full(len(ring), z)])
+            tier.append(np.arange(count, count + len(ring)))
+            count += len(ring)
+        numbers.append(tier)
+    return np.concatenate(points), numbers
+
+
+def _sides(numbers: list[list[Index]]) -> Index:
+    """Return the triangles between neighbouring tiers; the same order rises and falls."""
+    found = []
+    for lower, upper in itertools.pairwise(numbers):
+        for a, b in zip(lower, upper, strict=True):
+            ahead_a, ahead_b = np.roll(a, -1), np.roll(b, -1)
+            found += [np.stack([a, ahead_a, ahead_b], 1), np.stack([a, ahead_b, b], 1)]
+    return np.concatenate(found)
+
+
+def _top(tiers: Tiers, numbers: list[list[Index]]) -> Index:
+    """Return the triangles of the last tier."""
+    return triangulate_rings(tiers.rings[-1], np.concatenate(numbers[-1]), "a symbol's top")
 
 
 @dataclass(frozen=True, slots=True)

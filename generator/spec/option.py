@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import get_args
 
 from pydantic_core import PydanticCustomError
 
 from encoded_objects.base.document import Problem, did_you_mean
 from encoded_objects.base.sensor_type import SENSOR_FILES
+from generator.export.formats import EXPORTERS
 from generator.spec.problem import SpecError
-from generator.spec.settings import Format, database_url
+from generator.spec.settings import database_url
 
 
 def format_option(text: str) -> tuple[str, ...]:
     """Return the formats of `--format step,stl`; raises `SpecError`."""
-    known = get_args(Format)
+    known = tuple(EXPORTERS)
     names = [part.strip().lower().lstrip(".") for part in text.split(",") if part.strip()]
     problems = []
     for name in names:

@@ -23,6 +23,7 @@ from encoded_objects.base.settings import (
 from generator.alphabet.known import ALPHABETS
 from generator.array.lab_key import read_lab_key
 from generator.errors import LabKeyError
+from generator.export.formats import EXPORTERS
 from generator.spec.encoding import Encoding
 from generator.spec.name import ObjectName
 from generator.spec.printer import PrinterChoice
@@ -30,15 +31,16 @@ from generator.spec.shape import EXAMPLES, Shape
 
 if TYPE_CHECKING:
     AlphabetName = str
-else:
-    AlphabetName = Literal[tuple(ALPHABETS)]  # those that are registered
+    Format = str
+else:  # those that are registered
+    AlphabetName = Literal[tuple(ALPHABETS)]
+    Format = Literal[tuple(EXPORTERS)]
 
 SPEC_VERSION = 1
 COPIES_MAX = 1000
 SCHEMES = ("sqlite", "postgresql", "postgres", "postgresql+psycopg")  #: of databases
 
 ProfileName = Literal["one-touch", "thesis", "product", "large", "fine", "auto"]
-Format = Literal["step", "stl", "3mf", "glb", "stpz", "mjcf", "urdf", "sdf", "usd"]
 
 
 def version(value: Any) -> Any:

@@ -10,13 +10,13 @@ import hashlib
 import json
 import math
 import os
-import tempfile
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from encoded_objects.base.files import whole_file
 from probe.calibration.value import VERSION, Calibration, Condition
 from probe.circuit import Electronics, Noise
 from probe.errors import CalibrationError, CircuitError
@@ -45,20 +45,10 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike[str]) ->
     text, name = _text(calibration), Path(path)
     digest = hashlib.sha256(text.encode()).hexdigest()
     content = f'{text.removesuffix(chr(10) + "}" + chr(10))},\n  "sha256": "{digest}"\n}}\n'
-    staged = ""
     try:
-        with tempfile.NamedTemporaryFile(
-            "w", encoding="utf-8", dir=name.parent, prefix=f".{name.name}.", delete=False
-        ) as file:
-            staged = file.name
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(staged, 0o644)
-        os.replace(staged, name)
+        with whole_file(name) as file:
+            file.write(content.encode())
     except OSError as error:
-        if staged:
-            Path(staged).unlink(missing_ok=True)
         raise CalibrationError(
             f"cannot be written: {error.strerror}", fix="choose another folder", place=str(name)
         ) from error

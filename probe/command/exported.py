@@ -87,7 +87,7 @@ def export_files(
 
         export_csv(path, csv, live=live)
     if mcap is not None:
-        from probe.recording.mcap_writer import export_mcap
+        from probe.recording.mcap import export_mcap
 
         with staged_file(mcap) as draft:
             export_mcap(recording, draft)

@@ -102,7 +102,7 @@ def import_(
 
         check_output(output, replace=replace)
         if array.suffix.lower() == ".mcap":
-            from probe.recording.mcap_reader import import_mcap
+            from probe.recording.mcap import import_mcap
 
             made = import_mcap(array, output, sensor_type=sensor_type, replace=replace)
         else:

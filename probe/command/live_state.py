@@ -20,7 +20,7 @@ from probe.calibration import Calibration, calibrate_image, calibration_hash, dr
 from probe.calibration.settings import AVERAGE
 from probe.command.settings import COMMAND
 from probe.frame import Frame, median_filter
-from probe.recording.names import next_free
+from probe.recording.files import next_free
 from probe.recording.record import Recorder
 
 Image = NDArray[np.float64]

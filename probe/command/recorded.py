@@ -25,7 +25,7 @@ from probe.command.settings import COMMAND
 from probe.errors import PortError, RecordingError
 from probe.frame import Frame
 from probe.port.typed import typed_port
-from probe.recording.names import check_name
+from probe.recording.files import check_name
 from probe.recording.record import Recorder
 
 

@@ -89,7 +89,7 @@ def simulate(
 
     def action() -> int:
         from probe.command.simulated import check_outputs, simulate_touches
-        from probe.simulate.simulated_probe import SimulatedProbe, TouchOptions
+        from probe.simulate.simulation import SimulatedProbe, TouchOptions
 
         if overlay not in ("", "tab", "pad"):
             raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")

@@ -15,7 +15,7 @@ from encoded_objects.base.errors import require
 from encoded_objects.base.files import refuse_taken, staged_file
 from encoded_objects.base.output import message, progress_bar, write, write_json
 from probe.command.recorded import check_output
-from probe.simulate.simulated_probe import SimulatedProbe, SimulatedTouch
+from probe.simulate.simulation import SimulatedProbe, SimulatedTouch
 
 
 def simulate_touches(

@@ -1,12 +1,11 @@
-"""What a contact model takes and gives. Thesis 4.2.
+"""Contact models: what they take and give. Thesis 4.2.
 
-The plate that carries the sensor is rigid. Over the surface its tips' plane stands at
+The plate that carries the sensor is rigid. Over the surface the plane of its tips stands at
 
     zeta(x, y) = z + tilt_x * y - tilt_y * x        (x, y in the sensor frame, small tilts)
 
 and presses the overlay by h(x, y) - zeta(x, y) where that is positive; h is the height of
-the surface under the sensor's point. `Touch` says where the sensor stands and how it is
-loaded, `Contact` what every tactel feels. mm, N, rad.
+the surface under the sensor's point: finite, or -inf where there is no matter. mm, N, rad.
 """
 
 from __future__ import annotations
@@ -16,6 +15,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
+from probe.errors import ContactError
+from probe.surface.contract import HeightMap
+
+Array = NDArray[np.float64]
+
+STEEPEST_RAD = 0.35  #: largest tilt of the plate; beyond, tilts are not small
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,3 +69,29 @@ class Contact:
     tilt_y_rad: float
     level: str  #: footprint, tabs, layer, elements
     iterations: int
+
+
+def heights_at(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
+    """Return heights (...), mm, at points (..., 2) of the sensor frame.
+
+    Raises
+    ------
+    ContactError
+        For heights that are no numbers, or +inf.
+    """
+    asked = touch.on_surface(points_mm.reshape(-1, 2))
+    heights = np.asarray(surface.heights_mm(asked), np.float64)
+    if heights.shape != (len(asked),) or not heights.max(initial=-np.inf) < np.inf:  # NaN, too
+        raise ContactError(
+            "the surface gives heights that are no numbers",
+            fix="give a finite height at each point, or -inf where there is no matter",
+        )
+    return heights.reshape(points_mm.shape[:-1])
+
+
+def nothing_under(touch: Touch) -> ContactError:
+    """Return the refusal of a touch under which there is no matter."""
+    return ContactError(
+        f"there is nothing under the sensor to bear {touch.force_n:g} N",
+        fix="move the sensor over the object",
+    )

@@ -1,11 +1,11 @@
 """What presses on top of a pad, out of what arrives at its base, as far as it can be known.
 
 Forces on the tactels under a pad (N) -> forces on the pad's top over each tactel (N). A wave
-of pressure arrives at the base as B(q h) (`layer_kernel`); at the tactels' Nyquist frequency
+of pressure arrives at the base as B(q h) (`layer_influence`); at the tactels' Nyquist frequency
 of 0.61 (h = 1 mm), 0.185 (2 mm), 0.0065 (4 mm, nu = .4999). To invert that is to grow the noise
 by its inverse, so
 
-- below `DEBLUR.least` at Nyquist (h >= 4 mm at the usual pitch) it is refused;
+- below `LEAST_SHARE` at Nyquist (h >= 4 mm at the usual pitch) it is refused;
 - above, forces f >= 0 are sought for which |K f - m|^2 + (sigma/tau)^2 |f|^2 is least: K is
   the layer's blur from tactel to tactel, m the readings, sigma their noise, tau the root mean
   square of m. What lies under the noise is left out, not invented, and its extent is told.
@@ -29,12 +29,13 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.layer_influence import influence, nearest_tactel
-from probe.contact.layer_kernel import base_ratio
-from probe.contact.settings import DEBLUR
+from probe.contact.layer_influence import base_ratio, influence, nearest_tactel
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
+
+LEAST_SHARE = 0.01  #: of a wave at the tactels' Nyquist frequency that must arrive
+CELLS = 4  # of the layer, per tactel: finer than the blur
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,12 +77,12 @@ def deblur(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> Deblur
         raise ContactError(
             f"a noise of {noise_n:g} N", fix="give the standard deviation of one reading, >= 0"
         )
-    influence(sensor, DEBLUR.cells)  # refuses what is no pad
+    influence(sensor, CELLS)  # refuses what is no pad
     arrives = transmitted_share(sensor)
-    if arrives < DEBLUR.least:
+    if arrives < LEAST_SHARE:
         raise ContactError(
             f"a pad of {sensor.overlay.height_mm:g} mm passes {arrives:.2g} of a wave that is two "
-            f"tactels long, {DEBLUR.least:g} is needed: its blur cannot be inverted without noise "
+            f"tactels long, {LEAST_SHARE:g} is needed: its blur cannot be inverted without noise "
             "drowning the image",
             fix=f"take a pad of at most {math.floor(100 * thickest_mm(sensor)) / 100:g} mm, tabs, "
             "or the image as it is",
@@ -110,9 +111,9 @@ def thickest_mm(sensor: SensorType) -> float:
     """Return the height of the highest pad of the sensor's material that can be deblurred."""
     from scipy.optimize import brentq
 
-    # At s = 8 half of DEBLUR.least arrives, at any Poisson's ratio.
+    # At s = 8 half of LEAST_SHARE arrives, at any Poisson's ratio.
     s = brentq(
-        lambda s: float(base_ratio(np.array(s), sensor.overlay.poisson)) - DEBLUR.least, 0.0, 8.0
+        lambda s: float(base_ratio(np.array(s), sensor.overlay.poisson)) - LEAST_SHARE, 0.0, 8.0
     )
     return float(s) * sensor.pitch_mm / math.pi
 
@@ -137,7 +138,7 @@ def blur_of(sensor: SensorType) -> tuple[Array, Array]:
     ContactError
         When the overlay is no pad.
     """
-    grid = influence(sensor, DEBLUR.cells)
+    grid = influence(sensor, CELLS)
     n, dx, height = grid.cells_per_tactel, grid.dx_mm, sensor.overlay.height_mm
     down, right = (
         frequency(cells)

@@ -1,33 +1,45 @@
 """Level "elements": the one-piece pad by finite elements in space, its edge included. Thesis 4.2.
 
-The independent check of level "layer", and the level for what a layer without end cannot tell:
-the pad's free sides. Small strain; the surface is rigid and without friction. A pad is
+The independent check of level "layer", and the level for the pad's free sides, which a layer
+without end leaves out. Small strain; the surface is rigid and without friction. A pad is
 condensed once (`elements_pad`), kept in memory, and serves every further touch.
 
-Heights are asked at the nodes of the top, half an element apart: where a surface has walls,
+Heights are sampled at the nodes of the top, half an element apart: where a surface has walls,
 give their places as `walls_mm`, so that lines of the mesh lie there; otherwise an edge counts
-as if it stood at the next node. Strokes that the nodes miss, or are too wide for, are refused
-(`elements_seen`).
+as if it stood at the next node. A stroke thinner than the mesh can lie between nodes, or count as
+if it were as wide as the mesh. Once the touch is solved, lines with many points run through the
+nodes, along x and along y, and find both; such strokes are refused. mm, sensor frame.
 """
 
 from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import Contact, Touch
-from probe.contact.elements_line import Array
-from probe.contact.elements_pad import CondensedPad, PadLines, condense
-from probe.contact.elements_seen import refuse_unseen
+from probe.contact.contract import STEEPEST_RAD, Contact, Touch, heights_at
+from probe.contact.elements_pad import Array, CondensedPad, PadLines, condense
 from probe.contact.elements_unilateral import rest, tips
-from probe.contact.heights import heights_at
-from probe.contact.settings import CONTACT, ELEMENTS
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
+
+Value = TypeVar("Value", np.float64, np.bool_)
+
+KEPT = 2  # condensed pads
+ROUGH = 0.25  # of the deepest point: strokes between the nodes that rise less are accepted
+GROWTH = 1.5  # from element to element of the margin
+WALL_LINES = 0.15  # of an element: from a wall to the lines next to it
+NEAR = 0.1  # of an element: no two lines are as near as that, but walls and tactels
+TINY = 1e-6  # of an element: the same place
+FINER = 1.6  # elements get thinner towards the top, by this power
+SIGHT_STEP_MM = 0.01  # between the points of a line, the thinnest stroke that a face can carry
+SIGHT_POINTS = 4000  # of a line, at most
+SIGHT_LINES = 70  # each way, at most
+COVERED = 0.25  # of the place of a node that bears alone: less is not the node's to bear
 
 
 def elements(
@@ -86,7 +98,7 @@ def elements(
         refuse_unseen(surface, touch, lines, low, low, np.zeros(grid, dtype=bool), 0.0)
     found = rest(nodes, heights, pad.between, pad.displaced, touch, height / 50)
     z, tilt_x, tilt_y = (float(v) for v in found.plate)
-    if max(abs(tilt_x), abs(tilt_y)) > CONTACT.steepest_rad:
+    if max(abs(tilt_x), abs(tilt_y)) > STEEPEST_RAD:
         raise tips()
     sunk = pad.displaced(found.forces)
     deepest = float(sunk.max())
@@ -99,7 +111,7 @@ def elements(
         heights.reshape(grid),
         top.reshape(grid),
         bears,
-        ELEMENTS.rough * deepest,
+        ROUGH * deepest,
     )
     if deepest >= height:
         raise ContactError(
@@ -125,7 +137,7 @@ def condensed_pad(
     return _condense(sensor, per_tactel, layers, float(margin_mm), walls[0], walls[1], memory_gb)
 
 
-@lru_cache(maxsize=ELEMENTS.kept)
+@lru_cache(maxsize=KEPT)
 def _condense(
     sensor: SensorType,
     per_tactel: int,
@@ -145,7 +157,7 @@ def _condense(
     lines = PadLines(
         _element_boundaries(sensor.columns, pitch, per_tactel, margin_mm, walls_x),
         _element_boundaries(sensor.rows, pitch, per_tactel, margin_mm, walls_y),
-        overlay.height_mm * (1 - (1 - np.linspace(0, 1, layers + 1)) ** ELEMENTS.finer),
+        overlay.height_mm * (1 - (1 - np.linspace(0, 1, layers + 1)) ** FINER),
     )
     tactels = ((sensor.rows + 1) // 2) * ((sensor.columns + 1) // 2)
     needed = lines.bytes_needed(tactels) / 1e9
@@ -177,23 +189,21 @@ def _element_boundaries(
     if margin > 0:
         count = max(
             1,
-            math.ceil(
-                math.log1p(margin / size * (ELEMENTS.growth - 1)) / math.log(ELEMENTS.growth)
-            ),
+            math.ceil(math.log1p(margin / size * (GROWTH - 1)) / math.log(GROWTH)),
         )
-        steps = np.cumsum(ELEMENTS.growth ** np.arange(count))
+        steps = np.cumsum(GROWTH ** np.arange(count))
         lines = np.concatenate([lines, lines[-1] + margin * steps / steps[-1]])
     walls = tuple(w for w in walls if 0 < w < lines[-1])
     firm = np.concatenate([firm, walls, lines[-1:]])
     for wall in walls:  # a line there, in place of one too near, and one close by on each side
-        apart = np.abs(lines - wall) > ELEMENTS.near * size
-        held = (np.abs(lines[:, None] - firm) <= ELEMENTS.tiny * size).any(axis=1)
+        apart = np.abs(lines - wall) > NEAR * size
+        held = (np.abs(lines[:, None] - firm) <= TINY * size).any(axis=1)
         lines = np.append(lines[apart | held], wall)
-        for beside in (wall - ELEMENTS.beside * size, wall + ELEMENTS.beside * size):
-            if 0 < beside < lines.max() and np.abs(lines - beside).min() > ELEMENTS.near * size:
+        for beside in (wall - WALL_LINES * size, wall + WALL_LINES * size):
+            if 0 < beside < lines.max() and np.abs(lines - beside).min() > NEAR * size:
                 lines = np.append(lines, beside)
     lines = np.sort(lines)
-    return np.asarray(lines[np.append(True, np.diff(lines) > ELEMENTS.tiny * size)])
+    return np.asarray(lines[np.append(True, np.diff(lines) > TINY * size)])
 
 
 def _check_touch(sensor: SensorType, touch: Touch) -> None:
@@ -227,3 +237,85 @@ def _check_touch(sensor: SensorType, touch: Touch) -> None:
                 f"the {name} is {value:g}, it must be 0 or more, and finite",
                 fix="correct the touch",
             )
+
+
+def refuse_unseen(
+    surface: HeightMap,
+    touch: Touch,
+    lines: tuple[Array, Array],
+    heights_mm: Array,
+    top_mm: Array,
+    bears: NDArray[np.bool_],
+    slack_mm: float,
+) -> None:
+    """Refuse a touch whose strokes are too thin for the mesh.
+
+    Parameters
+    ----------
+    lines
+        (mx,) and (my,) coordinates of the nodes, ascending.
+    heights_mm
+        (mx, my) of the surface at the nodes.
+    top_mm
+        (mx, my) of the pressed top at the nodes.
+    bears
+        (mx, my) nodes that bear a force.
+    slack_mm
+        Strokes that stand out by less are roughness.
+
+    Raises
+    ------
+    ContactError
+        When something lies between the nodes, or a node bears for a thinner stroke.
+    """
+    x, y = lines
+    for along, across, swapped in ((x, y, False), (y, x, True)):
+        rows = np.arange(across.size)[:: -(-across.size // SIGHT_LINES)]
+        seen, top = ((grid if swapped else grid.T)[rows] for grid in (heights_mm, top_mm))
+        bearing = (bears if swapped else bears.T)[rows]
+        fine = _places(along)
+        points = np.stack(np.meshgrid(fine, across[rows]), axis=-1)
+        asked = points[..., ::-1] if swapped else points
+        found = heights_at(surface, touch, asked)
+        after = np.searchsorted(along, fine)
+        # What a node beside it bears is no more than an edge that is not on a line of the mesh.
+        around = _neighbour_maximum(top)
+        hidden = found > np.maximum(around[:, after - 1], around[:, after]) + slack_mm
+        # A node that stands out of both of its neighbours has at least its place's share there.
+        beside = np.pad(seen, ((0, 0), (1, 1)), constant_values=-np.inf)
+        lower = np.maximum(beside[:, :-2], beside[:, 2:])
+        ridge = bearing & (seen > lower + slack_mm)
+        nearest = np.searchsorted((along[1:] + along[:-1]) / 2, fine)
+        starts = np.searchsorted(nearest, np.arange(along.size))
+        half = np.where(np.isfinite(lower), (lower + seen) / 2, lower)
+        there = np.add.reduceat(found > half[:, nearest], starts, axis=1)
+        full = there >= COVERED * np.diff(np.append(starts, fine.size))
+        thin = ridge & ~full & ~_neighbour_maximum(bearing & full)
+        if hidden.any() or thin.any():
+            height = found[hidden].max() if hidden.any() else seen[thin].max()
+            raise ContactError(
+                f"strokes that rise to {height:.4g} mm are too thin for a mesh with nodes "
+                f"{np.diff(along).max():.2g} mm apart",
+                fix="give the strokes' walls_mm, more elements per_tactel, or take level layer",
+            )
+
+
+def _places(along: Array) -> Array:
+    """Return points along a line of nodes, several around each, ascending, ends left out."""
+    parts = np.clip(np.ceil(np.diff(along) / SIGHT_STEP_MM), 4, SIGHT_POINTS // along.size).astype(
+        int
+    )
+    return np.concatenate(
+        [
+            a + (b - a) * (np.arange(n) + 0.5) / n
+            for a, b, n in zip(along[:-1], along[1:], parts, strict=True)
+        ]
+    )
+
+
+def _neighbour_maximum(rows: NDArray[Value]) -> NDArray[Value]:
+    """Return the largest of each value and those in the rows before and after it."""
+    found = rows.copy()
+    np.maximum(found[1:], rows[:-1], out=found[1:])
+    np.maximum(found[:-1], rows[1:], out=found[:-1])
+    return found

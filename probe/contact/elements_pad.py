@@ -1,8 +1,9 @@
-"""A one-piece pad as finite elements, condensed to what a touch needs. Thesis 4.2.
+"""A one-piece pad as finite elements, condensed to its top nodes and tactels. Thesis 4.2.
 
 Quadratic bricks with a linear pressure of their own in each of them (Q2-P1: no locking), bonded
 at the base, free at the sides, loaded by normal forces on the nodes of the top. The mesh is a
-product of three lines, so each matrix is a sum of Kronecker products of matrices along a line.
+product of three lines, so each matrix is a sum of Kronecker products of matrices along a line and
+needs no assembly in space. Nodes of a line ascend, the middle ones of quadratic elements included.
 
 The pad is symmetric about x = 0 and y = 0: a quarter of it serves, in the four parities
 (even, odd) x (even, odd). One sweep of block Cholesky along x gives, for each of them, the
@@ -13,16 +14,133 @@ mm, N, MPa; x, y in the sensor frame, w = displacement of the top into the pad.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from skfem import Basis, BilinearForm, ElementLineP0, ElementLineP1, ElementLineP2, MeshLine
 
-from probe.contact.elements_line import Array, Quadratic, mirror, per_tactel, quadratic
-from probe.contact.settings import ELEMENTS
+Array = NDArray[np.float64]
+
+COMPRESSIBLE = 1e-7  # 1 - 2 nu counts as at least this; bulk over shear modulus 1e7
+
+
+LINE_ELEMENTS = (ElementLineP0, ElementLineP1, ElementLineP2)
+POINTS = {0: 3, 1: 3, 2: 5}  #: order of the quadrature by order of the displacement
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineBasis:
+    """Shape functions of one order on a line."""
+
+    basis: Any
+    order: NDArray[np.intp]  #: of the basis's unknowns along the line
+
+    @property
+    def places(self) -> Array:
+        """Nodes, or middles of the elements, (n,), ascending."""
+        places: Array = self.basis.doflocs[0][self.order]
+        return places
+
+    @property
+    def points(self) -> Array:
+        """Points of the quadrature, (elements, points)."""
+        points: Array = np.array(self.basis.global_coordinates()[0])
+        return points
+
+
+def line_bases(boundaries: Array, *degrees: int) -> tuple[LineBasis, ...]:
+    """Return shape functions of some degrees (0 ... 2) over elements between boundaries.
+
+    All share the quadrature of the first.
+    """
+    mesh = MeshLine(np.asarray(boundaries, dtype=np.float64))
+    basis = Basis(mesh, LINE_ELEMENTS[degrees[0]](), intorder=POINTS[degrees[0]])
+    bases = [basis, *(basis.with_element(LINE_ELEMENTS[d]()) for d in degrees[1:])]
+    return tuple(LineBasis(b, np.argsort(b.doflocs[0], kind="stable")) for b in bases)
+
+
+def integral(
+    form: Callable[[Any, Any], Any], trial: LineBasis, test: LineBasis, weight: Array | float = 1.0
+) -> sp.csr_matrix:
+    """Integrate form(u, v) times a weight at the quadrature's points: (test, trial)."""
+    found = BilinearForm(lambda u, v, _: form(u, v) * weight).assemble(trial.basis, test.basis)
+    return sp.csr_matrix(found)[test.order][:, trial.order]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Quadratic:
+    """Integrals of quadratic shape functions f, and of their products with linear pressures."""
+
+    nodes: Array  #: (2 n + 1,) mm
+    lengths: Array  #: (n,) of the elements, mm
+    mass: sp.csr_matrix  #: of f f
+    stiffness: sp.csr_matrix  #: of f' f'
+    mixed: sp.csr_matrix  #: of f_i' f_j
+    average: tuple[sp.csr_matrix, sp.csr_matrix]  #: (n, nodes): of f, and of f (x - middle)
+    slope: tuple[sp.csr_matrix, sp.csr_matrix]  #: (n, nodes): of f', and of f' (x - middle)
+
+
+def quadratic(boundaries: Array) -> Quadratic:
+    """Return the integrals over elements between ascending boundaries (n + 1,), mm."""
+    f, one = line_bases(boundaries, 2, 0)
+    beside = f.points - one.places[:, None]
+    return Quadratic(
+        nodes=f.places,
+        lengths=np.diff(boundaries),
+        mass=integral(lambda u, v: u * v, f, f),
+        stiffness=integral(lambda u, v: u.grad[0] * v.grad[0], f, f),
+        mixed=integral(lambda u, v: u * v.grad[0], f, f),
+        average=(
+            integral(lambda u, q: u * q, f, one),
+            integral(lambda u, q: u * q, f, one, beside),
+        ),
+        slope=(
+            integral(lambda u, q: u.grad[0] * q, f, one),
+            integral(lambda u, q: u.grad[0] * q, f, one, beside),
+        ),
+    )
+
+
+def mirror(half: Array) -> Array:
+    """Take places from 0 up to the whole line, symmetric about 0."""
+    return np.concatenate([-half[:0:-1], half])
+
+
+def per_tactel(boundaries: Array, edges: Array, parity: int) -> sp.csr_matrix:
+    """Take reactions on the nodes of half a line to the forces on the tactels along it.
+
+    The stress that has these reactions (the consistent one, by the mass matrix) is integrated
+    over each tactel.
+
+    Parameters
+    ----------
+    boundaries
+        (n + 1,) elements of the half with x >= 0, mm.
+    edges
+        (tactels + 1,) boundaries of all tactels, ascending and symmetric; on the line's own.
+    parity
+        1, -1: reactions of the other half are the same, the negative.
+
+    Returns
+    -------
+    (ceil(tactels / 2), 2 n + 1) for the tactels of the half, that in the middle included.
+    """
+    whole = quadratic(mirror(boundaries))
+    middles = whole.nodes[1::2]
+    inside = (middles > edges[:-1, None]) & (middles < edges[1:, None])
+    taken = sp.csr_matrix(inside.astype(np.float64)) @ whole.average[0]
+    recovered = np.linalg.solve(whole.mass.toarray(), taken.toarray().T).T
+    middle = 2 * (boundaries.size - 1)
+    # The plane of symmetry counts twice where even (half its reaction is here), else not at all.
+    folded = recovered[:, middle:] + parity * recovered[:, middle::-1]
+    return sp.csr_matrix(folded[(edges.size - 1) // 2 :])
+
 
 PARITIES = ((1, 1), (1, -1), (-1, 1), (-1, -1))  #: of w under x -> -x, and under y -> -y
 
@@ -155,7 +273,7 @@ def condense(
 def _stiffness(along: list[Quadratic], young: float, poisson: float) -> sp.csr_matrix:
     """Return the stiffness of all displacements (component, x, y, z), pressures eliminated."""
     shear = young / (2 * (1 + poisson))
-    lame = 2 * shear * poisson / max(1 - 2 * poisson, ELEMENTS.compressible)
+    lame = 2 * shear * poisson / max(1 - 2 * poisson, COMPRESSIBLE)
 
     def product(factors: list[sp.csr_matrix]) -> sp.csr_matrix:
         return sp.kron(sp.kron(factors[0], factors[1]), factors[2], format="csr")

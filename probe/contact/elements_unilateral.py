@@ -22,10 +22,14 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from probe.contact.contract import Touch
-from probe.contact.settings import UNILATERAL
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
+
+MOST_STEPS = 60  # of the active set before nodes are exchanged one by one
+FLOOR = 1e-11  # of the largest displacement or stiffness: rounding
+FIRM = 1e4  # weight of an equation of equilibrium against the compliance
+LOOSE = 1e-6  # of the largest force or gap: accuracy that the exchange must reach
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +98,7 @@ def rest(
     clear = heights_mm - press.lever @ press.at_rest
     active = matter & (clear >= clear[matter].max() - depth_mm)
     seen: set[bytes] = set()
-    for step in range(1, UNILATERAL.steps + 1):
+    for step in range(1, MOST_STEPS + 1):
         seen.add(np.packbits(active).tobytes())
         forces, plate = _solve_active(press, active)
         following = (forces > 0) | (_gap(press, forces, plate) < 0)
@@ -119,7 +123,7 @@ def _solve_active(press: UnilateralProblem, active: NDArray[np.bool_]) -> tuple[
     scale = 1 / np.sqrt(np.diag(foundation).clip(np.finfo(float).tiny))
     even = foundation * scale[:, None] * scale
     values, vectors = np.linalg.eigh((even + even.T) / 2)
-    firm = values > UNILATERAL.floor * values[-1]
+    firm = values > FLOOR * values[-1]
     inverse = vectors[:, firm] / values[firm] @ vectors[:, firm].T
     plate = scale * (inverse @ (scale * right))
     forces = np.zeros(active.size)
@@ -132,7 +136,7 @@ def _gap(press: UnilateralProblem, forces: Array, plate: Array) -> Array:
     given = press.displaced(forces)
     gap = given + press.lever @ plate - press.heights
     finite = np.isfinite(gap)
-    gap[finite & (np.abs(gap) <= UNILATERAL.floor * np.abs(given).max())] = 0.0
+    gap[finite & (np.abs(gap) <= FLOOR * np.abs(given).max())] = 0.0
     return gap
 
 
@@ -148,9 +152,7 @@ def _require_stable(press: UnilateralProblem, matter: NDArray[np.bool_]) -> None
     else:
         angles = np.sort(np.arctan2(y, x))
         turns = np.diff(np.append(angles, angles[0] + 2 * np.pi))
-        stands = bool((turns <= np.pi * (1 + UNILATERAL.floor)).all()) or bool(
-            (np.hypot(x, y) == 0).any()
-        )
+        stands = bool((turns <= np.pi * (1 + FLOOR)).all()) or bool((np.hypot(x, y) == 0).any())
     if not stands:
         raise tips()
 
@@ -172,7 +174,7 @@ def _solve_by_exchange(
     matrix = press.between(nodes)
     root = la.cholesky(matrix, lower=True)
     reach = np.abs(lever).max(axis=0).clip(np.finfo(float).tiny)
-    firm = UNILATERAL.firm * np.sqrt(np.diag(matrix).max()) / reach
+    firm = FIRM * np.sqrt(np.diag(matrix).max()) / reach
     weight = np.where(press.hold > 0, 1 / np.sqrt(press.hold.clip(1e-300)), firm)
     clear = press.heights[nodes] - lever @ press.at_rest
     forces = np.zeros(matter.size)
@@ -183,9 +185,6 @@ def _solve_by_exchange(
     )
     forces, plate = _solve_active(press, forces > 0)
     gap = _gap(press, forces, plate)[matter]
-    if (
-        forces.min() < -UNILATERAL.loose * forces.max()
-        or gap.min() < -UNILATERAL.loose * np.abs(plate[0] - clear).max()
-    ):
+    if forces.min() < -LOOSE * forces.max() or gap.min() < -LOOSE * np.abs(plate[0] - clear).max():
         raise tips()
     return UnilateralSolution(forces, plate, steps + int(np.count_nonzero(forces)))

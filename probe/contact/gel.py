@@ -24,15 +24,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import Contact, Touch
-from probe.contact.heights import heights_at, nothing_under
+from probe.contact.contract import STEEPEST_RAD, Contact, Touch, heights_at, nothing_under
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import checked_load, load_of, rest
-from probe.contact.settings import CONTACT, GEL
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
+
+FINE = 4  # places along a pixel at which the surface is sampled
+TOLERANCE = 1e-4  # of the deepest place: by which the membrane may still move
+MOST_STEPS = 2000  # of the membrane; each takes off 1 / (1 + 4 way^2) of its error
 
 
 def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
@@ -67,7 +69,7 @@ def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     if touch.force_n == 0:
         none = np.zeros(sensor.shape)
         return Contact(none, math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "gel", iterations=0)
-    step = sensor.pitch_mm / GEL.fine
+    step = sensor.pitch_mm / FINE
     points = _grid(sensor, step)
     heights = heights_at(surface, touch, points)
     if heights.max(initial=-math.inf) == -math.inf:
@@ -76,7 +78,7 @@ def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     found = rest(points.reshape(-1, 2), heights.ravel(), law, load)
     tilt = max(abs(found.pose.tilt_x_rad), abs(found.pose.tilt_y_rad))
     depth = heights - found.pose.heights_mm(points)
-    if tilt > CONTACT.steepest_rad or depth.max() > sensor.overlay.height_mm:
+    if tilt > STEEPEST_RAD or depth.max() > sensor.overlay.height_mm:
         raise ContactError(
             f"the plate tips or presses the gel through: {math.degrees(tilt):.3g} degrees, "
             f"{depth.max():.3g} mm of {sensor.overlay.height_mm:g} mm",
@@ -84,7 +86,7 @@ def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
         )
     imprint, iterations = bridge(np.maximum(depth, 0.0), sensor.overlay.membrane_mm / step)
     pixels = _blur(imprint, sensor.overlay.blur_mm / step)
-    pixels = pixels.reshape(sensor.rows, GEL.fine, sensor.columns, GEL.fine).mean(axis=(1, 3))
+    pixels = pixels.reshape(sensor.rows, FINE, sensor.columns, FINE).mean(axis=(1, 3))
     return Contact(
         pixels * (_bed_n_mm3(sensor) * sensor.pitch_mm**2),
         found.pose.z_mm,
@@ -116,9 +118,9 @@ def bridge(depth_mm: Array, way: float) -> tuple[Array, int]:
     pull = way * way
     padded = np.pad(depth_mm, 1)
     inside = padded[1:-1, 1:-1]
-    tolerance = GEL.tolerance * float(depth_mm.max())
+    tolerance = TOLERANCE * float(depth_mm.max())
     number = 0
-    while number < GEL.most:
+    while number < MOST_STEPS:
         number += 1
         beside = padded[:-2, 1:-1] + padded[2:, 1:-1] + padded[1:-1, :-2] + padded[1:-1, 2:]
         after = np.maximum(depth_mm, beside * (pull / (1 + 4 * pull)))
@@ -131,7 +133,7 @@ def bridge(depth_mm: Array, way: float) -> tuple[Array, int]:
 
 def _grid(sensor: SensorType, step: float) -> Array:
     """Return the places (n, m, 2) at which the surface is asked."""
-    rows, columns = sensor.rows * GEL.fine, sensor.columns * GEL.fine
+    rows, columns = sensor.rows * FINE, sensor.columns * FINE
     x = (np.arange(columns) - (columns - 1) / 2) * step
     y = ((rows - 1) / 2 - np.arange(rows)) * step
     return np.stack(np.meshgrid(x, y), axis=-1)

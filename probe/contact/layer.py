@@ -17,21 +17,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import Contact, Touch
-from probe.contact.layer_active_set import LayerContact, deep_mm, equilibrium
-from probe.contact.layer_descent import descend
-from probe.contact.layer_influence import Influence, influence
-from probe.contact.layer_kernel import layer_compliance
-from probe.contact.layer_levels import DepthWindow, Levels, levels_of
-from probe.contact.layer_patch import LayerPatch, centres_mm, patch_under
-from probe.contact.layer_solve import plate_of
+from probe.contact.contract import STEEPEST_RAD, Contact, Touch
+from probe.contact.layer_equilibrium import LayerContact, deep_mm, descend, equilibrium, plate_of
+from probe.contact.layer_influence import Influence, influence, layer_compliance
+from probe.contact.layer_patch import (
+    DepthWindow,
+    LayerPatch,
+    Levels,
+    centres_mm,
+    levels_of,
+    patch_under,
+)
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import PlatePose, load_of, rest
-from probe.contact.settings import CONTACT, LAYER
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
+
+DEEPEST = 0.5  #: mean indentation, of the pad's height, beyond which strains are not small
+THINNEST = 1.5  # points of a cell that meet a stroke, on the mean, below which that is chance
+FEW = 2  # cells on a step, from which on `THINNEST` is asked; one may be a sharp corner
+TURNED = 0.05  # of the indentation: change by a turn across a cell that may remain
+LEAST = 2e-3  # of a cell: indentations below are not resolved
+PASSES = 25  # over the surface, each with the plate of the last
+FARTHEST_RAD = 0.05  # turn of the plate between two passes
+HELD_RAD = 1e-4  # turn in the last pass, where the plate was held
 
 
 def layer(
@@ -113,7 +124,7 @@ def _find_rest(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[LayerC
     pose, depth = _foresee_rest(patch, touch)
     looks: list[DepthWindow] = []
     floor = -depth
-    for _ in range(LAYER.passes):
+    for _ in range(PASSES):
         above = patch.highest_mm - pose.heights_mm(patch.centres_mm)
         some = above >= min(floor, float(above.max()))
         patch = patch.with_cells(np.flatnonzero(patch.neighbours(some)))
@@ -121,7 +132,7 @@ def _find_rest(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[LayerC
         levels = levels_of(patch, grid, looks[-1], looks[:-1])
         pressed, held = _press_levels(levels, touch)
         turn = float(np.abs(pressed.plate[1:]).max()) / levels.reach_mm
-        b = min(1.0, LAYER.farthest_rad / max(turn, 1e-300)) * pressed.plate
+        b = min(1.0, FARTHEST_RAD / max(turn, 1e-300)) * pressed.plate
         moved = PlatePose(float(b[0]), float(b[1]) / levels.reach_mm, float(b[2]) / levels.reach_mm)
         pose = PlatePose(
             pose.z_mm + moved.z_mm,
@@ -132,8 +143,8 @@ def _find_rest(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[LayerC
         sunk = grid.sunk_mm(levels.image(pressed.pressures)).ravel()
         missed = levels.left_out_mm > moved_mm + sunk
         depth = float(deep_mm(levels, b).max())
-        enough = LAYER.turned * max(depth / grid.dx_mm, LAYER.least)
-        enough = min(enough, LAYER.held_rad) if held else min(enough, LAYER.farthest_rad)
+        enough = TURNED * max(depth / grid.dx_mm, LEAST)
+        enough = min(enough, HELD_RAD) if held else min(enough, FARTHEST_RAD)
         if turn <= enough and not missed.any():
             _refuse_steep(pose)
             _refuse_thin(patch, pose, sunk.reshape(grid.rows, -1)[1:-1, 1:-1])
@@ -143,7 +154,7 @@ def _find_rest(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[LayerC
     _refuse_steep(pose)
     _refuse_deep(pressed, sunk, depth, touch)
     raise ContactError(
-        f"the plate does not settle within {LAYER.passes} passes over the surface",
+        f"the plate does not settle within {PASSES} passes over the surface",
         fix="report the scene; a stiffer wrist helps",
     )
 
@@ -183,10 +194,10 @@ def _largest_tilt(pose: PlatePose) -> float:
 
 def _refuse_steep(pose: PlatePose) -> None:
     turn = _largest_tilt(pose)
-    if turn > CONTACT.steepest_rad:
+    if turn > STEEPEST_RAD:
         raise ContactError(
             f"the plate tips: it comes to rest at a tilt of {math.degrees(turn):.3g} degrees, "
-            f"beyond {math.degrees(CONTACT.steepest_rad):.3g}",
+            f"beyond {math.degrees(STEEPEST_RAD):.3g}",
             fix="move the sensor, press with less force, or take a stiffer wrist",
         )
 
@@ -196,10 +207,10 @@ def _refuse_deep(pressed: LayerContact, sunk_mm: Array, deepest_mm: float, touch
     height = pressed.levels.grid.sensor.overlay.height_mm
     p = pressed.pressures
     mean = float(sunk_mm[pressed.levels.cells] @ p / p.sum())
-    if mean > LAYER.deepest * height:
+    if mean > DEEPEST * height:
         raise ContactError(
             f"{touch.force_n:g} N press the pad of {height:g} mm in by {mean:.3g} mm on the "
-            f"mean, beyond {LAYER.deepest * height:g} mm strains are not small",
+            f"mean, beyond {DEEPEST * height:g} mm strains are not small",
             fix="press with less force, on more of the surface, or take tabs",
         )
     if deepest_mm > height:
@@ -222,7 +233,7 @@ def _refuse_thin(patch: LayerPatch, pose: PlatePose, sunk_mm: Array) -> None:
     apart = patch.dx_mm / math.sqrt(samples)
     many = np.count_nonzero(heights > heights.max(axis=0) - apart, axis=0)
     many = many[many < samples]
-    if len(many) >= LAYER.few and many.sum() < LAYER.thinnest * len(many):
+    if len(many) >= FEW and many.sum() < THINNEST * len(many):
         raise ContactError(
             f"of {samples} points in a cell of {patch.dx_mm:.3g} mm only {many.mean():.2g} meet "
             "the strokes, on the mean: they are too thin to be felt by their true width",

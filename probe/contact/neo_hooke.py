@@ -24,9 +24,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.contact.settings import NEO_HOOKE
-
 Array = NDArray[np.float64]
+
+LEAST_STRETCH = 1e-9  # below, only rounding goes
 
 
 class Law(Protocol):
@@ -77,7 +77,7 @@ class NeoHooke:
         third = self.stiffness / 3.0
         inverse = compression_mm * (-1.0 / self.length_mm)
         inverse += 1.0
-        inverse = 1.0 / np.maximum(inverse, NEO_HOOKE.least_stretch)
+        inverse = 1.0 / np.maximum(inverse, LEAST_STRETCH)
         square = inverse * inverse
         # lambda^-2 - lambda = (1 - lambda) (lambda^-2 + lambda^-1 + 1): nothing cancels.
         force = square + inverse

@@ -1,4 +1,4 @@
-"""One function over the ladder of contact models: the cheapest level that holds an error.
+"""Contact of a sensor on a surface by the cheapest model that holds an error. Thesis 4.2.
 
 Levels, from cheap to dear:
 
@@ -6,11 +6,15 @@ Levels, from cheap to dear:
     pad overlay    footprint < layer-2 < layer-4 < layer-8 < layer-16; elements by name alone
     gel            gel
 
-What each level errs by and costs is measured by `tests/bench/contact_precision.py` on
+Error and cost of each level are measured by `tests/bench/contact_precision.py` on
 several indenters against finer references, and kept in `precision.json`. The error of an
-image is the norm of its deviation over the norm of the reference: what the level's fineness
-costs, not what the model leaves out (tabs are columns, the layer has no free sides: where a
-pad's own edge is pressed, take elements). Thesis 4.2.
+image is the norm of its deviation over the norm of the reference: the cost of the level's
+fineness, not of what the model leaves out (tabs are columns, the layer has no free sides: where a
+pad's own edge is pressed, take elements).
+
+Level "footprint" shares the force by cover alone: the force on a tactel is F times the share of
+its tip under which the surface reaches to within a depth of its highest place, over the sum of all
+shares. No elasticity, no equilibrium: the plate keeps the wrist's tilt and stands at first touch.
 """
 
 from __future__ import annotations
@@ -22,11 +26,20 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib import resources
 
+import numpy as np
+
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Contact, Touch
-from probe.contact.settings import CONTACT
+from probe.contact.engines import Engine
+from probe.contact.plate import PlatePose, checked_load, load_of
+from probe.contact.tabs import heights_under, tabs
+from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
+
+AUTO_ERROR = 0.06  #: error that "auto" holds: below what the models leave out, 0.08 ... 0.14
+COVER_DEPTH = 0.25  # of the overlay's height, down to which the surface counts as touched
+
 
 #: "auto", the name of a level, or the largest error of an image.
 Accuracy = str | float
@@ -58,7 +71,7 @@ def press(
     surface, sensor, touch
         What is touched, with what, where and how.
     accuracy
-        "auto" holds `CONTACT.auto_error`; a number is the error to hold (0.003: 0.3 %); a name
+        "auto" holds `AUTO_ERROR`; a number is the error to hold (0.003: 0.3 %); a name
         takes that level: footprint, tabs, tabs-7, tabs-19, tabs-61, layer, layer-2 ... layer-16,
         elements.
 
@@ -107,7 +120,7 @@ def level_for(sensor: SensorType, accuracy: Accuracy = "auto") -> str:
         raise ContactError(
             f"the error of a {kind}'s levels is not known", fix=f"take auto, or {LEVELS[kind][0]}"
         )
-    error = CONTACT.auto_error if accuracy == "auto" else float(accuracy)
+    error = AUTO_ERROR if accuracy == "auto" else float(accuracy)
     known = [line for line in table()[kind] if line.error <= error]
     if not known:
         best = min(table()[kind], key=lambda line: line.error)
@@ -145,19 +158,18 @@ def table() -> dict[str, tuple[LevelAccuracy, ...]]:
     }
 
 
-def _footprint(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
-    from probe.contact.footprint import footprint
-
-    return footprint(surface, sensor, touch)
+def press_tips(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
+    """Press a sensor whose tabs have defects; pads and gels have no tips and take `press`."""
+    if sensor.overlay.kind == "tab":
+        return tabs(surface, sensor, touch, tips)
+    return press(surface, sensor, touch)
 
 
 def _tabs(points: int, surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
-    from probe.contact.tabs import tabs
-    from probe.contact.tips import Tips
-
     return tabs(surface, sensor, touch, Tips(points))
 
 
+# Loaded where they are used: scipy and scikit-fem take their time.
 def _layer(cells: int, surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     from probe.contact.layer import layer
 
@@ -176,10 +188,64 @@ def _gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     return gel(surface, sensor, touch)
 
 
+def footprint(
+    surface: HeightMap,
+    sensor: SensorType,
+    touch: Touch,
+    tips: Tips | None = None,
+    *,
+    depth_mm: float | None = None,
+) -> Contact:
+    """Share the force by cover.
+
+    Parameters
+    ----------
+    surface
+        Heights in the surface frame.
+    sensor
+        With tabs the round tips are asked, with a pad the whole squares of the tactels.
+    touch
+        Pose and force; the wrist is not asked.
+    tips
+        How finely the tips are asked; 19 points each without it (a pad: 16).
+    depth_mm
+        How far below the highest place, against the wrist's tilt, the surface counts; a
+        quarter of the overlay's height without it.
+
+    Returns
+    -------
+    Contact
+        Forces (rows, columns), N; the plate at first touch.
+
+    Raises
+    ------
+    ContactError
+        When nothing lies under the sensor, or a force or a height is no number.
+    """
+    load = load_of(touch)
+    checked_load(load)
+    shape = (sensor.rows, sensor.columns)
+    if touch.force_n == 0:
+        return Contact(
+            np.zeros(shape), math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "footprint", iterations=0
+        )
+    depth = COVER_DEPTH * sensor.overlay.height_mm if depth_mm is None else depth_mm
+    if not 0 <= depth < math.inf:
+        raise ContactError(f"a depth of {depth:g} mm", fix="give a finite depth >= 0")
+    points, drop = tip_points(sensor, tips or Tips())
+    unloaded = PlatePose(0.0, touch.tilt_x_rad, touch.tilt_y_rad)
+    level = heights_under(surface, touch, points) - drop - unloaded.heights_mm(points)
+    highest = float(level.max())
+    cover = (level >= highest - depth).mean(axis=1)
+    forces = touch.force_n * (cover / cover.sum()).reshape(shape)
+    return Contact(forces, highest, touch.tilt_x_rad, touch.tilt_y_rad, "footprint", iterations=0)
+
+
 MODELS: dict[str, Callable[[HeightMap, SensorType, Touch], Contact]] = {
-    "footprint": _footprint,
+    "footprint": footprint,
     **{f"tabs-{points}": partial(_tabs, points) for points in (7, 19, 61)},
     **{f"layer-{cells}": partial(_layer, cells) for cells in (2, 4, 8, 16)},
     "elements": _elements,
     "gel": _gel,
 }
+ENGINE = Engine(press_tips, points=19, overlays=("tab", "pad", "gel"))

@@ -1,38 +1,66 @@
 """Level "tabs": separate elastic tabs under a rigid plate on the wrist. Thesis 3.3, 4.2.
 
-Surface + sensor + touch -> force on each tactel and the plate's pose. Tabs do not know of
-each other. The tip of each asks the surface at a few points (`tips`) and presses as one
-neo-Hookean column; the plate comes to rest by `plate`.
+Surface + sensor + touch -> force on each tactel and the plate's pose. Tabs do not interact. The
+tip of each samples the surface at a few points (`tips`); the plate comes to rest by `plate`.
 
-The law of a tip is `tab_law`'s. Where the surface is a step, the share that it covers is a
-count of points: in x and y the force moves in small steps, finer with more points. Forces act
-at the points, so a tab that is pressed on one side turns the plate. Where strokes are so thin that
-one or two points of a tip meet them by chance, the tips are asked more finely; strokes too thin
-for the finest pattern are refused.
+A tab is a skin of independent columns over a common column, of the same solid (`neo_hooke`). The
+skin takes the share s = 1/(1 + beta) of the height, the column the rest.
+
+- Covered wholly at one height, both bear the same stress: the tab is exactly the neo-Hookean
+  column of its whole height.
+- Covered in part (share c, a step's edge), the skin works alone there while the column works
+  as a whole: F(c)/F(1) = c (1 + beta)/(1 + beta c) at small strain. An edge presses harder
+  than its share, as elements show (0.65 at c = 0.5, 0.34 at 0.25), by beta = 0.75 within 0.03,
+  and within 0.02 of c [1 + 0.59 (1 - c)].
+- Two heights, slopes, and domed ends are presses of different depth on the skin's points.
+
+The law is the least energy over the column's compression: convex and C1 in the plate's pose;
+no point pulls, and a tab's force grows with every point's depth.
+
+On a step the covered share is a count of points: in x and y the force moves in small steps, finer
+with more points. Forces act at the points, so a tab that is pressed on one side turns the plate.
+Where strokes are so thin that one or two points of a tip meet them by chance, tips get more
+points; strokes too thin for the finest pattern are refused.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from probe.contact.contract import Contact, Touch
-from probe.contact.heights import heights_at, nothing_under
-from probe.contact.neo_hooke import Linear
-from probe.contact.plate import PlateLoad, PlatePose, PlateRest, checked_load, load_of, rest
-from probe.contact.plate_newton import Columns
-from probe.contact.settings import CONTACT, TABS
-from probe.contact.tab_law import checked_tabs, tip_laws
-from probe.contact.tabs_foreseen import columns_foreseen, foreseen_pose
+from probe.contact.contract import STEEPEST_RAD, Contact, Touch, heights_at, nothing_under
+from probe.contact.neo_hooke import Linear, NeoHooke
+from probe.contact.plate import (
+    Columns,
+    PlateLoad,
+    PlatePose,
+    PlateRest,
+    checked_load,
+    load_of,
+    rest,
+)
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
+
+SKIN = 0.75  #: beta: stiffness of the column behind the skin: the skin's over the column's
+TOLERANCE = 1e-6  #: of the force
+FINER = (61, 217, 817)  # points on a tip, for thin strokes
+BY_CHANCE = 2  # points of a tip that may meet a stroke by chance
+ON_STEP = 0.5  # share of the tabs, at most, that may stand on a step
+CORNER_TABS = 4  # fewer tabs are on a corner, which is sharp for any pattern
+# Turn of the plate under the whole moment, beyond which springs first tell whether it stands.
+HOPELESS_RAD = 10.0
+MARGIN = 0.1  # of the predicted depth, further down which points are still computed
+CRUSHED = 1.4  # power by which partial cover stiffens more at the usual strains
+SAMPLED = 8  # every so many points of a tip one predicts the pose
 
 
 def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None = None) -> Contact:
@@ -74,22 +102,20 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
     points, drop = tip_points(sensor, tips)
     heights = heights_under(surface, touch, points) - drop
     stiffness = min(touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad)
-    if touch.force_n * sensor.reach_mm > TABS.hopeless_rad * stiffness > 0:
+    if touch.force_n * sensor.reach_mm > HOPELESS_RAD * stiffness > 0:
         # Springs tell for any force whether it would turn the plate over.
         law = Linear(overlay.young_mpa * math.prod(sensor.step_mm) / overlay.height_mm)
-        _require_stable(
-            rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, TABS.hopeless_rad
-        )
+        _require_stable(rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, HOPELESS_RAD)
     found, forces = tabs_at_rest(points, heights, overlay, load)
-    _require_stable(found.pose, CONTACT.steepest_rad)
+    _require_stable(found.pose, STEEPEST_RAD)
     if by_chance := _met_by_chance(heights, forces, overlay):
-        finer = next((q for q in TABS.finer if q > tips.points), None)
+        finer = next((q for q in FINER if q > tips.points), None)
         if finer:
             return tabs(surface, sensor, touch, replace(tips, points=finer))
-        if by_chance >= TABS.corner_tabs:
+        if by_chance >= CORNER_TABS:
             raise ContactError(
                 f"strokes too thin for {tips.points} points on each tip: {by_chance} tabs met "
-                f"them with {TABS.by_chance} at most",
+                f"them with {BY_CHANCE} at most",
                 fix="give wider strokes; printed ones have 0.1 mm or more",
             )
     return Contact(
@@ -107,7 +133,7 @@ def _require_stable(pose: PlatePose, steepest_rad: float) -> None:
     if tilt > steepest_rad:
         raise ContactError(
             f"the plate tips: it comes to rest at a tilt of {math.degrees(tilt):.3g} degrees, "
-            f"beyond {math.degrees(CONTACT.steepest_rad):.3g}",
+            f"beyond {math.degrees(STEEPEST_RAD):.3g}",
             fix="move the sensor, press with less force, or take a stiffer wrist",
         )
 
@@ -123,8 +149,8 @@ def _met_by_chance(heights_mm: Array, forces_n: Array, overlay: Overlay) -> int:
     apart = overlay.tab_diameter_mm / 2 * math.sqrt(math.pi / q)
     tips = heights_mm.take(np.flatnonzero(forces_n), axis=0)
     near = np.count_nonzero(tips > tips.max(axis=1, keepdims=True) - apart, axis=1)
-    few = int(np.count_nonzero(near <= min(TABS.by_chance, q // 7)))
-    return few if few > max(1, TABS.on_step * np.count_nonzero(near < q)) else 0
+    few = int(np.count_nonzero(near <= min(BY_CHANCE, q // 7)))
+    return few if few > max(1, ON_STEP * np.count_nonzero(near < q)) else 0
 
 
 def heights_under(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
@@ -151,7 +177,7 @@ def tabs_at_rest(
     foreseen, depth = foreseen_pose(points_mm, heights_mm, overlay, load)
     points, heights = points_mm.reshape(-1, 2), heights_mm.ravel()
     pressed = heights - foreseen.heights_mm(points)
-    kept = pressed >= min(-TABS.margin * depth, float(pressed.max()))
+    kept = pressed >= min(-MARGIN * depth, float(pressed.max()))
     if min(load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad) == 0:
         kept = heights > -math.inf  # whether a free plate stands is for all of them to tell
     while True:
@@ -165,7 +191,7 @@ def tabs_at_rest(
         columns = Columns(column, starts, np.cumsum(first) - 1, compressed)
         found = rest(
             points.take(some, axis=0), heights[some], skin, load,
-            columns=columns, foreseen=foreseen, tolerance=TABS.tolerance,
+            columns=columns, foreseen=foreseen, tolerance=TOLERANCE,
         )  # fmt: skip
         missed = (heights > found.pose.heights_mm(points)) & ~kept
         if not missed.any():
@@ -176,3 +202,104 @@ def tabs_at_rest(
 
 
 _PLAIN = Tips()
+
+
+@lru_cache(maxsize=16)
+def tip_laws(overlay: Overlay, points: int) -> tuple[NeoHooke, NeoHooke]:
+    """Return the laws of one point of the skin and of the column behind it."""
+    area = math.pi * overlay.tab_diameter_mm**2 / 4
+    skin_mm = overlay.height_mm / (1 + SKIN)
+    column_mm = overlay.height_mm - skin_mm
+    return (
+        NeoHooke(overlay.young_mpa * area / points / skin_mm, skin_mm),
+        NeoHooke(overlay.young_mpa * area / column_mm, column_mm),
+    )
+
+
+def checked_tabs(overlay: Overlay) -> None:
+    """Refuse an overlay that is no tabs, or of no size."""
+    if overlay.kind != "tab":
+        raise ContactError(
+            f"the overlay is a {overlay.kind}; this level knows tabs alone",
+            fix='take the level "layer" or "elements" for a pad',
+        )
+    sizes = (overlay.height_mm, overlay.tab_diameter_mm, overlay.young_mpa)
+    if not (min(sizes) > 0 and max(sizes) < math.inf):
+        raise ContactError(
+            f"tabs of height {sizes[0]:g} mm, diameter {sizes[1]:g} mm, modulus {sizes[2]:g} MPa",
+            fix="give finite values > 0",
+        )
+
+
+def foreseen_pose(
+    points_mm: Array, heights_mm: Array, overlay: Overlay, load: PlateLoad
+) -> tuple[PlatePose, float]:
+    """Return about where the plate comes to rest, and how deep the tabs are pressed.
+
+    Some points of each tip stand for all, each a neo-Hookean column of its own, stiffened as
+    tips are that are covered in part.
+    """
+    q = heights_mm.shape[1]
+    level = heights_mm
+    if load.tilt_x_rad or load.tilt_y_rad:
+        unloaded = PlatePose(0.0, load.tilt_x_rad, load.tilt_y_rad)
+        level = heights_mm - unloaded.heights_mm(points_mm)
+    high = level > level.max() - overlay.height_mm / 4
+    share = high.astype(np.float64) @ np.full(q, 1 / q)
+    stiffer = float(share @ ((1 + SKIN) / (1 + SKIN * share))) / max(float(share.sum()), 1 / q)
+    area = math.pi * overlay.tab_diameter_mm**2 / 4 * stiffer**CRUSHED
+    free = min(load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad) == 0
+    some = slice(None, None, SAMPLED)
+    if free or not heights_mm[:, some].max() > -math.inf:
+        some = slice(None)  # a needle, or a hull that matters
+    points = points_mm[:, some].reshape(-1, 2)
+    heights = heights_mm[:, some].ravel()
+    area *= len(heights_mm) / heights.size
+    law = NeoHooke(overlay.young_mpa * area / overlay.height_mm, overlay.height_mm)
+    z = level.max() - _level_depth(-np.sort(-level[:, some], axis=None), law, load.force_n)
+    start = PlatePose(float(z), load.tilt_x_rad, load.tilt_y_rad)
+    found = rest(points, heights, law, load, foreseen=start, tolerance=0.02)
+    return found.pose, max(float((heights - found.pose.heights_mm(points)).max()), 0.0)
+
+
+def _level_depth(heights: Array, law: NeoHooke, force_n: float) -> float:
+    """Return about how deep a level plate sinks in on columns of falling heights (n,).
+
+    The first k are taken at their mean; the next would bear too much.
+    """
+    length = law.length_mm
+    many = np.arange(1, heights.size + 1)
+    below = np.minimum(heights[0] - heights, 1e3 * length)
+    mean = np.cumsum(below) / many
+    stretch = np.maximum(1 - (below - mean) / length, 1e-6)
+    stress = 3 * force_n / (float(law.stiffness) * length)
+    k = max(int(np.searchsorted(many * (1 / (stretch * stretch) - stretch), stress)) - 1, 0)
+    return float(mean[k]) + length * (1 - _stretch(stress / float(many[k])))
+
+
+def _stretch(stress: float) -> float:
+    """Return lambda with lambda^-2 - lambda = stress >= 0, by Newton from above."""
+    stretch = min(1.0, 1 / math.sqrt(stress)) if stress > 0 else 1.0
+    for _ in range(60):
+        step = ((stretch + stress) * stretch**2 - 1) / ((3 * stretch + 2 * stress) * stretch)
+        stretch -= step
+        if abs(step) <= 1e-12 * stretch:
+            break
+    return stretch
+
+
+def columns_foreseen(
+    pressed: Array, starts: NDArray[np.intp], points: int, overlay: Overlay
+) -> Array:
+    """Return about the compression of the columns behind skins that are pressed so deep.
+
+    Exact for tips covered at one height in the limits of small and of large strain.
+    """
+    skin, column = 1 / (1 + SKIN), SKIN / (1 + SKIN)
+    share = np.add.reduceat((pressed > 0).astype(np.float64), starts) / points
+    mean = np.add.reduceat(np.maximum(pressed, 0.0), starts) / points
+    small = column * mean / (skin + column * share)
+    root = np.sqrt(share)
+    depth = mean / np.maximum(share, 1 / points)
+    large = (depth - skin * overlay.height_mm * (1 - root)) / (1 + root * (skin / column))
+    return np.maximum(small, large)

@@ -17,9 +17,9 @@ import numpy as np
 from encoded_objects.base.errors import require
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from generator.export.atomic import Staging
+from generator.export.meshes import stl_chunks
 from generator.export.slicer_settings import slicer_settings
 from generator.export.step import step_chunks
-from generator.export.stl import stl_chunks
 from generator.export.threemf import mesh_print_files, print_files
 from generator.printers import printer_named
 from generator.solid import Mesh, triangles

@@ -1,22 +1,33 @@
-"""What an HDF5 file may ask of its reader: values of its own, and no more than it can hold.
+"""Open HDF5 files of unknown origin: what is checked by hand before a value is read.
 
-HDF5 lets a dataset stand in any other file, and lets 1,400 bytes claim 10^9 images. Every file
-that is opened is checked here, by its links and headers alone, before a value is read.
+- Superblock: HDF5 says "unable to open file" for many reasons; the first bytes tell them apart.
+- Strings: attributes stand in global heaps, collections of objects, each with its length.
+  libhdf5 walks along the lengths, and never stops where a damaged file says zero.
+- Links and headers: HDF5 lets a dataset stand in any other file, and lets 1,400 bytes claim
+  10^9 images. A recording holds all its values itself, and no more than its size allows.
+- A file without its end: `h5py.File(path, "r")` refuses a file whose writer was killed ("may use
+  h5clear", a programme that pip does not bring) and one that is shorter than it says. Through a
+  Python file HDF5 looks at no flags; only the length must be right (`PaddedFile`).
 
 References
 ----------
-HDF5 File Format Specification 3.0, IV.A.2: link, data layout and external data files messages.
-RFC 1951: deflate packs at most 1,032 bytes into one.
+HDF5 File Format Specification 3.0, II.A: superblock; III.E: global heap; IV.A.2: link, data layout
+and external data files messages. RFC 1951: deflate packs at most 1,032 bytes into one.
 """
 
 from __future__ import annotations
 
+import io
 import math
+import os
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, BinaryIO, Final
 
 from probe.errors import RecordingError
-from probe.recording.heap import strings_end
+from probe.recording.files import blank_error, explain_errors, is_part, not_closed_error
 
 if TYPE_CHECKING:
     import h5py
@@ -29,6 +40,154 @@ _MOST_CHUNK: Final = 64 << 20  #: bytes of a chunk, which is unpacked as a whole
 _LARGE_CHUNK: Final = 256 << 10  #: bytes; it is kept from one block to the next
 _MOST_LINKS: Final = 10_000  #: of all groups; checking as many datasets takes 1 to 2 s
 _MOST_DEPTH: Final = 64  #: groups in one another; libhdf5 visits them by recursion
+
+_SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
+_WRITING, _SWMR = 0x01, 0x04
+_END_AT: Final = {0: 40, 1: 44, 2: 28, 3: 28}  #: offset of the address of the end, by version
+
+_HEAP: Final = b"GCOL\x01"  #: signature and version
+_HEAD: Final = 16  #: bytes before the objects, and before the data of each
+_ALIGNED: Final = 8  #: bytes, to which an object's length is rounded up
+_SEARCHED: Final = 1 << 26  #: bytes from the beginning; attributes are written before frames
+_AT_ONCE: Final = 1 << 20  #: bytes
+
+
+@contextmanager
+def open_hdf5(
+    path: Path, *, live: bool = False, damaged: bool = False
+) -> Iterator[tuple[h5py.File, Superblock]]:
+    """Open an HDF5 file for reading; gives its superblock too.
+
+    Parameters
+    ----------
+    path
+        The file.
+    live
+        Also one that its writer left open: the values that were flushed are read.
+    damaged
+        In whatever state, if the library can; parts may be missing.
+
+    Raises
+    ------
+    RecordingError
+        No such file, no HDF5 file, truncated, not closed, damaged; it leads to another file, or
+        claims more values than it can hold.
+    """
+    import h5py
+
+    with explain_errors(path, "read"):
+        head = superblock_of(path)
+    if is_part(path) and (head is None or head.blank):
+        raise blank_error(path)
+    if head is None:
+        raise _no_hdf5_error(path)
+    if head.truncated and not damaged and not (live and head.writing):
+        raise RecordingError(
+            f"it is truncated: {head.size} of {head.end} bytes",
+            fix="copy it again, or save what can be read with `repair`",
+            place=str(path),
+        )
+    if head.writing and not live and not damaged:
+        raise not_closed_error(path)
+    with ExitStack() as stack:
+        with explain_errors(path, "open"):
+            source: object = path
+            if not head.whole:
+                source = PaddedFile(stack.enter_context(open(path, "rb")), head)
+            file = stack.enter_context(h5py.File(source, "r"))
+        with explain_errors(path, "read"):
+            _held = check_file(file, path)
+        yield file, head
+
+
+@dataclass(frozen=True, slots=True)
+class Superblock:
+    """The first bytes of an HDF5 file: who left it open, and how long it should be."""
+
+    version: int
+    writing: bool  #: opened for writing and not closed
+    swmr: bool  #: opened so that others can read it meanwhile
+    end: int  #: bytes that the file should have
+    size: int  #: bytes that it has
+
+    @property
+    def truncated(self) -> bool:
+        """Whether the end of the file is missing."""
+        return self.size < self.end
+
+    @property
+    def blank(self) -> bool:
+        """Whether nothing was flushed yet."""
+        return self.writing and not self.swmr
+
+    @property
+    def whole(self) -> bool:
+        """Whether it was closed by its writer and has its whole length."""
+        return not self.writing and not self.truncated
+
+
+def superblock_of(path: Path) -> Superblock | None:
+    """Return the superblock of a file; None if it is no HDF5 file.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    """
+    size = os.path.getsize(path)
+    with open(path, "rb") as file:
+        start = 0
+        while start < size:  # a user block of 512, 1024, 2048, ... bytes may come first
+            file.seek(start)
+            head = file.read(64)
+            if head.startswith(_SIGNATURE) and len(head) >= 12:
+                return _parse_superblock(head, size)
+            start = max(512, 2 * start)
+    return None
+
+
+def _parse_superblock(head: bytes, size: int) -> Superblock | None:
+    version = head[8]
+    if version not in _END_AT:
+        return None
+    width = head[13] if version < 2 else head[9]
+    flags = head[11] if version >= 3 else 0
+    at, end = _END_AT[version], size
+    if width == 8 and len(head) >= at + 8:
+        end = int.from_bytes(head[at : at + 8], "little")
+    return Superblock(version, bool(flags & _WRITING), bool(flags & _SWMR), end, size)
+
+
+class PaddedFile(io.RawIOBase):
+    """An HDF5 file with zeros where its end is missing; the file itself is not touched.
+
+    Parts that depend on the missing bytes fail alone, by their checksums. Opened with `swmr=True`
+    instead, HDF5 reads metadata with a wrong checksum again and again for a writer that is gone
+    (9 minutes in HDF5 2.0), and h5py has no `H5Pset_metadata_read_attempts`.
+    """
+
+    def __init__(self, file: BinaryIO, head: Superblock) -> None:
+        self._file = file
+        self._length = max(head.end, head.size)
+        self._at = 0
+
+    def readable(self) -> bool:
+        """Say that it can be read."""
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Go to a place."""
+        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._length}[whence]
+        self._at = base + offset
+        return self._at
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
+        """Fill the buffer with the next bytes, zeros where the file has none."""
+        count = max(0, min(len(buffer), self._length - self._at))
+        self._file.seek(self._at)
+        buffer[:count] = self._file.read(count).ljust(count, b"\0")
+        self._at += count
+        return count
 
 
 def check_file(file: h5py.File, path: Path) -> list[h5py.h5d.DatasetID]:
@@ -165,5 +324,70 @@ def _leads_out(path: Path, place: str) -> RecordingError:
     return RecordingError(
         f"{place[:80]} leads to another file: a recording holds all its values itself",
         fix="copy the values into one file, without links, external or virtual datasets",
+        place=str(path),
+    )
+
+
+def strings_end(path: Path) -> bool:
+    """Tell whether every collection of strings in the beginning of a file has an end.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    """
+    room = 2 * path.stat().st_size  # collections lie apart; those that were freed may overlap
+    with open(path, "rb") as file:
+        for start in _heaps(file):
+            data = _objects(file, start)
+            room -= len(data)
+            if room < 0 or not _ends(data):
+                return False
+    return True
+
+
+def _heaps(file: BinaryIO) -> Iterator[int]:
+    """Yield where collections begin."""
+    for first in range(0, _SEARCHED, _AT_ONCE):
+        file.seek(first)
+        data = file.read(_AT_ONCE + len(_HEAP) - 1)
+        at = data.find(_HEAP)
+        while at >= 0:
+            yield first + at
+            at = data.find(_HEAP, at + 1)
+        if len(data) < _AT_ONCE:
+            return
+
+
+def _objects(file: BinaryIO, start: int) -> bytes:
+    """Return the objects of a collection, as far as the file has them."""
+    file.seek(start + 8)
+    return file.read(max(0, min(_number(file.read(8), 0), _SEARCHED) - _HEAD))
+
+
+def _ends(data: bytes) -> bool:
+    """Tell whether the objects of a collection lead to its end, or beyond the end of the file."""
+    at = 0
+    while at + _HEAD <= len(data):
+        length = _number(data, at + 8)
+        if int.from_bytes(data[at : at + 2], "little"):
+            at += _HEAD + -(-length // _ALIGNED) * _ALIGNED
+        elif length < _HEAD:  # what is free counts its own head
+            return False
+        else:
+            at += length
+    return True
+
+
+def _number(data: bytes, at: int) -> int:
+    return int.from_bytes(data[at : at + 8], "little")
+
+
+def _no_hdf5_error(path: Path) -> RecordingError:
+    if path.stat().st_size == 0:
+        return RecordingError("it is empty", fix="delete it", place=str(path))
+    return RecordingError(
+        "it is no HDF5 file",
+        fix="give a recording (.h5), or import an array from .npy or .mat",
         place=str(path),
     )

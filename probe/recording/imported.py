@@ -1,5 +1,11 @@
 """Others' images -> a recording of counts.
 
+Sources: .npy and .npz, MATLAB files (v4 to v7 by scipy, v7.3 is HDF5), HDF5, a table (.csv), a
+folder of grey pictures in the order of their names. Time may be the first axis of an array or, as
+MATLAB users have it, the last. A table holds an image a line (rows * columns numbers, row 0 first;
+a head line is skipped, and where it names `r0c0`, `r0c1`, ... as our own tables do, those columns
+are taken), or one image (rows lines of columns numbers).
+
 Whole numbers 0 ... 65535 are taken as they are. Other values of a sensor type that says what
 one count is (depth in mm, force in N) are counted in that unit, below 0 as 0. Anything else
 (voltages, values with the bias removed) is scaled: value = scale_offset + scale * count, with
@@ -9,12 +15,14 @@ in the attributes, and `units` says "scaled".
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import csv
+import zipfile
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +30,17 @@ from numpy.typing import NDArray
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from probe.errors import RecordingError
 from probe.frame import WRIST
-from probe.recording.arrays import FileArray, arrays_of
+from probe.recording.files import check_name, draft_of, explain_errors, final_name
+from probe.recording.guard import open_hdf5
+from probe.recording.hdf5 import write_hdf5
 from probe.recording.layout import NOMINAL_HZ, FrameBlock, RecordingOrigin
-from probe.recording.names import check_name, final_name, part_of, unless_it_fails
-from probe.recording.pictures import folder_array, table_array
 from probe.recording.read import Recording
-from probe.recording.write import FileWriter
+from probe.recording.table import table_header
 
+if TYPE_CHECKING:
+    import h5py
+
+SUFFIXES: Final = (".png", ".pgm", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg")
 _AT_ONCE: Final = 1024  #: images read at a time
 _FULL: Final = 65535
 
@@ -59,7 +71,7 @@ def import_array(
     path
         A .npy, .npz, .mat or HDF5 file with an array (N, rows, columns), (rows, columns, N) or
         (rows, columns), the first axis taken for time where both would do; a table (.csv) or a
-        folder of pictures, see `pictures`.
+        folder of pictures.
     out
         The recording to be made.
     dataset
@@ -91,12 +103,16 @@ def import_array(
         if scale:
             more |= {"scale": scale.scale, "scale_offset": scale.offset}
         units = "counts" if scale is None or scale.scale == kind.unit else "scaled"
-        told = sensor_type_text(kind)
-        origin = RecordingOrigin(sensor, calibration, units, told, MappingProxyType(more))
-        with unless_it_fails(part_of(out)) as part, FileWriter(part, origin) as writer:
-            for first, images in _images(found, kind.shape):
-                writer.write(_block(images, first, scale, 1e9 / rate_hz))
-    final_name(part, out, [], last=True, replace=replace)
+        origin = RecordingOrigin(
+            sensor, calibration, units, sensor_type_text(kind), MappingProxyType(more)
+        )
+        blocks = (
+            _block(images, first, scale, 1e9 / rate_hz)
+            for first, images in _images(found, kind.shape)
+        )
+        draft = draft_of(out)
+        write_hdf5(draft, origin, blocks, out)
+    final_name(draft, out, replace=replace)
     return Recording(out)
 
 
@@ -104,12 +120,20 @@ def import_array(
 def _arrays_at(path: Path, image: tuple[int, int]) -> Iterator[list[FileArray]]:
     """Open whatever holds images: a folder of pictures, a table, a file of arrays."""
     if path.is_dir():
-        yield [folder_array(path, image)]
-    elif path.suffix.lower() == ".csv":
-        yield [table_array(path, image)]
+        yield [_folder_array(path, image)]
+        return
+    if path.suffix.lower() == ".csv":
+        yield [_table_array(path, image)]
+        return
+    with explain_errors(path, "read"), open(path, "rb") as file:
+        head = file.read(128)
+    if head.startswith(b"\x93NUMPY") or zipfile.is_zipfile(path):
+        yield _numpy_arrays(path)
+    elif head.startswith(b"MATLAB 5.0") or (path.suffix == ".mat" and b"MATLAB 7.3" not in head):
+        yield _matlab_arrays(path)
     else:
-        with arrays_of(path) as arrays:
-            yield arrays
+        with open_hdf5(path) as (hdf5, _):
+            yield _hdf5_arrays(hdf5)
 
 
 def _choose_array(
@@ -185,3 +209,188 @@ def _block(images: NDArray[Any], first: int, scale: Scale | None, period_ns: flo
         np.zeros((len(images), WRIST), np.uint16),
         None,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class FileArray:
+    """An array in a file, read a block at a time."""
+
+    name: str
+    shape: tuple[int, ...]  #: with the axes in the order of the programme that wrote it
+    dtype: np.dtype[Any]
+    part: Callable[[tuple[slice, ...]], NDArray[Any]]  #: reads these slices
+
+    def frames(self, image: tuple[int, int]) -> int | None:
+        """Return how many images of that shape it holds; None if it holds other things."""
+        if self.dtype.kind not in "biuf":
+            return None
+        if self.shape == image:
+            return 1
+        if len(self.shape) == 3 and self.shape[1:] == image:
+            return self.shape[0]
+        if len(self.shape) == 3 and self.shape[:2] == image:
+            return self.shape[2]
+        return None
+
+    def images(self, image: tuple[int, int], start: int, stop: int) -> NDArray[Any]:
+        """Return images `start` ... `stop` - 1, (n, rows, columns)."""
+        if self.shape == image:
+            return self.part((slice(None), slice(None)))[None][start:stop]
+        if self.shape[1:] == image:
+            return self.part((slice(start, stop), slice(None), slice(None)))
+        return np.moveaxis(self.part((slice(None), slice(None), slice(start, stop))), 2, 0)
+
+
+def _numpy_arrays(path: Path) -> list[FileArray]:
+    try:
+        with explain_errors(path, "read"):
+            loaded = np.load(path, mmap_mode="r", allow_pickle=False)
+            if isinstance(loaded, np.ndarray):
+                return [_in_memory(path.stem, loaded)]
+            with loaded:
+                return [_in_memory(name, loaded[name]) for name in loaded.files]
+    except RecordingError as error:
+        if not isinstance(error.__cause__, ValueError):
+            raise
+        raise RecordingError(
+            "it holds objects, or it is damaged",
+            fix="save a plain array of numbers (N, rows, columns)",
+            place=str(path),
+        ) from error
+
+
+def _matlab_arrays(path: Path) -> list[FileArray]:
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        with explain_errors(path, "read"):
+            variables = loadmat(path, appendmat=False)
+    except MatReadError as error:
+        raise RecordingError(
+            "it is no MATLAB file, or it is damaged", fix="save it again", place=str(path)
+        ) from error
+    return [
+        _in_memory(name, array)
+        for name, array in variables.items()
+        if isinstance(array, np.ndarray) and not name.startswith("__")
+    ]
+
+
+def _in_memory(name: str, array: NDArray[Any]) -> FileArray:
+    return FileArray(name, array.shape, array.dtype, lambda part: array[part])
+
+
+def _hdf5_arrays(file: h5py.File) -> list[FileArray]:
+    import h5py
+
+    found: list[FileArray] = []
+
+    def note(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset) and item.shape is not None:
+            found.append(_dataset(name, item))
+
+    with explain_errors(Path(file.filename), "read"):
+        file.visititems(note)
+    return found
+
+
+def _dataset(name: str, dataset: h5py.Dataset) -> FileArray:
+    def part(slices: tuple[slice, ...]) -> NDArray[Any]:
+        with explain_errors(Path(dataset.file.filename), "read"):
+            read: NDArray[Any] = dataset[slices[::-1]].T if reverse else dataset[slices]
+        return read
+
+    reverse = "MATLAB_class" in dataset.attrs
+    shape = dataset.shape[::-1] if reverse else dataset.shape
+    return FileArray(name, tuple(map(int, shape)), dataset.dtype, part)
+
+
+def _folder_array(folder: Path, image: tuple[int, int]) -> FileArray:
+    """Return the pictures of a folder as one array; each is read when it is asked for."""
+    with explain_errors(folder, "read"):
+        paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
+    if not paths:
+        raise RecordingError(
+            "no picture in the folder", fix=f"put {', '.join(SUFFIXES)} there", place=str(folder)
+        )
+    for path in paths:
+        _picture(path, image)
+
+    def part(slices: tuple[slice, ...]) -> NDArray[Any]:
+        return np.stack([_picture(path, image) for path in paths[slices[0]]])[:, *slices[1:]]
+
+    return FileArray(folder.name, (len(paths), *image), np.dtype(np.float64), part)
+
+
+def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
+    """Return the images of a table of numbers."""
+    with explain_errors(path, "read"):
+        try:
+            with open(path, encoding="utf-8-sig", newline="") as file:
+                lines = [line for line in csv.reader(file) if any(cell.strip() for cell in line)]
+        except (UnicodeError, csv.Error) as bad:
+            raise RecordingError(
+                f"it is no table: {bad}", fix="save it as CSV, UTF-8", place=str(path)
+            ) from bad
+    head = [] if not lines or _are_numbers(lines[0]) else [name.strip() for name in lines.pop(0)]
+    wanted = [name for name in table_header(image) if name.startswith("r")]
+    if all(name in head for name in wanted):
+        columns = [head.index(name) for name in wanted]
+        lines = [[line[c] for c in columns] if len(line) == len(head) else line for line in lines]
+    values = _numbers(path, lines, bool(head))
+    rows, columns_ = image
+    if values.shape == image:
+        values = values[None]
+    elif values.ndim == 2 and values.shape[1] == rows * columns_:
+        values = values.reshape(-1, rows, columns_)
+    else:
+        raise RecordingError(
+            f"lines of {values.shape[-1]} numbers are no images of {rows} x {columns_}",
+            fix=f"write {rows * columns_} numbers a line, or give the --sensor-type",
+            place=str(path),
+        )
+    return FileArray(path.stem, values.shape, values.dtype, lambda slices: values[slices])
+
+
+def _picture(path: Path, image: tuple[int, int]) -> NDArray[np.float64]:
+    from PIL import Image, UnidentifiedImageError
+
+    with explain_errors(path, "read"):
+        try:
+            with Image.open(path) as opened:
+                values = np.asarray(opened)
+        except (UnidentifiedImageError, SyntaxError) as bad:
+            raise RecordingError(
+                "it is no picture, or it is damaged", fix="save it again", place=str(path)
+            ) from bad
+    if values.shape != image or values.dtype.kind not in "uif":
+        raise RecordingError(
+            f"a picture of {' x '.join(map(str, values.shape))}, not of "
+            f"{image[0]} x {image[1]} grey values",
+            fix="save it in grey, a pixel a tactel; or give the --sensor-type",
+            place=str(path),
+        )
+    return values.astype(np.float64)
+
+
+def _are_numbers(cells: list[str]) -> bool:
+    try:
+        [float(cell) for cell in cells]
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(path: Path, lines: list[list[str]], headed: bool) -> NDArray[np.float64]:
+    width = len(lines[0]) if lines else 0
+    for number, line in enumerate(lines, 2 if headed else 1):
+        if len(line) != width or not _are_numbers(line):
+            raise RecordingError(
+                f"not {width} numbers as in the lines before",
+                fix="write numbers with commas between, as many in each line",
+                place=f"{path}:{number}",
+            )
+    if not lines:
+        raise RecordingError("it holds no numbers", fix="write an image a line", place=str(path))
+    return np.array([[float(cell) for cell in line] for line in lines])

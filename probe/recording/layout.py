@@ -1,4 +1,4 @@
-"""What stands in a recording: datasets, attributes, version.
+"""What a recording holds: datasets, attributes, version, and blocks of its frames.
 
 ::
 
@@ -16,12 +16,12 @@ Only /frames is needed to be read: any HDF5 file with counts
 (N, rows, columns) there is a recording.
 Without /seq frames are numbered from 0, without /t_ns they come at 220 frames a second.
 All datasets are chunked and compressed by shuffle and deflate, which every HDF5 library
-reads, in the file format of HDF5 1.10, the first one that can be read while written.
+reads, in the file format of HDF5 1.10, whose metadata have checksums.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Final
@@ -35,7 +35,7 @@ from probe.frame import WRIST, Frame
 FORMAT: Final = "tactile recording"
 FORMAT_VERSION: Final = 1
 NOMINAL_HZ: Final = 220.0  #: of the frames of a file that tells no time
-CHUNK: Final = 64  #: frames that are compressed together, and written at a time when they come fast
+CHUNK: Final = 64  #: frames that are compressed together
 
 #: name: shape of one entry (-1: any length), type in the file
 DATASETS: Final[Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]] = MappingProxyType(
@@ -47,7 +47,6 @@ DATASETS: Final[Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]] = MappingPr
         "pose": ((4, 4), np.dtype("<f8")),
     }
 )
-OPTIONAL: Final = ("pose",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,3 +100,74 @@ class FrameBlock:
         """Return frame `i` of the block, a view on its arrays."""
         pose = None if self.pose is None or np.isnan(self.pose[i, 0, 0]) else self.pose[i]
         return Frame(self.counts[i], int(self.t_ns[i]), int(self.seq[i]), self.wrist[i], pose)
+
+
+def block_of(frames: Sequence[Frame]) -> FrameBlock:
+    """Return frames as a block; with poses if any frame has one."""
+    pose = None
+    if any(frame.pose is not None for frame in frames):
+        unknown = np.full((4, 4), np.nan)
+        pose = np.stack([unknown if frame.pose is None else frame.pose for frame in frames])
+    return FrameBlock(
+        np.stack([frame.counts for frame in frames]),
+        np.array([frame.t_ns for frame in frames], np.int64),
+        np.array([frame.seq for frame in frames], np.int64),
+        np.stack([frame.wrist for frame in frames]),
+        pose,
+    )
+
+
+def join_blocks(blocks: Sequence[FrameBlock], shape: tuple[int, int]) -> FrameBlock:
+    """Return consecutive blocks as one; without any, an empty one of images of that shape."""
+    if len(blocks) < 2:
+        return blocks[0] if blocks else FrameBlock.empty(shape)
+    pose = None
+    if any(block.pose is not None for block in blocks):
+        pose = np.concatenate(
+            [
+                np.full((len(block), 4, 4), np.nan) if block.pose is None else block.pose
+                for block in blocks
+            ]
+        )
+    return FrameBlock(
+        np.concatenate([block.counts for block in blocks]),
+        np.concatenate([block.t_ns for block in blocks]),
+        np.concatenate([block.seq for block in blocks]),
+        np.concatenate([block.wrist for block in blocks]),
+        pose,
+    ).frozen()
+
+
+def are_rigid(poses: NDArray[Any]) -> bool:
+    """Tell whether poses (n, 4, 4) are rigid transforms, or NaN."""
+    known = poses[~np.isnan(poses).all(axis=(1, 2))].astype(np.float64)
+    if not np.isfinite(known).all():
+        return False
+    turn = known[:, :3, :3]
+    return bool(
+        np.allclose(turn @ turn.transpose(0, 2, 1), np.eye(3), atol=1e-6)
+        and (known[:, 3] == (0, 0, 0, 1)).all()
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class FrameFile:
+    """An open file of frames, HDF5 or a journal."""
+
+    origin: RecordingOrigin
+    own: bool  #: written by this programme
+    closed: bool  #: its writer closed it, and its end is there
+    tool_version: str
+    piece: int  #: number in its series, from 1
+    frames: int  #: with everything that belongs to them
+    shape: tuple[int, int]  #: rows and columns of its images
+    even: bool  #: all datasets have that length
+    poses: bool  #: frames in it may have a pose
+    read: Callable[[int, int], FrameBlock]
+    """Return and check frames `start` ... `stop` - 1; RecordingError where the file is damaged, or
+    a value is no count, time, number or pose."""
+
+    def blocks(self) -> Iterator[FrameBlock]:
+        """Yield the blocks that were compressed or written together; see `read`."""
+        for start in range(0, self.frames, CHUNK):
+            yield self.read(start, min(start + CHUNK, self.frames))

@@ -1,25 +1,26 @@
 """A recording, or any HDF5 file with /frames (N, rows, columns), -> frames, a block at a time.
 
 Nothing is held open between two calls, and no more than a block is in memory: a recording
-of an hour is read in the memory of a second.
+of an hour is read in the memory of a second. The journal of a writer that was killed is read as
+it is, to its last whole record.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.errors import RecordingError
 from probe.frame import Frame
-from probe.recording.checked import check_recording, read_block
-from probe.recording.layout import FrameBlock, RecordingOrigin
-from probe.recording.names import part_of, series_of
-from probe.recording.opened import is_blank, open_recording
+from probe.recording.files import explain_errors, part_of, series_of
+from probe.recording.guard import superblock_of
+from probe.recording.hdf5 import open_hdf5_frames
+from probe.recording.journal import is_journal, open_journal
+from probe.recording.layout import FrameBlock, FrameFile, RecordingOrigin, join_blocks
 
 _AT_ONCE: Final = 256  #: frames read at a time
 _VALUES_AT_ONCE: Final = 1 << 24  #: of larger images fewer: 256 of 256 x 256
@@ -43,13 +44,13 @@ class Recording:
     path
         A file; or the name that was given to the recorder, when the recording rolled over.
     live
-        Also what was flushed of a recording that is still being written, or was left open.
+        Also the flushed frames of a recording that is still being written.
 
     Raises
     ------
     RecordingError
         No such file, no HDF5 file, no /frames of the right shape, a newer format, truncated,
-        damaged, or not closed (and not `live`).
+        damaged, or being written (and not `live`); an HDF5 file that was left open.
 
     Examples
     --------
@@ -74,20 +75,27 @@ class Recording:
     tool_version: str = field(init=False, repr=False)  #: that wrote it; empty: not this programme
 
     def __post_init__(self) -> None:
-        looks = [
-            (name, check_recording(name, live=self.live))
-            for name in _files_of(Path(self.path), self.live)
-        ]
-        _, first = looks[0]
-        for name, seen in looks:
-            if seen.shape != first.shape:
+        files: list[File] = []
+        first: FrameFile | None = None
+        for name in _files_of(Path(self.path), self.live):
+            with open_frames(name, live=self.live) as file:
+                if file.own and not file.even and not self.live:
+                    raise RecordingError(
+                        "its datasets have different lengths",
+                        fix="run `repair` on it",
+                        place=str(name),
+                    )
+            first = first or file
+            if file.shape != first.shape:
                 raise RecordingError(
-                    f"its images are of {seen.shape}, those of {looks[0][0].name} of {first.shape}",
+                    f"its images are of {file.shape}, those of {files[0].path.name} of "
+                    f"{first.shape}",
                     fix="read the two by themselves",
                     place=str(name),
                 )
-        files = tuple(File(name, seen.frames, seen.poses) for name, seen in looks)
-        object.__setattr__(self, "files", files)
+            files.append(File(name, file.frames, file.poses))
+        assert first is not None
+        object.__setattr__(self, "files", tuple(files))
         object.__setattr__(self, "origin", first.origin)
         object.__setattr__(self, "shape", first.shape)
         object.__setattr__(self, "tool_version", first.tool_version)
@@ -116,18 +124,18 @@ class Recording:
         size = max(1, min(size, _VALUES_AT_ONCE // (self.shape[0] * self.shape[1])))
         for file in self.files:
             if start < min(stop, file.frames):
-                with open_recording(file.path, live=self.live) as source:
+                with open_frames(file.path, live=self.live) as source:
                     for first in range(start, min(stop, file.frames), size):
                         end = min(first + size, stop, file.frames)
-                        yield read_block(source, file.path, first, end)
+                        yield source.read(first, end)
             start, stop = max(0, start - file.frames), stop - file.frames
 
     def block(self, start: int = 0, stop: int | None = None) -> FrameBlock:
         """Return frames `start` ... `stop` - 1 at once."""
-        return _join_blocks(list(self.blocks(start, stop)), self.shape)
+        return join_blocks(list(self.blocks(start, stop)), self.shape)
 
     def sensor_type(self, asked: str | SensorType | None = None) -> SensorType:
-        """Return the type of sensor that made it: the one asked for, else the one it tells.
+        """Return the type of sensor that made it: the one asked for, else the one it names.
 
         Raises
         ------
@@ -148,32 +156,43 @@ def read_frames(path: Path | str, *, live: bool = False) -> Iterator[Frame]:
     return Recording(path, live=live).frames()
 
 
+@contextmanager
+def open_frames(path: Path, *, live: bool = False, damaged: bool = False) -> Iterator[FrameFile]:
+    """Open a file of frames: HDF5, or the journal of one that is not closed.
+
+    Parameters
+    ----------
+    path
+        The file.
+    live
+        Also one that is being written, or that its writer left open.
+    damaged
+        In whatever state; parts may be missing.
+
+    Raises
+    ------
+    RecordingError
+        See `Recording`.
+    """
+    opened = open_journal(path, live=live) if is_journal(path) else \
+        open_hdf5_frames(path, live=live, damaged=damaged)  # fmt: skip
+    with opened as file:
+        yield file
+
+
 def _files_of(path: Path, live: bool) -> list[Path]:
     """Return the files of a recording, in order; `path` itself if there are none."""
     if path.exists():
         return [path]
     series = [file for _, file in series_of(path)]
     part = part_of(path)
-    if part.exists() and not (live and series and is_blank(part)):
+    if part.exists() and not (live and series and _is_blank(part)):
         series.append(part)
     return series or [path]
 
 
-def _join_blocks(blocks: list[FrameBlock], shape: tuple[int, int]) -> FrameBlock:
-    if len(blocks) < 2:
-        return blocks[0] if blocks else FrameBlock.empty(shape)
-    pose = None
-    if any(block.pose is not None for block in blocks):
-        pose = np.concatenate(
-            [
-                np.full((len(block), 4, 4), np.nan) if block.pose is None else block.pose
-                for block in blocks
-            ]
-        )
-    return FrameBlock(
-        np.concatenate([block.counts for block in blocks]),
-        np.concatenate([block.t_ns for block in blocks]),
-        np.concatenate([block.seq for block in blocks]),
-        np.concatenate([block.wrist for block in blocks]),
-        pose,
-    ).frozen()
+def _is_blank(part: Path) -> bool:
+    """Tell whether nothing in a part file has reached the disk yet."""
+    with explain_errors(part, "read"):
+        head = superblock_of(part)
+    return not is_journal(part) and (head is None or head.blank)

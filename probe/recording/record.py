@@ -1,32 +1,31 @@
 """Frames -> a recording on the disk, whatever happens meanwhile.
 
-Frames are handed to the disk when 64 of them have gathered or `flush_s` of device time has
-passed, whichever comes first; a process that is killed loses those since then. Every
+Frames are appended to a journal (`touch.part.h5`) when 64 of them have gathered or `flush_s` of
+device time has passed, whichever comes first; a process that is killed loses those since then.
+When the recording is closed, the journal is turned into HDF5 and gets its name. Every
 `roll_over_s` of device time another file begins, because a file that loses its end is lost
 as a whole to most readers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, NoReturn
-
-import numpy as np
+from typing import Any, NoReturn, Self
 
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
-from probe.closing import Closing
 from probe.errors import RecordingError
 from probe.frame import Frame
-from probe.recording.layout import CHUNK, FrameBlock, RecordingOrigin
-from probe.recording.names import check_name, final_name, part_of
-from probe.recording.write import FileWriter
+from probe.recording.files import check_name, draft_of, explain_errors, final_name, part_of
+from probe.recording.hdf5 import write_hdf5
+from probe.recording.journal import JournalWriter, open_journal
+from probe.recording.layout import CHUNK, FrameBlock, RecordingOrigin, block_of
 
-_NO_POSE: Final = np.full((4, 4), np.nan)
 
-
-class Recorder(Closing):
+class Recorder:
     """A recording that is being written; a context manager. Not for several threads.
 
     Parameters
@@ -98,7 +97,13 @@ class Recorder(Closing):
         self._waiting: list[Frame] = []
         self._piece_began_ns: int | None = None
         check_name(self.path, replace=replace)
-        self._writer: FileWriter | None = self._next_writer()
+        self._journal: JournalWriter | None = self._next_journal()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def append(self, frame: Frame) -> None:
         """Take a frame.
@@ -109,14 +114,15 @@ class Recorder(Closing):
             The recording is closed, the frame is of another shape than those before, or the
             disk is full; then it has been closed with all frames so far, this one included.
         """
-        self._open_writer()
+        self._open_journal()
         self._check_shape(frame)
         if self._piece_began_ns is None:
             self._piece_began_ns = frame.t_ns
         elif not 0 <= frame.t_ns - self._piece_began_ns < self._roll_over_ns:
             self.flush()
             if frame.t_ns > self._piece_began_ns:  # or else the clock of the probe began anew
-                self._roll_over()
+                self._finish(last=False)
+                self._journal = self._next_journal()
             self._piece_began_ns = frame.t_ns
         self._waiting.append(frame)
         self.frames += 1
@@ -125,22 +131,20 @@ class Recorder(Closing):
 
     def flush(self) -> None:
         """Bring every frame so far to the disk; worth calling when frames stop coming."""
-        writer = self._open_writer()
+        journal = self._open_journal()
         if not self._waiting:
             return
         block, self._waiting = block_of(self._waiting), []
-        if block.pose is not None and writer.frames and not writer.poses:
-            writer = self._roll_over()  # this file has no place for poses
-        before = writer.frames
+        before = journal.frames
         try:
-            writer.write(block)
+            journal.append(block)
         except RecordingError as error:
-            self.frames -= before + len(block) - writer.frames
+            self.frames -= before + len(block) - journal.frames
             self._give_up(error)
 
     def close(self) -> None:
         """Bring every frame to the disk and give the file its name; may be called twice."""
-        if self._writer is None:
+        if self._journal is None:
             return
         self.flush()
         self._finish(last=True)
@@ -157,49 +161,46 @@ class Recorder(Closing):
                 place=str(self.path),
             )
 
-    def _open_writer(self) -> FileWriter:
-        if self._writer is None:
+    def _open_journal(self) -> JournalWriter:
+        if self._journal is None:
             raise RecordingError(
                 "the recording is closed", fix="begin another one", place=str(self.path)
             )
-        return self._writer
+        return self._journal
 
-    def _next_writer(self) -> FileWriter:
-        return FileWriter(part_of(self.path), self._origin, len(self.files) + 1)
-
-    def _roll_over(self) -> FileWriter:
-        self._finish(last=False)
-        self._writer = self._next_writer()
-        return self._writer
+    def _next_journal(self) -> JournalWriter:
+        return JournalWriter(part_of(self.path), self._origin, len(self.files) + 1)
 
     def _finish(self, *, last: bool) -> None:
-        """Close the file at hand, and give it its name."""
-        writer = self._open_writer()
-        self._writer = None
-        writer.close()
-        self.files.append(
-            final_name(writer.path, self.path, self.files, last=last, replace=self._replace)
-        )
+        """Turn the journal into HDF5, and give the file its name; the journal stays if it fails."""
+        journal = self._open_journal()
+        self._journal = None
+        part, draft, number = journal.path, draft_of(self.path), len(self.files) + 1
+        self.files.append(part)
+        try:
+            with ExitStack() as stack:
+                blocks: Iterator[FrameBlock] = iter(())
+                if journal.frames:
+                    blocks = stack.enter_context(open_journal(part, live=True)).blocks()
+                write_hdf5(draft, self._origin, blocks, part, number)
+            with explain_errors(part, "replace"):
+                os.replace(draft, part)
+        except RecordingError as error:
+            fix = f"{error.fix}, then run `repair` on {part.name}"
+            raise RecordingError(error.cause, fix=fix, place=str(part)) from error
+        finally:
+            journal.close()
+        self.files[-1] = final_name(part, self.path, number, last=last, replace=self._replace)
 
     def _give_up(self, error: RecordingError) -> NoReturn:
-        """Close the recording with what is safe, and say so."""
-        self._finish(last=True)
+        """Close the recording with the frames that are safe, and say so."""
+        fix = error.fix
+        try:
+            self._finish(last=True)
+        except RecordingError as unfinished:
+            fix = unfinished.fix
         raise RecordingError(
             f"{error.cause}; the recording ends after {self.frames} frames",
-            fix=error.fix,
+            fix=fix,
             place=str(self.files[-1]),
         ) from error
-
-
-def block_of(frames: list[Frame], *, poses: bool = False) -> FrameBlock:
-    """Return frames as a block; with a place for poses if any has one, or if asked for."""
-    pose = None
-    if poses or any(frame.pose is not None for frame in frames):
-        pose = np.stack([_NO_POSE if frame.pose is None else frame.pose for frame in frames])
-    return FrameBlock(
-        np.stack([frame.counts for frame in frames]),
-        np.array([frame.t_ns for frame in frames], np.int64),
-        np.array([frame.seq for frame in frames], np.int64),
-        np.stack([frame.wrist for frame in frames]),
-        pose,
-    )

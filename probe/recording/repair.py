@@ -7,23 +7,27 @@ out of it.
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from probe.errors import RecordingError
-from probe.recording.checked import CheckedFile, check_open_file, read_block
-from probe.recording.layout import CHUNK, FrameBlock
-from probe.recording.lock import is_locked
-from probe.recording.names import final_of, is_part, part_of, piece_of, series_of
-from probe.recording.opened import explain_errors, open_anyhow
-from probe.recording.write import FileWriter
-
-if TYPE_CHECKING:
-    import h5py
+from probe.recording.files import (
+    draft_of,
+    explain_errors,
+    final_of,
+    is_locked,
+    is_part,
+    part_of,
+    piece_of,
+    series_of,
+)
+from probe.recording.hdf5 import write_hdf5
+from probe.recording.layout import CHUNK, FrameBlock, FrameFile
+from probe.recording.read import open_frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,73 +64,53 @@ def repair(path: Path | str) -> RepairResult:
         raise RecordingError(
             "it is still being written", fix="stop the recording first", place=str(path)
         )
-    with open_anyhow(path) as (source, head):
-        seen = check_open_file(source, path)
-        target = _free_name(path, seen) if is_part(path) else path
-        if head.whole and seen.even and _count_readable(source, path, seen) == seen.frames:
-            return _rename(path, target, seen)
-        copy = path.with_name(f".{target.name}.repair")
-        copy.unlink(missing_ok=True)
-        frames = _copy(source, path, seen, copy)
-    lost = seen.frames - frames
-    if not frames and seen.frames:
-        copy.unlink()
-        raise RecordingError("no frame in it can be read", fix="copy it again", place=str(path))
+    with open_frames(path, damaged=True) as file:
+        target = _free_name(path, file.piece) if is_part(path) else path
+        frames = sum(map(len, _readable_blocks(file)))
+        lost, origin = file.frames - frames, file.origin
+        if file.closed and file.even and not lost:
+            if path != target:
+                with explain_errors(path, "rename"):
+                    os.rename(path, target)
+            return RepairResult(target, frames, 0, changed=path != target)
+        if lost and not frames:
+            raise RecordingError("no frame in it can be read", fix="copy it again", place=str(path))
+        if lost:
+            more = MappingProxyType({**origin.more, "frames_lost": lost})
+            origin = dataclasses.replace(origin, more=more)
+        draft = draft_of(target)
+        write_hdf5(draft, origin, _readable_blocks(file), target, file.piece)
     with explain_errors(path, "replace"):
-        if lost or not seen.own:
-            damaged = _first_free(target.with_name(f"{target.stem}.damaged{target.suffix}"))
-            os.link(path, damaged)
-        os.replace(copy, target)
+        if lost or not file.own:
+            os.link(path, _first_free(target.with_name(f"{target.stem}.damaged{target.suffix}")))
+        os.replace(draft, path)
         if path != target:
-            path.unlink()
+            os.rename(path, target)
     return RepairResult(target, frames, lost, changed=True)
 
 
-def _copy(source: h5py.File, path: Path, seen: CheckedFile, copy: Path) -> int:
-    """Write every block that can be read to a new file; return the number of frames."""
-    lost, origin = seen.frames - _count_readable(source, path, seen), seen.origin
-    if lost:
-        note = {**origin.more, "frames_lost": lost}
-        origin = replace(origin, more=MappingProxyType(note))
-    with FileWriter(copy, origin, seen.piece) as writer:
-        for block in _blocks(source, path, seen):
-            writer.write(block)
-    return writer.frames
-
-
-def _count_readable(source: h5py.File, path: Path, seen: CheckedFile) -> int:
-    return sum(len(block) for block in _blocks(source, path, seen))
-
-
-def _blocks(source: h5py.File, path: Path, seen: CheckedFile) -> Iterator[FrameBlock]:
+def _readable_blocks(file: FrameFile) -> Iterator[FrameBlock]:
     """Yield the blocks that can be read, one for each that was compressed."""
-    for start in range(0, seen.frames, CHUNK):
+    for start in range(0, file.frames, CHUNK):
         try:
-            yield read_block(source, path, start, min(start + CHUNK, seen.frames))
+            yield file.read(start, min(start + CHUNK, file.frames))
         except RecordingError:
             continue
 
 
-def _rename(path: Path, target: Path, seen: CheckedFile) -> RepairResult:
-    if path != target:
-        with explain_errors(path, "rename"):
-            os.rename(path, target)
-    return RepairResult(target, seen.frames, 0, changed=path != target)
-
-
-def _free_name(part: Path, seen: CheckedFile) -> Path:
+def _free_name(part: Path, piece: int) -> Path:
     """Return the name that a part file would have got, had it been closed."""
     path = final_of(part)
-    if seen.piece == 1 and not path.exists() and not series_of(path):
+    if piece == 1 and not path.exists() and not series_of(path):
         return path
-    piece = piece_of(path, seen.piece)
-    if piece.exists():
+    named = piece_of(path, piece)
+    if named.exists():
         raise RecordingError(
-            f"{piece.name} exists, and this is piece {seen.piece} too",
-            fix=f"move {piece.name} away",
+            f"{named.name} exists, and this is piece {piece} too",
+            fix=f"move {named.name} away",
             place=str(part),
         )
-    return piece
+    return named
 
 
 def _first_free(path: Path) -> Path:

@@ -4,10 +4,16 @@ Images are `sensor_msgs/Image` (32FC1, counts as 32-bit floats, which hold them 
 `geometry_msgs/PoseStamped` in metres. What no message of ROS holds without loss stands in
 `encoded_objects_msgs/TouchFrame`, what a touch says in `encoded_objects_msgs/Recognition`. The
 values fit any writer that takes dictionaries, and rclpy's `set_message_fields`.
+
+`cdr_bytes` writes messages as the plain CDR that rmw, zenoh bridges and MCAP files carry:
+little-endian, each number aligned to its own size from behind the four bytes of the head; a string
+is its length with the closing zero, then its bytes. OMG, "DDS-XTypes", 7.4.1 (PLAIN_CDR).
 """
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -69,6 +75,21 @@ DEFINITIONS: Final[dict[str, str]] = {
         "string json         # the whole answer, as recognize-object --json prints it\n"
     ),
 }
+
+_HEADER_FIELDS: Final = (
+    ("header.stamp.sec", "i"), ("header.stamp.nanosec", "I"), ("header.frame_id", "string"),
+)  # fmt: skip
+_POSE_FIELDS: Final = tuple((f"pose.pose.position.{name}", "d") for name in "xyz") + tuple(
+    (f"pose.pose.orientation.{name}", "d") for name in "xyzw"
+)
+#: type -> its fields in order: a letter of `struct`, `string`, `bytes` (of any length), or 36 d
+FIELDS: Final[dict[str, tuple[tuple[str, str], ...]]] = {
+    IMAGE: (
+        *_HEADER_FIELDS, ("height", "I"), ("width", "I"), ("encoding", "string"),
+        ("is_bigendian", "B"), ("step", "I"), ("data", "bytes"),
+    ),
+    POSE_WITH_COVARIANCE: (*_HEADER_FIELDS, *_POSE_FIELDS, ("pose.covariance", "36d")),
+}  # fmt: skip
 
 
 def image_message(frame: Frame) -> dict[str, Any]:
@@ -138,3 +159,29 @@ def pose_fields(T: NDArray[np.float64]) -> dict[str, Any]:
     x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True).tolist()
     at = dict(zip("xyz", (T[:3, 3] * 1e-3).tolist(), strict=True))
     return {"position": at, "orientation": {"x": x, "y": y, "z": z, "w": w}}
+
+
+def cdr_bytes(kind: str, fields: Mapping[str, Any]) -> bytes:
+    """Return a message of one of the types of `FIELDS`, its from its values."""
+    body = bytearray()
+    for path, form in FIELDS[kind]:
+        value: Any = fields
+        for name in path.split("."):
+            value = value[name]
+        if form == "string":
+            text = value.encode() + b"\0"
+            _append(body, "I", len(text))
+            body += text
+        elif form == "bytes":
+            _append(body, "I", len(value))
+            body += value
+        elif form[-1] == "d" and len(form) > 1:
+            _append(body, form, *value)
+        else:
+            _append(body, form, value)
+    return b"\0\1\0\0" + bytes(body)
+
+
+def _append(body: bytearray, form: str, *values: float) -> None:
+    body += b"\0" * (-len(body) % struct.calcsize(form[-1]))
+    body += struct.pack(f"<{form}", *values)

@@ -6,15 +6,15 @@ known in any frame p00 ... p33, T_base_sensor by rows (mm), empty in the frames 
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
+from encoded_objects.base.files import staged_file
 from probe.frame import WRIST
+from probe.recording.files import explain_errors
 from probe.recording.layout import FrameBlock
-from probe.recording.opened import explain_errors
 from probe.recording.read import Recording
 
 
@@ -28,7 +28,7 @@ def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
     out
         The table; it appears when it is complete, and replaces a file of that name.
     live
-        Also one that is not closed.
+        Also one that is being written.
 
     Raises
     ------
@@ -36,21 +36,19 @@ def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
         The recording cannot be read, or the table not be written.
     """
     recording, out = Recording(path, live=live), Path(out)
-    draft = out.with_name(f".{out.name}.{os.getpid()}")
-    try:
-        with explain_errors(out, "write"):
-            with open(draft, "x", encoding="ascii", newline="") as stream:
-                write_csv(recording, stream)
-            os.replace(draft, out)
-    finally:
-        draft.unlink(missing_ok=True)
+    with (
+        explain_errors(out, "write"),
+        staged_file(out) as draft,
+        open(draft, "x", encoding="ascii", newline="") as stream,
+    ):
+        _write_csv(recording, stream)
     return len(recording)
 
 
-def write_csv(recording: Recording, stream: TextIO) -> None:
-    """Write the table of a recording to a stream."""
+def _write_csv(recording: Recording, stream: TextIO) -> None:
     poses = any(file.poses for file in recording.files)
-    stream.write(",".join(_header(recording.shape, poses)) + "\n")
+    pose = [f"p{r}{c}" for r in range(4) for c in range(4)] if poses else []
+    stream.write(",".join([*table_header(recording.shape), *pose]) + "\n")
     for block in recording.blocks():
         stream.write("".join(line + "\n" for line in _lines(block, poses)))
 
@@ -59,11 +57,6 @@ def table_header(shape: tuple[int, int]) -> list[str]:
     """Return the names of the columns of a table without poses."""
     images = [f"r{r}c{c}" for r in range(shape[0]) for c in range(shape[1])]
     return ["seq", "t_ns", *images, *(f"wrist{i}" for i in range(WRIST))]
-
-
-def _header(shape: tuple[int, int], poses: bool) -> list[str]:
-    pose = [f"p{r}{c}" for r in range(4) for c in range(4)] if poses else []
-    return [*table_header(shape), *pose]
 
 
 def _lines(block: FrameBlock, poses: bool) -> list[str]:

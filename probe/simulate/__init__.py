@@ -2,10 +2,13 @@
 
 ::
 
-    target      a word -> the surface that it names: registered, part, round, scene
+    scene       a surface, where on it a sensor may stand, and whose it is
+    target      a word -> scene: a face of a database (registered), a written part (written)
     touch       touches at random, and where a touched sensor stands
+    sensor      scene + touch -> contact and counts, frame after frame
     scan        places one after the other on a way over a face, as a robot goes it
     simulation  target + options -> touches with their frames and their truth
-    source      what stands behind `sim:` ports: a probe that keeps touching
-    world       how sensors, prints and surfaces are off: levels, wear, surfaces of nobody
+    source      frames of `sim:` ports: a probe that keeps touching
+    printed     what PrusaSlicer's G-code leaves of a registered part
+    world       how sensors, prints and surfaces are off: levels, wear, foreign surfaces
 """

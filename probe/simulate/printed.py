@@ -29,7 +29,7 @@ from generator.printed.prints import (
 )
 from generator.printed.profiles import DEFAULT
 from generator.printed.slicer import find_slicer, slicer_version
-from generator.printed.surface_file import is_written, read_surface
+from generator.printed.surface import is_written, read_surface
 from probe.errors import SurfaceError
 from probe.simulate.registered import face_of, registered_object
 from probe.simulate.scene import Scene

@@ -1,8 +1,8 @@
-"""Faces of registered objects as surfaces. Thesis 6.3.
+"""Faces of registered objects, and their written parts, as surfaces. Thesis 6.3.
 
-Database + object + face -> Scene in the face frame: the face with its symbols, and what lies
-around it: the other faces that can be seen from above, with their symbols. Panels are taken
-as assembled, without the gap along their edges.
+Database + object + face -> Scene in the face frame: the face with its symbols, and around it
+the other faces that can be seen from above, with their symbols. Panels are taken as assembled,
+without the gap along their edges. A part is the surface of its STL file; a round face, too.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,24 +18,26 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from generator.database import DatabaseError
-from generator.database.entries import find_object, list_objects, object_names
-from generator.database.open import open_database
-from generator.database.read import read_object, read_parts
+from generator.database.open import normal_url, open_database, part_file, part_path
+from generator.database.read import find_object, list_objects, object_names, read_object, read_parts
 from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
 from generator.database.transaction import read_transaction
 from probe.errors import SurfaceError
-from probe.simulate.round import round_scene
 from probe.simulate.scene import Scene
-from probe.simulate.settings import FACE_AROUND
-from probe.surface.face import FaceSurface
-from probe.surface.lattice import LatticeSurface, list_lookup
+from probe.simulate.written import part_mesh, round_part
+from probe.surface.body import symbol_triangles, triangulate
+from probe.surface.contract import HeightMap
+from probe.surface.face import FaceSurface, LatticeSurface, list_lookup, template
 from probe.surface.mesh import MeshSurface, mesh
 from probe.surface.polygon import polygon
-from probe.surface.solids import symbol_triangles, triangulate
 from probe.surface.symbols import Relief, SymbolReliefs, emboss
-from probe.surface.template import template
 
 Array = NDArray[np.float64]
+
+DEEPEST_MM = 8.0  #: symbols of other faces that lie farther below a face are left out ...
+BEYOND_MM = 40.0  #: ... and those farther outside its box
+UP = 0.999  #: cosine from which a face of a panel lies up
+FLAT = 1e-9  #: share of an object's size that is rounding
 
 
 class DatabaseUnreadableError(SurfaceError):
@@ -67,15 +70,44 @@ def registered_surface(database: str, object_name: str, face: str = "") -> Scene
 def scene_of_face(database: str, held: RegisteredObject, face: str = "") -> Scene:
     """Return a face of an object that was read before; raises as `registered_surface`."""
     found = face_of(held, face)
-    if found.round is not None:
-        return round_scene(database, held, found)
+    if found.round is None:
+        return _scene(held, found, _surface(held, found), f"{held.entry.name}/{found.name}")
+    for part in held.parts:
+        if part.format == "stl":
+            return round_part(part_path(normal_url(database), part.file), held, part, found).scene()
+    raise SurfaceError(
+        f"{held.entry.name} has no STL file, and a round face is touched as it was written",
+        fix="make it again with --format stl",
+        place=database,
+    )
+
+
+def registered_part_surface(path: Path, database: str, object_name: str, face: str) -> Scene:
+    """Return the surface of a registered part; see `target.part_surface`."""
+    held, part = _registered_part(database, path, object_name)
+    return scene_of_part(path, held, part, face)
+
+
+def scene_of_part(path: Path, held: RegisteredObject, part: RegisteredPart, face: str) -> Scene:
+    """Return the surface of a part (STL) of an object that was read before.
+
+    An empty `face`: the face of a panel, or the first face of a whole body with symbols.
+    """
+    up = _face_up(held, part, face)
+    if up.round is not None:
+        return round_part(path, held, part, up).scene()
+    T_face_part = np.linalg.inv(up.T_object_face) @ part.T_object_part
+    return _scene(held, up, part_mesh(path, T_face_part), f"{path.name}/{up.name}")
+
+
+def _scene(held: RegisteredObject, face: RegisteredFace, surface: HeightMap, name: str) -> Scene:
     return Scene(
-        surface=_surface(held, found),
-        region=polygon(found.polygon_mm),
-        name=f"{held.entry.name}/{found.name}",
+        surface=surface,
+        region=polygon(face.polygon_mm),
+        name=name,
         object_name=held.entry.name,
-        face=found.name,
-        T_object_surface=found.T_object_face,
+        face=face.name,
+        T_object_surface=face.T_object_face,
     )
 
 
@@ -146,6 +178,40 @@ def face_of(held: RegisteredObject, name: str = "") -> RegisteredFace:
     )
 
 
+def _registered_part(
+    database: str, path: Path, object_name: str
+) -> tuple[RegisteredObject, RegisteredPart]:
+    """Return the part that a file holds: of this path, or else of this file name."""
+    stated = part_file(normal_url(database), str(path))
+    named = registered_object(database, object_name) if object_name else None
+    parts = (
+        [(named.entry.name, part) for part in named.parts] if named else registered_parts(database)
+    )
+    known = [(name, part) for name, part in parts if part.format == "stl"]
+    same_path = [held for held in known if held[1].file == stated]
+    same_name = [held for held in known if Path(held[1].file).name == path.name]
+    for name, part in same_path + same_name:
+        return named or registered_object(database, name), part
+    shown = ", ".join(Path(part.file).name for _, part in known[:8])
+    raise SurfaceError(
+        f"{path.name} is not registered in {database}",
+        fix=f"its STL parts: {shown or 'none'}{', ...' if len(known) > 8 else ''}",
+        place=str(path),
+    )
+
+
+def _face_up(held: RegisteredObject, part: RegisteredPart, name: str) -> RegisteredFace:
+    """Return the named face, or the one whose plane holds the top of a panel."""
+    if name or len(held.parts) == 0:
+        return face_of(held, name)
+    panels = sum(other.format == part.format for other in held.parts) == len(held.faces)
+    for face in held.faces:
+        T = np.linalg.inv(part.T_object_part) @ face.T_object_face
+        if panels and part.name.endswith(f"-{face.name}") and T[2, 2] > UP:
+            return face
+    return face_of(held)
+
+
 def _surface(held: RegisteredObject, face: RegisteredFace) -> FaceSurface:
     symbols = _symbols(held)
     lattice = None
@@ -181,14 +247,14 @@ def _surrounding_mesh(
 ) -> MeshSurface | None:
     """Return all other faces that are seen from above, with symbols near this face."""
     T_face_object = np.linalg.inv(face.T_object_face)
-    eps = FACE_AROUND.flat * float(np.ptp(held.polyhedron.vertices, axis=0).max())
+    eps = FLAT * float(np.ptp(held.polyhedron.vertices, axis=0).max())
     low, high = polygon(face.polygon_mm).box_mm
     found: list[Array] = []
     for other in held.faces:
         if other.face_id == face.face_id:
             continue
         T = T_face_object @ other.T_object_face
-        if T[2, 2] > FACE_AROUND.flat:
+        if T[2, 2] > FLAT:
             # Corners come from the object, so that neighbours share them to the last bit.
             loops = held.polyhedron.faces[other.face_id].loops
             corners = _transform_points(held.polyhedron.vertices, T_face_object)
@@ -199,8 +265,8 @@ def _surrounding_mesh(
         cells = held.layout.faces[other.face_id]
         at = _transform_points(np.c_[cells.centres_mm, np.zeros(len(cells.labels))], T)
         reach = math.hypot(symbols.foot_half_mm * math.sqrt(2), symbols.relief.height_mm)
-        near = (at[:, 2] + reach > -FACE_AROUND.deepest_mm) & (
-            (at[:, :2] > low - FACE_AROUND.beside_mm) & (at[:, :2] < high + FACE_AROUND.beside_mm)
+        near = (at[:, 2] + reach > -DEEPEST_MM) & (
+            (at[:, :2] > low - BEYOND_MM) & (at[:, :2] < high + BEYOND_MM)
         ).all(axis=1)
         turn = _rotation_about_z(-other.placement.rotation_rad)
         for label in np.unique(cells.labels[near]):

@@ -2,8 +2,8 @@
 
 Region of a scene + sensor -> the places of a raster, line by line, there and back; `raster`
 stands on them exactly, `kinesthetic` is an arm with play in its joints, which presses until it
-feels the force, and believes to stand where it was sent. Both know the sensor only in the
-robot's base: the face lies there level, before the arm, at a place that nobody is told.
+measures the force, and believes to stand where it was sent. Poses are in the robot's base: the
+face lies there level, before the arm, at a place that frames do not say.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.simulate.scene import Scene
-from probe.simulate.settings import SIMULATED_SCAN
 from probe.simulate.touch import pose_of
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist
@@ -36,10 +35,16 @@ ScanKind = Literal["raster", "kinesthetic"]
 KINDS: Final = ("raster", "kinesthetic")
 _PLANAR: Final = (0, 1, 5)  # x, y and the turn about z among a pose's six freedoms
 
+FACE_AT_MM: Final = (300.0, 0.0, 100.0)  #: middle of the region in the base, within reach
+FACE_TURN_RAD: Final = 0.2  #: of the face about the base's z, so that no axes agree by chance
+LEAST_COVER: Final = 0.5  #: over the face, of the best place's: with less the sensor slips off
+LIFT_MM: Final = 10.0  #: between two touches; the way decides on which side of its play a joint is
+GAP_MM: Final = 3.0  #: from where an approach begins to the surface
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanPath:
-    """Where a scan touches, and what the robot knows of it."""
+    """Where a scan touches, and where the robot believes it does."""
 
     touches: tuple[Touch, ...]
     T_base_surface: Array | None  #: (4, 4) mm; None: a round face, every touch has its own
@@ -62,7 +67,7 @@ class ScanPath:
         return T_base_surface @ pose_of(self.touches[number], contact)
 
     def believed_pose(self, number: int, true: Array) -> Array:
-        """Return T_base_sensor (4, 4) as the robot has it: what it pressed on, it measured."""
+        """Return T_base_sensor (4, 4), the robot's estimate; depth along the normal is exact."""
         if self.believed is self.true:
             return true
         pose: Array = self.believed[number] @ np.linalg.inv(self.true[number]) @ true
@@ -74,11 +79,9 @@ class ScanPath:
             return None
         touch = self.touches[number]
         z_mm = pose_under_load(self.wrist, touch.force_n).z_mm
-        given_x, given_y = (
-            contact.tilt_x_rad - touch.tilt_x_rad,
-            contact.tilt_y_rad - touch.tilt_y_rad,
-        )
-        return counts_of(self.wrist, distances_at(self.wrist, z_mm, given_x, -given_y))
+        bent_x = contact.tilt_x_rad - touch.tilt_x_rad
+        bent_y = contact.tilt_y_rad - touch.tilt_y_rad
+        return counts_of(self.wrist, distances_at(self.wrist, z_mm, bent_x, -bent_y))
 
 
 def scan_path(
@@ -119,16 +122,13 @@ def scan_path(
     ContactError
         When the force cannot be felt.
     """
-    way = raster(scene.region.loops(), sensor, theta_rad=theta_rad).there_and_back(
-        SIMULATED_SCAN.least_cover
-    )
+    way = raster(scene.region.loops(), sensor, theta_rad=theta_rad).there_and_back(LEAST_COVER)
     if most is not None and most < len(way):
         begin = int(rng.integers(len(way) - most + 1))
         way = way[begin : begin + most]
-    T_base_middle = surface_to_sensor(
-        *SIMULATED_SCAN.face_at_mm[:2], SIMULATED_SCAN.face_turn_rad, SIMULATED_SCAN.face_at_mm[2]
-    )
-    if scene.rolled is not None:
+    x_mm, y_mm, z_mm = FACE_AT_MM
+    T_base_middle = surface_to_sensor(x_mm, y_mm, FACE_TURN_RAD, z_mm)
+    if scene.scene_at is not None:
         if kind == "kinesthetic":
             raise SurfaceError("an arm of five axes cannot go round a round face",
                                fix="scan it by raster", place=scene.name)  # fmt: skip
@@ -147,7 +147,7 @@ def scan_path(
         touches = tuple(Touch(x, y, theta_rad, force_n) for x, y in way.tolist())
         return ScanPath(touches, T_base_surface, T_base_object, stands, stands, (0.0, 0.0), None)
     wrist = Wrist()
-    lift = surface_to_sensor(0.0, 0.0, 0.0, SIMULATED_SCAN.lift_mm)
+    lift = surface_to_sensor(0.0, 0.0, 0.0, LIFT_MM)
     went = follow_poses(
         Arm(), [pose for stand in stands for pose in (lift @ stand, stand)], JointErrors(), rng
     )
@@ -156,21 +156,21 @@ def scan_path(
     touches = tuple(
         touch_at(T_surface_base @ stand, _pressed_n(wrist, force_n, rng), springs) for stand in true
     )
-    x_mm, y_mm, turn = np.sqrt(np.diagonal(spread, axis1=1, axis2=2).mean(axis=0))[list(_PLANAR)]
-    error = (math.sqrt((x_mm**2 + y_mm**2) / 2), float(turn))
+    sd_x, sd_y, sd_turn = np.sqrt(np.diagonal(spread, axis1=1, axis2=2).mean(axis=0))[list(_PLANAR)]
+    error = (math.sqrt((sd_x**2 + sd_y**2) / 2), float(sd_turn))
     return ScanPath(touches, T_base_surface, T_base_object, went.believed[1::2], true, error, wrist)
 
 
 def _pressed_n(wrist: Wrist, force_n: float, rng: np.random.Generator) -> float:
     """Return the force at which an approach ends; the wrist's springs give way, not the overlay."""
     springs_n_mm = 4 * wrist.spring_n_mm + wrist.axial_n_mm
-    gap_mm = SIMULATED_SCAN.gap_mm + rng.uniform(-1.0, 1.0)
+    gap_mm = GAP_MM + rng.uniform(-1.0, 1.0)
     limits = ApproachLimits(
         force_n=force_n,
         tolerance_n=min(1.0, force_n / 20),
         felt_n=min(0.5, force_n / 4),
         most_n=1.5 * force_n,
-        travel_mm=2 * SIMULATED_SCAN.gap_mm + 1.5 * force_n / springs_n_mm,
+        travel_mm=2 * GAP_MM + 1.5 * force_n / springs_n_mm,
     )
     return guarded_approach(lambda at: springs_n_mm * max(0.0, at - gap_mm), limits).force_n
 

@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
-from probe.simulate.settings import TOUCH_DRAW
 from probe.surface.contract import HeightMap
-from probe.surface.polygon import FaceRegion
+from probe.surface.polygon import FaceRegion, polygon
+
+GRID = 64  #: points each way among which the inmost of a region is chosen
+BARE_MM = 100.0  #: half the side of the region of a surface of no object
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +31,11 @@ class Scene:
     object_name: str = ""  #: empty: not known
     face: str = ""  #: empty: not known
     T_object_surface: NDArray[np.float64] | None = None  #: (4, 4) mm; None: not known
-    rolled: Callable[[Touch], Scene] | None = None  #: of a round face: the scene of a touch
+    scene_at: Callable[[Touch], Scene] | None = None  #: of a round face: the scene of a touch
 
     def under(self, touch: Touch) -> Scene:
-        """Return what a touch meets; on a flat face that is always this."""
-        return self if self.rolled is None else self.rolled(touch)
+        """Return the scene of a touch; on a flat face that is always this one."""
+        return self if self.scene_at is None else self.scene_at(touch)
 
     def centre_mm(self) -> NDArray[np.float64]:
         """Return the region's middle (2,): the mean of its area, or its inmost point."""
@@ -47,8 +49,24 @@ class Scene:
         if self.region.contains((at + mean)[None])[0]:
             middle: NDArray[np.float64] = at + mean
             return middle
-        x, y = (low + (high - low) * np.linspace(0, 1, TOUCH_DRAW.grid)[:, None]).T
-        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        points = points[self.region.contains(points)]
+        points = self._grid()
         inmost: NDArray[np.float64] = points[np.argmax(self.region.distance_mm(points))]
         return inmost
+
+    def inradius_mm(self) -> float:
+        """Return how far the inmost point of the region lies from its edges, mm, nearly."""
+        return float(self.region.distance_mm(self._grid()).max())
+
+    def _grid(self) -> NDArray[np.float64]:
+        """Return points of a grid that lie in the region (n, 2)."""
+        low, high = self.region.box_mm
+        x, y = (low + (high - low) * np.linspace(0, 1, GRID)[:, None]).T
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        inside: NDArray[np.float64] = points[self.region.contains(points)]
+        return inside
+
+
+def bare_scene(surface: HeightMap, name: str = "") -> Scene:
+    """Return the scene of a surface of no object, a square about its origin."""
+    corners = BARE_MM * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    return Scene(surface, polygon([corners]), name)

@@ -1,28 +1,276 @@
-"""Simulated touches of one target as a value: frames, counts, truth, and a recording of them.
+"""Touches of one target in simulation: frames, and the truth where the probe was.
 
-Target by its name + options -> Simulation. Thesis 4.2.
+Target + options -> SimulatedProbe -> touches, each with its frames -> Simulation. Touch i draws
+from a generator of (seed, i) alone, so that it does not depend on the number of touches. Its
+frames follow each other at the board's rate under a steady force. Truth stands apart from the
+frames; those of a scan have the pose that the robot believes. Thesis 4.2.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.sensor_type import SensorType
-from probe.frame import Frame
-from probe.recording.names import check_name
-from probe.simulate.scan import ScanKind
-from probe.simulate.simulated_probe import SimulatedProbe, SimulatedTouch, TouchOptions
+from encoded_objects.base.files import staged_file
+from encoded_objects.base.sensor_type import (
+    SensorType,
+    choose_sensor_type,
+    force_share,
+    usual_force_n,
+)
+from probe.contact.contract import Contact, Touch
+from probe.contact.press import accuracy_of, level_for
+from probe.errors import SurfaceError
+from probe.frame import Frame, frame_from
+from probe.recording.files import check_name
+from probe.recording.record import Recorder
+from probe.simulate.scan import ScanKind, ScanPath, scan_path
+from probe.simulate.scene import Scene
+from probe.simulate.sensor import simulated_sensor
+from probe.simulate.target import surface_of
+from probe.simulate.touch import TouchRanges, pose_of, random_touches
+
+_WAY = 1 << 32  # of the generator that draws a scan's path: no touch has that number
+
+
+@dataclass(frozen=True, slots=True)
+class TouchOptions:
+    """Touches as a person names them: mm, degrees, N; None where they say nothing."""
+
+    x_mm: float | None = None
+    y_mm: float | None = None
+    theta_deg: float | None = None
+    force_n: float | None = None
+    tilt_x_deg: float | None = None
+    tilt_y_deg: float | None = None
+    touches: int | None = None  #: at random; None: one, as named; of a scan at most
+    frames: int = 1  #: of each touch
+    seed: int = 0
+    scan: ScanKind | None = None  #: None: touches by themselves
+
+    def draw(self, scene: Scene, sensor: SensorType, rng: np.random.Generator) -> Touch:
+        """Return a touch; values that are not named are drawn, or have a default of the type.
+
+        Raises
+        ------
+        SurfaceError
+            A value that is no finite number.
+        """
+        share = force_share(sensor)
+        if self.touches is None:
+            x, y = scene.centre_mm()
+            drawn = Touch(float(x), float(y), 0.0, usual_force_n(sensor))
+        else:
+            low, high = TouchRanges().force_n
+            ranges = TouchRanges(force_n=(share * low, share * high))
+            drawn = next(random_touches(scene.region, rng, ranges))
+        touch = Touch(
+            _given_or_drawn(self.x_mm, drawn.x_mm),
+            _given_or_drawn(self.y_mm, drawn.y_mm),
+            math.radians(_given_or_drawn(self.theta_deg, math.degrees(drawn.theta_rad))),
+            _given_or_drawn(self.force_n, drawn.force_n),
+            math.radians(_given_or_drawn(self.tilt_x_deg, math.degrees(drawn.tilt_x_rad))),
+            math.radians(_given_or_drawn(self.tilt_y_deg, math.degrees(drawn.tilt_y_rad))),
+            drawn.wrist,
+        )
+        numbers = (touch.x_mm, touch.y_mm, touch.theta_rad, touch.force_n, touch.tilt_x_rad,
+                   touch.tilt_y_rad)  # fmt: skip
+        if not all(map(math.isfinite, numbers)):
+            raise SurfaceError("a touch at what is no finite number", fix="give mm, degrees and N")
+        return touch
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedTouch:
+    """One touch and its frames."""
+
+    scene: Scene  #: that it met
+    touch: Touch
+    contact: Contact
+    frames: tuple[Frame, ...]
+    T_base_sensor: NDArray[np.float64] | None = None  #: (4, 4) mm, of a scan: as it was
+
+    def truth(self) -> dict[str, Any]:
+        """Return where the probe was and its load: mm, degrees, N, as JSON has it."""
+        touch, contact = self.touch, self.contact
+        touching = math.isfinite(contact.z_mm)
+        T_face_probe = pose_of(touch, contact) if touching else None
+        T_object_probe = None
+        T_object_surface = self.scene.T_object_surface
+        if T_face_probe is not None and T_object_surface is not None:
+            T_object_probe = T_object_surface @ T_face_probe
+        T_base = self.T_base_sensor
+        return {
+            "seq": self.frames[0].seq,
+            "x_mm": touch.x_mm,
+            "y_mm": touch.y_mm,
+            "theta_deg": math.degrees(touch.theta_rad),
+            "force_n": touch.force_n,
+            "tilt_x_deg": math.degrees(touch.tilt_x_rad),
+            "tilt_y_deg": math.degrees(touch.tilt_y_rad),
+            "felt_n": float(contact.forces_n.sum()),
+            "tactels": int((contact.forces_n > 0).sum()),
+            "T_face_probe": None if T_face_probe is None else T_face_probe.tolist(),
+            "T_object_probe": None if T_object_probe is None else T_object_probe.tolist(),
+            **({} if T_base is None else {"T_base_probe": T_base.tolist()}),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedProbe:
+    """A probe over a target, ready to touch it.
+
+    Parameters
+    ----------
+    target
+        A written part, `out/cube/Cube-F1.stl` (with `@lab.db`: in the frame of its face), a
+        registered face, `lab.db#Cube/F1`, or `washer`.
+    options
+        Which touches.
+    sensor_type
+        The sensor: a type, its name or file; `fsr-16` if not given.
+    overlay
+        tab or pad instead of the type's own overlay.
+    accuracy
+        auto, a level of the contact model (footprint, tabs, layer, elements), or the largest
+        error of an image, as "0.01".
+    noise
+        Of contacts and board: typical or quiet.
+
+    Raises
+    ------
+    SurfaceError
+        The target is no surface; exit code 4 if its database cannot be read.
+    ContactError
+        The accuracy cannot be had.
+    PoseError
+        A scan's arm does not reach.
+    """
+
+    target: str
+    options: TouchOptions = field(default_factory=TouchOptions)
+    sensor_type: str | SensorType | None = field(default=None, kw_only=True)
+    overlay: str = field(default="", kw_only=True)
+    accuracy: str = field(default="auto", kw_only=True)
+    noise: Literal["typical", "quiet"] = field(default="typical", kw_only=True)
+    sensor: SensorType = field(init=False)
+    level: str = field(init=False)  #: of the contact model
+    scene: Scene = field(init=False)
+    path: ScanPath | None = field(init=False)  #: None: no scan
+
+    def __post_init__(self) -> None:
+        for name, given, known in (
+            ("overlay", self.overlay, ("tab", "pad", "")),
+            ("noise", self.noise, ("typical", "quiet")),
+        ):  # fmt: skip
+            if given not in known:
+                raise SurfaceError(f"{name} {given!r}", fix=f"give {known[0]} or {known[1]}")
+        chosen = choose_sensor_type(self.sensor_type, "", None, self.target)
+        sensor = chosen.with_overlay(self.overlay)
+        object.__setattr__(self, "sensor", sensor)
+        object.__setattr__(self, "overlay", sensor.overlay.kind)
+        object.__setattr__(self, "level", level_for(sensor, accuracy_of(self.accuracy)))
+        object.__setattr__(self, "scene", surface_of(self.target))
+        object.__setattr__(self, "path", self._scan_path())
+
+    def __len__(self) -> int:
+        """Return the number of touches."""
+        return (self.options.touches or 1) if self.path is None else len(self.path)
+
+    def touches(self) -> Iterator[SimulatedTouch]:
+        """Yield the touches, one after another.
+
+        Raises
+        ------
+        ContactError
+            A touch has no equilibrium.
+        """
+        options, path = self.options, self.path
+        quiet = self.noise == "quiet"
+        sensor = simulated_sensor(self.sensor, accuracy=self.level, quiet=quiet)
+        for i in range(len(self)):
+            rng = np.random.default_rng([options.seed, i])
+            touch = options.draw(self.scene, self.sensor, rng) if path is None else path.touches[i]
+            reading = sensor.read(self.scene, touch, rng, options.frames)
+            contact = reading.contact
+            true = believed = wrist = None
+            if path is not None and math.isfinite(contact.z_mm):
+                true = path.true_pose(i, reading.scene, contact)
+                believed = path.believed_pose(i, true)
+                wrist = path.wrist_counts(i, contact)
+            frames = tuple(
+                frame_from(counts, t_ns=sensor.time_ns(seq), seq=seq, wrist=wrist, pose=believed)
+                for seq, counts in enumerate(reading.frames, start=i * options.frames)
+            )
+            yield SimulatedTouch(reading.scene, touch, contact, frames, true)
+
+    @contextmanager
+    def recorder(self, out: Path) -> Iterator[Recorder]:
+        """Yield the writer of a recording; where a touch is refused, no file is left."""
+        attributes: dict[str, Any] = {
+            "simulated": self.target, "overlay": self.overlay, "level": self.level,
+            "noise": self.noise, "seed": self.options.seed,
+            "frames_per_touch": self.options.frames,
+        }  # fmt: skip
+        if self.path is not None:
+            error_mm, error_rad = self.path.error
+            attributes |= {"scan": self.options.scan, "pose_error_mm": error_mm,
+                           "pose_error_deg": math.degrees(error_rad)}  # fmt: skip
+        sensor = f"simulated/{self.overlay}"
+        with (
+            staged_file(out) as draft,
+            Recorder(
+                draft,
+                sensor=sensor,
+                sensor_type=self.sensor,
+                attributes=attributes,
+                roll_over_s=math.inf,
+            ) as writer,
+        ):
+            yield writer
+
+    def truth(self, touches: list[dict[str, Any]]) -> dict[str, Any]:
+        """Return the truth of a run whose touches were these, as JSON has it."""
+        scan = {}
+        if self.path is not None:
+            T = self.path.T_base_object
+            scan = {"scan": self.options.scan, "T_base_object": None if T is None else T.tolist()}
+        return {
+            "target": self.target, "object": self.scene.object_name or None,
+            "face": self.scene.face or None, "sensor_type": self.sensor.name,
+            "overlay": self.overlay, "level": self.level,
+            "seed": self.options.seed, "frames_per_touch": self.options.frames,
+            **scan, "touches": touches,
+        }  # fmt: skip
+
+    def _scan_path(self) -> ScanPath | None:
+        options = self.options
+        if options.scan is None:
+            return None
+        if {options.x_mm, options.y_mm, options.tilt_x_deg, options.tilt_y_deg} != {None}:
+            raise SurfaceError("a scan chooses places and tilts by itself",
+                               fix="leave x, y and tilts out, or the scan")  # fmt: skip
+        return scan_path(
+            self.scene, self.sensor, options.scan, np.random.default_rng([options.seed, _WAY]),
+            most=options.touches, theta_rad=math.radians(_given_or_drawn(options.theta_deg, 0.0)),
+            force_n=_given_or_drawn(options.force_n, usual_force_n(self.sensor)),
+        )  # fmt: skip
+
+
+def _given_or_drawn(given: float | None, drawn: float) -> float:
+    return drawn if given is None else given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
-    """What a simulated probe read: like a `Recording`, and with the truth."""
+    """Touches of a simulated probe: frames like a `Recording`, and the truth."""
 
     probe: SimulatedProbe
     touches: tuple[SimulatedTouch, ...]

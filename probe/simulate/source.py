@@ -1,4 +1,4 @@
-"""Frames of a probe that keeps touching a surface: what stands behind `sim:` ports.
+"""Frames of a probe that keeps touching a surface: the source of `sim:` ports.
 
 Target + options -> frames without end. The sensor comes down, holds, and lifts, again and
 again; the film remembers (hysteresis, creep). Without a place it wanders from touch to touch
@@ -27,18 +27,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, usual_force_n
+from encoded_objects.base.sensor_type import choose_sensor_type, usual_force_n
 from probe.contact.contract import Touch
-from probe.contact.press import Accuracy, accuracy_of, level_for, press
+from probe.contact.press import accuracy_of, level_for
 from probe.errors import ContactError, SurfaceError
-from probe.frame import Frame, frame_from
-from probe.simulate.readout import SensorReadout, readout_of
+from probe.frame import Frame
 from probe.simulate.scene import Scene
-from probe.simulate.settings import SIMULATED_PORT
+from probe.simulate.sensor import SimulatedSensor, simulated_sensor
 from probe.simulate.target import surface_of
 
 Image = NDArray[np.float64]
 
+LEVELS = 16  #: of the force while it rises and falls: each is one contact
+TRIES = 64  #: directions tried for the next step, places tried that hold no sensor
 DOWN, HELD, UP = 0.15, 0.65, 0.80  #: shares of a period: full force, begin to lift, off
 _DEFAULTS = {"tilt": 0.0, "step": 5.0, "period": 2.0, "rate": 100.0, "seed": 0.0}
 _CHOICES = {"overlay": ("tab", "pad"), "noise": ("typical", "quiet")}
@@ -48,12 +49,10 @@ NAMES = ("x", "y", "theta", "force", *_DEFAULTS, *_CHOICES, *_WORDS)
 
 @dataclass(frozen=True, slots=True)
 class MotionOptions:
-    """How a simulated probe moves and what it is; the table above."""
+    """How a simulated probe moves, and its sensor; the table above."""
 
     numbers: dict[str, float]  #: x, y and theta only where given
-    sensor: SensorType
-    readout: SensorReadout
-    accuracy: Accuracy
+    sensor: SimulatedSensor
 
 
 def frames_of(target: str, options: Mapping[str, str] | None = None) -> Iterator[Frame]:
@@ -74,7 +73,8 @@ def frames_of(target: str, options: Mapping[str, str] | None = None) -> Iterator
         When the accuracy is no level, or no touch has an equilibrium.
     """
     given = options_of(options or {}, place=target)
-    return _frames(surface_of(target), given)
+    rng = np.random.default_rng(int(given.numbers["seed"]))
+    return given.sensor.frames(_forces(surface_of(target), given, rng), rng)
 
 
 def options_of(values: Mapping[str, str], *, place: str = "") -> MotionOptions:
@@ -105,10 +105,11 @@ def options_of(values: Mapping[str, str], *, place: str = "") -> MotionOptions:
     sensor = chosen.with_overlay(values.get("overlay", ""))
     numbers.setdefault("force", usual_force_n(sensor))
     quiet = values.get("noise") == "quiet"
-    readout = readout_of(sensor, quiet=quiet, frame_s=1 / numbers["rate"])
     accuracy = accuracy_of(values.get("accuracy", "auto"))
     level_for(sensor, accuracy)
-    return MotionOptions(numbers, sensor, readout, accuracy)
+    frame_s = 1 / numbers["rate"]
+    simulated = simulated_sensor(sensor, accuracy=accuracy, quiet=quiet, frame_s=frame_s)
+    return MotionOptions(numbers, simulated)
 
 
 def _number(name: str, text: str, place: str) -> float:
@@ -123,21 +124,18 @@ def _number(name: str, text: str, place: str) -> float:
     return value
 
 
-def _frames(scene: Scene, options: MotionOptions) -> Iterator[Frame]:
+def _forces(scene: Scene, options: MotionOptions, rng: np.random.Generator) -> Iterator[Image]:
+    """Yield the forces (rows, columns) of touch after touch, frame by frame."""
     numbers = options.numbers
-    rng = np.random.default_rng(int(numbers["seed"]))
-    state = None
     beats = max(1, round(numbers["period"] * numbers["rate"]))
-    seq = 0
     for touch in _random_walk(scene, options, rng):
         images: dict[float, Image] = {}
         for beat in range(beats):
-            share = round(load(beat / beats) * SIMULATED_PORT.levels) / SIMULATED_PORT.levels
+            share = round(load(beat / beats) * LEVELS) / LEVELS
             if share not in images:
-                images[share] = _press_forces(scene, options, touch, share)
-            counts, state = options.readout.read(images[share], state, rng)
-            yield frame_from(counts, t_ns=round(seq * 1e9 / numbers["rate"]), seq=seq)
-            seq += 1
+                pressed = replace(touch, force_n=touch.force_n * share)
+                images[share] = options.sensor.press(scene, pressed).forces_n
+            yield images[share]
 
 
 def load(share: float) -> float:
@@ -151,14 +149,8 @@ def load(share: float) -> float:
     return 0.0
 
 
-def _press_forces(scene: Scene, options: MotionOptions, touch: Touch, share: float) -> Image:
-    pressed = replace(touch, force_n=touch.force_n * share)
-    surface = scene.under(touch).surface
-    return press(surface, options.sensor, pressed, accuracy=options.accuracy).forces_n
-
-
 def _random_walk(scene: Scene, options: MotionOptions, rng: np.random.Generator) -> Iterator[Touch]:
-    """Yield touches that have an equilibrium: at the place asked for, or step after step."""
+    """Yield touches that have an equilibrium: at the given place, or step after step."""
     numbers = options.numbers
     fixed = "x" in numbers or "y" in numbers
     middle = scene.centre_mm()
@@ -176,10 +168,10 @@ def _random_walk(scene: Scene, options: MotionOptions, rng: np.random.Generator)
             tilt_y_rad=tilt * math.sin(towards),
         )
         try:
-            _press_forces(scene, options, touch, 1.0)
+            options.sensor.press(scene, touch)
         except ContactError:
             refused += 1
-            if fixed or refused > SIMULATED_PORT.tries:
+            if fixed or refused > TRIES:
                 raise
         else:
             refused = 0
@@ -190,7 +182,7 @@ def _random_walk(scene: Scene, options: MotionOptions, rng: np.random.Generator)
 
 def _next_place(scene: Scene, at: Image, step_mm: float, rng: np.random.Generator) -> Image:
     """Return a place one step further inside the region; the middle where there is none."""
-    for angle in rng.uniform(-math.pi, math.pi, SIMULATED_PORT.tries):
+    for angle in rng.uniform(-math.pi, math.pi, TRIES):
         onward = at + step_mm * np.array([math.cos(angle), math.sin(angle)])
         if scene.region.contains(onward[None])[0]:
             return onward

@@ -8,11 +8,14 @@
     part.stl@lab.db              a written part, in the frame of its face
     washer                       the washer that the thesis pressed
 
-What follows the last '/' after '#' is a face if the object has one of that name.
+What follows the last '/' after '#' is a face if the object has one of that name. A written part
+is touched as it was printed; one that no database registers stands as it lies on the printer's
+bed (z up, centred on x and y), with its face up if it is a panel. Thesis 6.3.
 """
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -51,18 +54,54 @@ def surface_of(target: str) -> Scene:
         return registered_surface(database, name, face)
     file, mark, database = target.rpartition("@")
     if mark and Path(file).suffix.lower() == ".stl":
-        from probe.simulate.part import part_surface
-
         return part_surface(file, database=database)
     if Path(target).suffix.lower() == ".stl":
-        from probe.simulate.part import part_surface
-
         return part_surface(target)
     raise SurfaceError(
         "this names no surface",
         fix="write part.stl, or database#object/face such as lab.db#Cube/F1",
         place=target,
     )
+
+
+def part_surface(
+    file: str | os.PathLike[str], *, database: str = "", object_name: str = "", face: str = ""
+) -> Scene:
+    """Return the surface of a written part.
+
+    Parameters
+    ----------
+    file
+        STL.
+    database
+        Where it is registered; empty: the part as it lies, whoever it belongs to.
+    object_name
+        Whose part it is; empty: found by the file's name.
+    face
+        Which face lies up; empty: the face of a panel, or the first face of a whole body
+        that bears symbols.
+
+    Returns
+    -------
+    Scene
+        In the face frame, or in the part's frame without a database.
+
+    Raises
+    ------
+    SurfaceError
+        When the file is no STL, or the database does not know it.
+    """
+    path = Path(file)
+    if database:
+        from probe.simulate.registered import registered_part_surface  # loads the database
+
+        return registered_part_surface(path, database, object_name, face)
+    from probe.simulate.written import part_mesh
+
+    surface = part_mesh(path)
+    low, high = surface.corners[:, :, :2].min((0, 1)), surface.corners[:, :, :2].max((0, 1))
+    box = [low, (high[0], low[1]), high, (low[0], high[1])]
+    return Scene(surface, polygon([np.array(box)]), path.name)
 
 
 def _washer() -> Scene:

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.errors import SurfaceError
-from probe.surface.settings import SURFACE
 
 Array = NDArray[np.float64]
 
+ON_EDGE = 1e-12  # share of the size that counts as on an edge
 _BLOCK = 1 << 20  # pairs of points and edges looked at together
 
 
@@ -61,7 +61,7 @@ class FaceRegion:
         """Decide for all pairs of an edge (down) and a point (across)."""
         along = self.ends - self.starts
         size = np.hypot(*along.T)
-        eps = SURFACE.on_edge * float(np.abs(self.starts).max())
+        eps = ON_EDGE * float(np.abs(self.starts).max())
         outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / size[:, None]
         beyond = outward @ points.T - np.einsum("ij,ij->i", outward, self.starts)[:, None]
         if self.convex:

@@ -11,8 +11,8 @@ from pathlib import Path
 from sqlalchemy import Connection
 
 from generator.database.as_built import AsBuilt, read_as_built, write_as_built
-from generator.database.entries import list_objects
 from generator.database.open import existing_database
+from generator.database.read import list_objects
 from generator.database.transaction import write_transaction
 from recognizer.as_built.estimate import estimate_printer
 

@@ -7,14 +7,13 @@ imported before it is needed.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, NoReturn
 
-import typer
-
 from encoded_objects.base import console
-from encoded_objects.base.console import Action
 from encoded_objects.base.errors import require
+from encoded_objects.base.options import Option, Options, command
 
 HELP = """See the part, the touch and the answer in a web page.
 
@@ -32,56 +31,59 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     console.main("open-bench", lambda _arguments: app, arguments, bare=True)
 
 
-@app.command(help=HELP, epilog=EPILOG)
-def bench(
+@dataclass(frozen=True, slots=True)
+class BenchOptions(Options):
+    """What is served, where, and to whom."""
+
     port: Annotated[
-        str, typer.Option(metavar="URL", show_default=False,
-                          help="Of the probe: serial:///dev/ttyACM0, sim:, file:touch.h5, or "
-                               "touch: for a simulated one that comes down where you click "
-                               "(default)."),
-    ] = "",
+        str,
+        Option(
+            "Of the probe: serial:///dev/ttyACM0, sim:, file:touch.h5, or touch: for a "
+            "simulated one that comes down where you click (default).",
+            "URL",
+        ),
+    ] = ""
     database: Annotated[
-        str, typer.Option(metavar="URL", help="Of the objects: lab.db, sqlite:///lab.db, "
-                                              "postgresql://host/name."),
-    ] = LAB,
-    web_port: Annotated[int, typer.Option(min=0, max=65535, help="0: any free one.")] = 8080,
+        str, Option("Of the objects: lab.db, sqlite:///lab.db, postgresql://host/name.", "URL")
+    ] = LAB
+    web_port: Annotated[int, Option("0: any free one.", least=0, most=65535)] = 8080
     host: Annotated[
-        str, typer.Option(help="Address to listen on. One that others reach asks for a token.")
-    ] = "127.0.0.1",
+        str, Option("Address to listen on. One that others reach asks for a token.")
+    ] = "127.0.0.1"
     token: Annotated[
-        str, typer.Option(envvar="OPEN_BENCH_TOKEN", show_default=False,
-                          help="Token that pages need; made anew by default where one is needed."),
-    ] = "",
-    folder: Annotated[
-        Path, typer.Option(metavar="DIR", help="For recordings and calibrations.")
-    ] = Path("recordings"),
+        str,
+        Option(
+            "Token that pages need; made anew by default where one is needed.",
+            variable="OPEN_BENCH_TOKEN",
+        ),
+    ] = ""
+    folder: Annotated[Path, Option("For recordings and calibrations.", "DIR")] = Path("recordings")
     parts: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", show_default=False,
-                     help="Where printed parts may be downloaded from; the database's folder by "
-                          "default."),
-    ] = None,
+        Option(
+            "Where printed parts may be downloaded from; the database's folder by default.", "DIR"
+        ),
+    ] = None
     sensor_type: Annotated[
-        str, typer.Option("--sensor-type", metavar="NAME|FILE", show_default=False,
-                          help="Type of the sensor: a name that probe-sensor types lists, or a "
-                               "file; fsr-16 by default."),
-    ] = "",
+        str,
+        Option(
+            "Type of the sensor: a name that probe-sensor types lists, or a file; fsr-16 by "
+            "default.",
+            "NAME|FILE",
+        ),
+    ] = ""
     overlay: Annotated[
-        str, typer.Option(metavar="tab|pad", show_default=False,
-                          help="Elastic overlay; that of the sensor type."),
-    ] = "",
-) -> Action:  # fmt: skip
+        str, Option("Elastic overlay; that of the sensor type.", choices=("tab", "pad"))
+    ] = ""
+
+
+@command(app, help=HELP, epilog=EPILOG)
+def bench(options: BenchOptions) -> int:
     """Serve the bench."""
+    require("fastapi", "uvicorn", "websockets", extra="bench", purpose="open-bench")
+    from recognizer.bench.serve import serve
 
-    def action() -> int:
-        require("fastapi", "uvicorn", "websockets", extra="bench", purpose="open-bench")
-        from recognizer.bench.serve import BenchOptions, serve
-
-        return serve(
-            BenchOptions(port, database, web_port, host, token, folder, parts, overlay, sensor_type)
-        )
-
-    return action
+    return serve(options)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.database.registered import RegisteredFace, RegisteredObject
-from probe.surface.solids import triangulate
+from probe.surface.body import triangulate
 
 Array = NDArray[np.float64]
 

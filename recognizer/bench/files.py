@@ -10,8 +10,8 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from generator.database.open import normal_url, part_path
 from generator.database.registered import RegisteredPart
-from generator.database.url import normal_url, part_path
 from probe.errors import RecordingError
 from probe.recording.read import Recording
 from recognizer.bench.errors import UnknownError

@@ -18,7 +18,7 @@ from encoded_objects.base.sensor_type import SensorType
 from probe.calibration import calibration_hash, write_calibration
 from probe.errors import ProbeError
 from probe.frame import Frame
-from probe.recording.names import next_free
+from probe.recording.files import next_free
 from probe.recording.record import Recorder
 from recognizer.bench.broker import Broker
 from recognizer.bench.calibration_guide import CalibrationGuide, condition_json

@@ -8,9 +8,8 @@ from typing import Any
 from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse
 
-from generator.database.entries import object_entry
 from generator.database.open import open_database
-from generator.database.read import read_object, read_parts
+from generator.database.read import object_entry, read_object, read_parts
 from generator.database.transaction import read_transaction
 from recognizer.bench.errors import BusyError, UnknownError
 from recognizer.bench.example import make_example

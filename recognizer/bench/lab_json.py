@@ -14,10 +14,9 @@ import numpy as np
 from sqlalchemy import Connection, select
 
 from generator.database import tables
-from generator.database.entries import list_objects
-from generator.database.read import read_object
+from generator.database.read import list_objects, read_object
 from generator.database.registered import RegisteredObject
-from probe.surface.solids import symbol_triangles
+from probe.surface.body import symbol_triangles
 from probe.surface.symbols import Relief, emboss
 from recognizer.bench.face_mesh import DIGITS, drawn_faces, mesh_json, nested_lists, stands_json
 from recognizer.touch.lab import EmbossedArray, Lab

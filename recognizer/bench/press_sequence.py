@@ -16,12 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.circuit import FilmState
 from probe.contact.contract import Touch
-from probe.contact.press import press
-from probe.frame import Frame, frame_from
-from probe.simulate.readout import readout_of
+from probe.frame import Frame
 from probe.simulate.scene import Scene
+from probe.simulate.sensor import simulated_sensor
 from recognizer.bench.errors import BenchError
 from recognizer.bench.settings import PRESS
 
@@ -43,7 +41,8 @@ class PressSequence:
 
     def __init__(self, sensor: SensorType, manner: SimulationSettings) -> None:
         self.sensor, self.manner = sensor, manner
-        self._readout = readout_of(sensor, quiet=manner.noise == "quiet", frame_s=1 / manner.rate)
+        quiet, frame_s = manner.noise == "quiet", 1 / manner.rate
+        self._sensor = simulated_sensor(sensor, quiet=quiet, frame_s=frame_s)
         self._rest = np.zeros(sensor.shape)
         self._turn = threading.Condition()
         self._felt = 0  #: beats so far
@@ -65,7 +64,7 @@ class PressSequence:
                 f"a force of {touch.force_n:g} N",
                 fix=f"give more than 0, at most {PRESS.largest_n:g} N",
             )
-        full = press(scene.under(touch).surface, self.sensor, touch).forces_n
+        full = self._sensor.press(scene, touch).forces_n
         held = self._beats(self.manner.hold_s)
         steps = [(1, share * full) for share in PRESS.steps]
         self._play([*steps, (held, full), *reversed(steps), (1, self._rest)])
@@ -96,10 +95,7 @@ class PressSequence:
     def frames(self) -> Iterator[Frame]:
         """Yield frames without end, numbered and timed from 0."""
         rng = np.random.default_rng(self.manner.seed)
-        state: FilmState | None = None
-        for seq in count():
-            counts, state = self._readout.read(self._beat(), state, rng)
-            yield frame_from(counts, t_ns=round(seq * 1e9 / self.manner.rate), seq=seq)
+        return self._sensor.frames((self._beat() for _ in count()), rng)
 
     def _beats(self, seconds: float) -> int:
         return max(1, round(seconds * self.manner.rate))

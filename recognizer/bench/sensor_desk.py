@@ -11,7 +11,7 @@ import threading
 from typing import Any
 
 from encoded_objects.base.errors import EncodedObjectsError
-from probe.recording.names import next_free
+from probe.recording.files import next_free
 from recognizer.bench.desk import DeskSession
 from recognizer.bench.errors import BusyError
 from recognizer.bench.files import find_file, list_files

@@ -11,8 +11,6 @@ import socket
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
-from pathlib import Path
 from types import FrameType
 
 import uvicorn
@@ -23,6 +21,7 @@ from generator.database.open import database_exists
 from probe.errors import ProbeError
 from recognizer.bench.app import BenchContext, app_for
 from recognizer.bench.broker import Broker
+from recognizer.bench.command import BenchOptions
 from recognizer.bench.errors import BenchError
 from recognizer.bench.guard import RequestGuard, access_rules, is_loopback
 from recognizer.bench.patience import PatientProtocol
@@ -36,21 +35,6 @@ PATTERN = ("sim:", "Moving pattern")
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{12,200}")
 
 
-@dataclass(frozen=True, slots=True)
-class BenchOptions:
-    """The options of `open-bench`."""
-
-    port: str
-    database: str
-    web_port: int
-    host: str
-    token: str
-    folder: Path
-    parts: Path | None
-    overlay: str = ""
-    sensor_type: str = ""
-
-
 def serve(options: BenchOptions) -> int:
     """Serve until interrupted; returns the exit code.
 
@@ -59,8 +43,6 @@ def serve(options: BenchOptions) -> int:
     BenchError, DatabaseError, ProbeError
         When an option cannot be met.
     """
-    if options.overlay not in ("", "tab", "pad"):
-        raise BenchError(f"an overlay {options.overlay!r}", fix="give tab or pad")
     if options.token and not _TOKEN.fullmatch(options.token):
         raise BenchError(
             "this token can be guessed, or cannot stand in an address",

@@ -7,11 +7,13 @@
 ::
 
     app           options
+    recognize     touches -> answers, printed and drawn as they come
+    scanning      several touches as one belief; how the probe moved
     port          a port -> touches, the sensor, its calibration
-    answers       touches -> answers, printed as they come
     learning      the sensor, learned from the touches and kept
-    in_base       the object in the robot's base
-    report        answers as text and as JSON
+    answers       an answer as text and as JSON
+    ros, publish  answers as ROS 2 messages: into a file, over the network
+    picture       a touch with its symbols, the window, the object
     as_built      recognize-object as-built
     check         recognize-object check
 
@@ -31,8 +33,6 @@ if TYPE_CHECKING:
     from typer import Typer
 
 NAME = "recognize-object"
-AS_BUILT = "as-built"
-CHECK = "check"
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -48,14 +48,10 @@ def run(arguments: list[str]) -> int:
 
 def application(arguments: list[str]) -> Typer:
     """Return the application that reads the arguments; a recording needs no command's name."""
-    if arguments[:1] == [AS_BUILT]:
+    if arguments[:1] == ["as-built"]:
         from recognizer.command.as_built import app
-
-        return app
-    if arguments[:1] == [CHECK]:
+    elif arguments[:1] == ["check"]:
         from recognizer.command.check import app
-
-        return app
-    from recognizer.command.app import app
-
+    else:
+        from recognizer.command.app import app
     return app

@@ -1,62 +1,22 @@
-"""Touches -> answers, one after another: each by itself, or all as one scan."""
+"""An answer of `recognize-object`: as a value, as JSON and in words."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from pathlib import Path
-from threading import Event
-from typing import TYPE_CHECKING
+import math
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from encoded_objects.base.output import warning
-from probe.frame import Frame
-from recognizer.command.learning import SensorLearning
-from recognizer.command.scanning import (
-    Belief,
-    Joints,
-    belief_for,
-    edges_of,
-    pose_during,
-    read_joints,
-    refuse_single,
-    touches_for,
-)
-from recognizer.touch.contacts import TouchImage
-from recognizer.touch.recognition import Recognition
-from recognizer.touch.source import TouchSource
+from encoded_objects.base.output import count_of
+from probe.closing import Closing
+from recognizer.touch.recognition import NO_CONTACT
 
 if TYPE_CHECKING:
+    from probe.frame import Frame
     from recognizer.thesis.edges.line import Edge
+    from recognizer.touch.contacts import TouchImage
+    from recognizer.touch.recognition import Recognition
     from recognizer.touch.robot import ObjectPose
-
-
-@dataclass(frozen=True, slots=True)
-class RecognizeOptions:
-    """What the command line says; see `app`."""
-
-    recording: Path | None
-    port: str
-    database: str
-    follow: bool
-    every: bool
-    most: int | None
-    sensor_type: str
-    overlay: str
-    calibration: Path | None
-    sensor: int | None
-    live: bool
-    joints_deg: tuple[float, ...] | None
-    joint_error_deg: float
-    plot: Path | None
-    replace: bool
-    as_json: bool
-    scan: str = ""  #: joint or thesis; empty: every touch by itself
-    joints_file: Path | None = None  #: angles of every touch
-    learn: Path | None = None  #: what is learned of the sensor, kept and read by
-    state: Path | None = None  #: the same, read by alone
-    flip: str = ""  #: how images arrive
-    mcap: Path | None = None  #: images and answers as ROS 2 messages
-    publish: str = ""  #: URL where images and answers are told
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,85 +26,84 @@ class Answer:
     touch: TouchImage
     found: Recognition
     in_base: ObjectPose | None
-    touches: int | None = None  #: of a scan, that it rests on
-    edges: tuple[Edge, ...] | None = None  #: that the touch feels; None: not asked for
+    touches: int | None = None  #: of the scan that it rests on; None: no scan
+    edges: tuple[Edge, ...] | None = None  #: seen in the touch; None: not asked for
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what files and networks get."""
+        return self.found.as_json() | {
+            "x_mm": self.found.x_mm,
+            "y_mm": self.found.y_mm,
+            "theta_deg": self.found.theta_deg,
+            "frames": self.touch.frames,
+            "t_ns": self.touch.t_ns,
+            "T_robot_object": None if self.in_base is None else self.in_base.T_robot_object,
+            "robot_covariance": None if self.in_base is None else self.in_base.covariance,
+        }
+
+    def printed_json(self) -> dict[str, Any]:
+        """Return what `--json` prints: of a scan with its touches, and edges if asked for."""
+        entry = self.as_json()
+        if self.touches is not None:
+            entry["touches"] = self.touches
+        if self.edges is not None:
+            entry["edges"] = [_edge_json(edge, self.found) for edge in self.edges]
+        return entry
+
+    def sentence(self, needed: int) -> str:
+        """Return it in a line: what and where, or why not and what to do.
+
+        Parameters
+        ----------
+        needed
+            About how many touches an answer of a scan takes.
+        """
+        text = f"{self.touch.seq}: {self.found}"
+        text += "" if self.in_base is None else f"; {self.in_base}"
+        if self.touches is None:
+            return text
+        if not self.found and self.found.reason != NO_CONTACT:
+            more = f"; go on: about {needed} touches" if self.touches < needed else ""
+            text = f"{self.touch.seq}: not yet: {self.found.reason}{more}"
+            text += f"; next: {self.found.next}" if self.found.next is not None else ""
+        text += f" ({count_of(self.touches, 'touch')})"
+        return "; ".join((text, *map(_edge_text, self.edges or ())))
 
 
-def answers_of(
-    options: RecognizeOptions,
-    learning: SensorLearning,
-    source: TouchSource,
-    frames: Iterator[Frame],
-    interrupted: Event,
-) -> Iterator[Answer]:
-    """Yield the answer of every touch as it comes; of a scan its answer at last."""
-    reader = learning.reader
-    belief = belief_for(reader, options.scan) if options.scan else None
-    most = options.most
-    if options.port and not options.follow and most is None and belief is None:
-        most = 1
-    by_touch = read_joints(options.joints_file) if options.joints_file else ()
-    touches = source.touches(_frames_until(interrupted, frames), reader.settings)
-    if belief is not None and options.recording is not None:
-        touches = refuse_single(touches, source.place, touches_for(reader))
-    warned = ""
-    last: Answer | None = None  # that answers
-    for count, touch in enumerate(touches, start=1):
-        if interrupted.is_set():  # what an interruption cuts short is no touch
-            return
-        own = by_touch[count - 1 : count]
-        reader = learning.take(touch)
-        if belief is None:
-            found = reader.read(touch.counts, calibration=source.calibration, seq=touch.seq)
-        else:
-            signal = reader.signal(touch.counts, calibration=source.calibration)
-            pose = pose_during(touch, count, by_touch, options.joint_error_deg)
-            found = belief.add(signal, pose, seq=touch.seq)
-        answer, trouble = _answer(options, touch, found, own, belief)
-        if options.scan == "thesis":
-            answer = replace(answer, edges=edges_of(reader, signal))
-        if trouble and trouble != warned:
-            warning(f"touch {touch.seq}: the place in the robot's base is not known: {trouble}")
-            warned = trouble
-        yield answer
-        last = answer if found else last
-        until_told = belief is not None and options.port and not options.follow
-        if count == most or (found and until_told):
-            break
-    else:
-        if belief is None or not belief.touches or found or not belief.answer:
-            return
-        # the answer of the scan, though its last touch could not be read
-        if last is not None and last.found is belief.answer:
-            yield last
-        else:
-            late, _ = _answer(options, touch, belief.answer, own, belief)
-            yield replace(late, edges=answer.edges)
+class AnswerSink(Closing):
+    """Takes images and answers as they come."""
+
+    @abstractmethod
+    def frame(self, frame: Frame) -> None:
+        """Take an image."""
+
+    @abstractmethod
+    def answer(self, answer: Answer) -> None:
+        """Take an answer."""
 
 
-def _answer(
-    options: RecognizeOptions,
-    touch: TouchImage,
-    found: Recognition,
-    own: Joints,
-    belief: Belief | None,
-) -> tuple[Answer, str]:
-    """Return an answer with the object in the robot's base, or what kept it from being known.
+def _edge_json(edge: Edge, found: Recognition) -> dict[str, Any]:
+    """Return an edge in the sensor frame, and on the object if it is known.
 
-    Joint angles are those of the touch (`own`), if there are such.
+    Positions are of the middle of what is seen, mm; the face lies left of the direction.
     """
-    joints = own[0] if own else options.joints_deg
-    touches = None if belief is None else belief.touches
-    if joints is None and touch.pose is None:
-        return Answer(touch, found, None, touches), ""
-    from recognizer.command.in_base import object_in_base
+    value: dict[str, Any] = {
+        "position_mm": edge.middle_mm,
+        "direction_deg": edge.direction_deg,
+        "length_mm": edge.length_mm,
+        "position_sd_mm": edge.across_mm,
+        "direction_sd_deg": edge.turn_deg,
+    }
+    if found.T_object_probe is not None:
+        T, angle = found.T_object_probe, edge.angle_rad
+        value["object_position_mm"] = T[:3, :2] @ edge.middle_mm + T[:3, 3]
+        value["object_direction"] = T[:3, 0] * math.sin(angle) - T[:3, 1] * math.cos(angle)
+    return value
 
-    in_base, trouble = object_in_base(touch, found, joints, options.joint_error_deg)
-    return Answer(touch, found, in_base, touches), trouble
 
-
-def _frames_until(interrupted: Event, frames: Iterator[Frame]) -> Iterator[Frame]:
-    for frame in frames:
-        if interrupted.is_set():
-            return
-        yield frame
+def _edge_text(edge: Edge) -> str:
+    x, y = edge.middle_mm.tolist()
+    return (
+        f"an edge at ({x:.2f}, {y:.2f}) mm +- {edge.across_mm:.2f}, "
+        f"{edge.direction_deg:.1f} degrees +- {edge.turn_deg:.1f}"
+    )

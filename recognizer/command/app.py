@@ -1,12 +1,17 @@
-"""The options of `recognize-object`."""
+"""`recognize-object`: its options."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from encoded_objects.base import console
+from encoded_objects.base.errors import UsageError
+from encoded_objects.base.options import Argument, Option, Options, Replace, command
+from recognizer.command import NAME
+from recognizer.command.options import Calibration, Database
 
 HELP = """Say which object was touched, which face, where, and how sure.
 
@@ -20,172 +25,169 @@ EPILOG = """Exit codes: 0 recognised, 1 nothing recognised, 2 bad input, 3 devic
 """
 URLS = "serial:///dev/ttyACM0?baud=1000000, sim:lab.db#Cube/F1, file:touch.h5"
 
-app = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+app = console.application()
 
 
-@app.command(help=HELP, epilog=EPILOG)
-def recognize(
-    recording: Annotated[
-        Path | None, typer.Argument(metavar="RECORDING", show_default=False,
-                                    help="A recording; or give --port."),
-    ] = None,
-    port: Annotated[
-        str, typer.Option(metavar="URL", show_default=False, help=f"Read a port: {URLS}."),
-    ] = "",
-    database: Annotated[
-        str, typer.Option(metavar="URL", help="The lab's database."),
-    ] = "lab.db",
+@dataclass(frozen=True)
+class RecognizeOptions(Options):
+    """What is read, by what, and where answers go."""
+
+    recording: Annotated[Path | None, Argument("A recording; or give --port.", "RECORDING")] = None
+    port: Annotated[str, Option(f"Read a port: {URLS}.", "URL")] = ""
+    database: Database = "lab.db"
     follow: Annotated[
-        bool, typer.Option("--follow", help="Keep reading the port, until Ctrl-C; without it "
-                                            "the next touch is read."),
-    ] = False,
-    every: Annotated[
-        bool, typer.Option("--every", help="Every frame by itself, not every touch."),
-    ] = False,
+        bool,
+        Option("Keep reading the port, until Ctrl-C; without it the next touch is read."),
+    ] = False
+    every: Annotated[bool, Option("Every frame by itself, not every touch.")] = False
     scan: Annotated[
-        bool, typer.Option("--scan", help="All touches together, of one face: for symbols too "
-                                          "large for one touch (profiles thesis, product), worn "
-                                          "parts, edges. A port is read until they answer."),
-    ] = False,
+        bool,
+        Option(
+            "All touches together, of one face: for symbols too large for one touch (profiles "
+            "thesis, product), worn parts, edges. A port is read until they answer."
+        ),
+    ] = False
     method: Annotated[
-        str, typer.Option(metavar="joint|thesis", help="How a scan is read: the joint fit, or as "
-                                                       "the thesis has it."),
-    ] = "joint",
+        str,
+        Option(
+            "How a scan is read: the joint fit, or as the thesis has it.",
+            choices=("joint", "thesis"),
+        ),
+    ] = "joint"
     most: Annotated[
-        int | None, typer.Option("--touches", metavar="N", min=1, show_default=False,
-                                 help="End after so many touches."),
-    ] = None,
+        int | None, Option("End after so many touches.", "N", names=("--touches",), least=1)
+    ] = None
     sensor_type: Annotated[
-        str, typer.Option("--sensor-type", metavar="NAME|FILE", show_default=False,
-                          help="Type of the sensor: a name that probe-sensor types lists, or a "
-                               "file; as recording or port tells, fsr-16 by default."),
-    ] = "",
+        str,
+        Option(
+            "Type of the sensor: a name that probe-sensor types lists, or a file; as recording "
+            "or port tells, fsr-16 by default.",
+            "NAME|FILE",
+        ),
+    ] = ""
     overlay: Annotated[
-        str, typer.Option(metavar="tab|pad", show_default=False,
-                          help="Elastic overlay; as recording or port tell, that of the type by "
-                               "default."),
-    ] = "",
-    calibration: Annotated[
-        Path | None, typer.Option(metavar="FILE", show_default=False,
-                                  help="The sensor's calibration; the one that the recording "
-                                       "names is found beside it."),
-    ] = None,
+        str,
+        Option(
+            "Elastic overlay; as recording or port tell, that of the type by default.",
+            choices=("tab", "pad"),
+        ),
+    ] = ""
+    calibration: Calibration = None
     learn: Annotated[
-        Path | None, typer.Option(metavar="FILE", show_default=False,
-                                  help="Learn the sensor from these touches (25 and more): "
-                                       "tactels that never answer, gains, where tips stand, "
-                                       "floating rows. Kept in FILE, which is read by from then "
-                                       "on, and goes on learning."),
-    ] = None,
+        Path | None,
+        Option(
+            "Learn the sensor from these touches (25 and more): tactels that never answer, "
+            "gains, where tips stand, floating rows. Kept in FILE, which is read by from then "
+            "on, and goes on learning.",
+            "FILE",
+        ),
+    ] = None
     flip: Annotated[
-        str, typer.Option(metavar="LIST", show_default=False,
-                          help="How the image arrives: columns, rows, transpose, quarter, "
-                               "column-halves, row-halves, values (readings fall with force); "
-                               "refusals and [bold]recognize-object check[/] say it."),
-    ] = "",
+        str,
+        Option(
+            "How the image arrives: columns, rows, transpose, quarter, column-halves, "
+            "row-halves, values (readings fall with force); refusals and "
+            "[bold]recognize-object check[/] say it.",
+            "LIST",
+        ),
+    ] = ""
     state: Annotated[
-        Path | None, typer.Option("--sensor-state", metavar="FILE", show_default=False,
-                                  help="Read by what was learned of the sensor."),
-    ] = None,
+        Path | None,
+        Option("Read by what was learned of the sensor.", "FILE", names=("--sensor-state",)),
+    ] = None
     sensor: Annotated[
-        int | None, typer.Option(metavar="0...7", min=0, max=7, show_default=False,
-                                 help="Which of the probe's sensors to read at a port."),
-    ] = None,
-    live: Annotated[
-        bool, typer.Option("--live", help="Also a recording that is still being written."),
-    ] = False,
+        int | None,
+        Option("Which of the probe's sensors to read at a port.", "0...7", least=0, most=7),
+    ] = None
+    live: Annotated[bool, Option("Also a recording that is still being written.")] = False
     joints: Annotated[
-        str, typer.Option(metavar="Q1,...,Q5|FILE", show_default=False,
-                          help="Joint angles of the arm, degrees: with the wrist's readings they "
-                               "place the object in the robot's base. A pose in the recording "
-                               "does so too. Of a scan a text file, a line for each touch."),
-    ] = "",
-    joint_error: Annotated[
-        float, typer.Option(metavar="DEGREES", min=0.0, help="Standard deviation of each."),
-    ] = 0.1,
+        str,
+        Option(
+            "Joint angles of the arm, degrees: with the wrist's readings they place the object "
+            "in the robot's base. A pose in the recording does so too. Of a scan a text file, "
+            "a line for each touch.",
+            "Q1,...,Q5|FILE",
+        ),
+    ] = ""
+    joint_error: Annotated[float, Option("Standard deviation of each.", "DEGREES", least=0.0)] = 0.1
     plot: Annotated[
-        Path | None, typer.Option(metavar="PNG", show_default=False,
-                                  help="Draw each touch with its symbols, the window on the "
-                                       "array, and the object with the probe on it. Several "
-                                       "touches: PNG-SEQ; --follow: the newest."),
-    ] = None,
+        Path | None,
+        Option(
+            "Draw each touch with its symbols, the window on the array, and the object with "
+            "the probe on it. Several touches: PNG-SEQ; --follow: the newest.",
+            "PNG",
+        ),
+    ] = None
     mcap: Annotated[
-        Path | None, typer.Option(metavar="OUT", show_default=False,
-                                  help="Keep images and answers as ROS 2 messages, poses with "
-                                       "covariance among them (docs/robot.md)."),
-    ] = None,
+        Path | None,
+        Option(
+            "Keep images and answers as ROS 2 messages, poses with covariance among them "
+            "(docs/robot.md).",
+            "OUT",
+        ),
+    ] = None
     publish: Annotated[
-        str, typer.Option(metavar="URL", show_default=False,
-                          help="Tell images and answers to whoever listens: "
-                               "zenoh://0.0.0.0:7447/touch (docs/robot.md)."),
-    ] = "",
-    replace: Annotated[
-        bool, typer.Option("--replace", help="Replace files that are there."),
-    ] = False,
+        str,
+        Option(
+            "Tell images and answers to whoever listens: zenoh://0.0.0.0:7447/touch "
+            "(docs/robot.md).",
+            "URL",
+        ),
+    ] = ""
+    replace: Replace = False
     as_json: Annotated[
-        bool, typer.Option("--json", help="One JSON list on stdout; with --follow one object a "
-                                          "line."),
-    ] = False,
-    version: Annotated[
-        bool, typer.Option("--version", help="Say which version this is."),
-    ] = False,
-) -> Callable[[], int]:  # fmt: skip
-    """Read touches; `HELP` is what people see."""
-    if version:
-        from encoded_objects.base import output
-        from recognizer.command import NAME
-        from recognizer.touch.symbols.kernels import kernels_in_use
+        bool,
+        Option("One JSON list on stdout; with --follow one object a line.", names=("--json",)),
+    ] = False
 
-        output.version(NAME, as_json=as_json, kernels=kernels_in_use())
-        raise typer.Exit
-    if (recording is None) == (not port):
-        both = "both RECORDING and --port were given" if port else "nothing to read"
-        raise typer.BadParameter(f"{both}; give a recording or --port URL")
-    if follow and not port:
-        raise typer.BadParameter("--follow needs --port; a file is played by --port file:FILE")
-    if overlay not in ("", "tab", "pad"):
-        raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
-    if method not in ("joint", "thesis"):
-        raise typer.BadParameter(f"--method {method}: give joint or thesis")
-    if learn is not None and state is not None:
-        raise typer.BadParameter("--learn FILE reads by that file too; leave --sensor-state out")
-    by_touch = joints if joints and Path(joints).is_file() else ""
-    angles = _angles("" if by_touch else joints)
-    scan = scan or method == "thesis"
-    if scan and angles:
-        raise typer.BadParameter("--joints of a scan: give a file with a line for each touch")
+    def check(self) -> None:
+        """Refuse options that exclude each other."""
+        if (self.recording is None) == (not self.port):
+            both = "both RECORDING and --port were given" if self.port else "nothing to read"
+            raise UsageError(f"{both}; give a recording or --port URL")
+        if self.follow and not self.port:
+            raise UsageError("--follow needs --port; a file is played by --port file:FILE")
+        if self.learn is not None and self.state is not None:
+            raise UsageError("--learn FILE reads by that file too; leave --sensor-state out")
+        if self.joints_deg is not None and self.scan_method:
+            raise UsageError("--joints of a scan: give a file with a line for each touch")
 
-    def action() -> int:
-        from recognizer.command.answers import RecognizeOptions
-        from recognizer.command.recognize import recognize_touches
+    @property
+    def scan_method(self) -> str:
+        """`joint` or `thesis`; empty where every touch is read by itself."""
+        return self.method if self.scan or self.method == "thesis" else ""
 
-        return recognize_touches(
-            RecognizeOptions(
-                recording=recording, port=port, database=database, follow=follow, every=every,
-                most=most, sensor_type=sensor_type, overlay=overlay, calibration=calibration,
-                sensor=sensor, live=live,
-                joints_deg=angles, joint_error_deg=joint_error, plot=plot, replace=replace,
-                as_json=as_json, scan=method if scan else "",
-                joints_file=Path(by_touch) if by_touch else None, learn=learn, state=state,
-                flip=flip, mcap=mcap, publish=publish,
+    @property
+    def joints_file(self) -> Path | None:
+        """File of joint angles, a line for each touch."""
+        path = Path(self.joints)
+        return path if self.joints and path.is_file() else None
+
+    @cached_property
+    def joints_deg(self) -> tuple[float, ...] | None:
+        """(5,) joint angles of all touches, degrees."""
+        if not self.joints or self.joints_file is not None:
+            return None
+        try:
+            angles = tuple(float(part) for part in self.joints.split(","))
+        except ValueError:
+            angles = ()
+        if len(angles) != 5 or not all(abs(angle) <= 360 for angle in angles):
+            raise UsageError(
+                f"--joints {self.joints}: give five angles in degrees, as 0,-30,60,0,0"
             )
-        )  # fmt: skip
-
-    return action
+        return angles
 
 
-def _angles(text: str) -> tuple[float, ...] | None:
-    if not text:
-        return None
-    try:
-        angles = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        angles = ()
-    if len(angles) != 5 or not all(abs(angle) <= 360 for angle in angles):
-        raise typer.BadParameter(f"--joints {text}: give five angles in degrees, as 0,-30,60,0,0")
-    return angles
+def _kernels() -> dict[str, str]:
+    from recognizer.touch.symbols.kernels import kernels_in_use
+
+    return {"kernels": kernels_in_use()}
+
+
+@command(app, help=HELP, epilog=EPILOG, version_of=NAME, parts=_kernels)
+def recognize(options: RecognizeOptions) -> int:
+    """Read touches; `HELP` is what people see."""
+    from recognizer.command.recognize import recognize_touches
+
+    return recognize_touches(options)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from encoded_objects.base import console
-from encoded_objects.base.console import Action
+from encoded_objects.base.options import Argument, Json, Option, command
+from recognizer.command.options import Calibration, Database
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from encoded_objects.base.output import ProgressBar
     from recognizer.as_built.estimate import FeltPrint
     from recognizer.touch.contacts import TouchImage
@@ -32,81 +30,62 @@ def _commands() -> None:
     """Say what a print is like."""
 
 
-@app.command(name="as-built", help=HELP)
+@command(app, "as-built", help=HELP)
 def as_built(
-    recording: Annotated[
-        Path, typer.Argument(metavar="RECORDING", show_default=False, help="Touches of one part."),
-    ],
-    database: Annotated[
-        str, typer.Option(metavar="URL", help="The lab's database."),
-    ] = "lab.db",
-    store: Annotated[
-        bool, typer.Option("--store", help="Keep it in the database, for every later pose."),
-    ] = False,
-    material: Annotated[
-        str, typer.Option(metavar="NAME", help="What the part is printed of, as PLA."),
-    ] = "",
+    recording: Annotated[Path, Argument("Touches of one part.", "RECORDING")],
+    database: Database = "lab.db",
+    store: Annotated[bool, Option("Keep it in the database, for every later pose.")] = False,
+    material: Annotated[str, Option("What the part is printed of, as PLA.", "NAME")] = "",
     sensor_type: Annotated[
-        str, typer.Option("--sensor-type", metavar="NAME|FILE", show_default=False,
-                          help="Type of the sensor: a name that probe-sensor types lists, or a "
-                               "file; as the recording tells, fsr-16 by default."),
+        str,
+        Option("Type of the sensor: a name that probe-sensor types lists, or a file; as the "
+               "recording tells, fsr-16 by default.", "NAME|FILE"),
     ] = "",
     overlay: Annotated[
-        str, typer.Option(metavar="tab|pad", show_default=False,
-                          help="Elastic overlay; as the recording tells, tab by default."),
+        str,
+        Option("Elastic overlay; as the recording tells, tab by default.", choices=("tab", "pad")),
     ] = "",
-    calibration: Annotated[
-        Path | None, typer.Option(metavar="FILE", show_default=False,
-                                  help="The sensor's calibration; the one that the recording "
-                                       "names is found beside it."),
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout, also for errors."),
-    ] = False,
-) -> Action:  # fmt: skip
+    calibration: Calibration = None,
+    as_json: Json = False,
+) -> int:  # fmt: skip
     """Estimate a print; `HELP` is what people see."""
-    if overlay not in ("", "tab", "pad"):
-        raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
+    from encoded_objects.base.output import message, write, write_json
+    from recognizer.as_built.parts import estimate_parts
+    from recognizer.as_built.words import (
+        as_built_entry,
+        as_built_numbers,
+        as_built_sentences,
+        as_built_sizes,
+    )
 
-    def action() -> int:
-        from encoded_objects.base.output import message, write, write_json
-        from recognizer.as_built.parts import estimate_parts
-        from recognizer.as_built.words import (
-            as_built_entry,
-            as_built_numbers,
-            as_built_sentences,
-            as_built_sizes,
-        )
+    touched = _touched_prints(recording, database, sensor_type, overlay, calibration)
+    prints, too_few = estimate_parts(touched, database, material)
+    for words in too_few:
+        message(words)
+    printer = None
+    if store:
+        from recognizer.as_built.keep import keep_prints
 
-        felt = _feel(recording, database, sensor_type, overlay, calibration)
-        prints, too_few = estimate_parts(felt, database, material)
-        for words in too_few:
-            message(words)
-        printer = None
-        if store:
-            from recognizer.as_built.keep import keep_prints
-
-            printer = keep_prints(database, [found for found, _ in prints])
-        if as_json:
-            parts = [as_built_entry(found, verdict) for found, verdict in prints]
-            told = None if printer is None else as_built_numbers(printer)
-            write_json({"object": felt[0].object, "parts": parts, "stored": store, "printer": told})
-            return 0
-        for found, verdict in prints:
-            write(as_built_sentences(found, verdict))
-        if printer is not None:
-            name = " ".join(filter(None, (printer.printer or "its printer", printer.material)))
-            message(f"kept in {database}; parts of {name} that are not known by touches of their "
-                    f"own: {as_built_sizes(printer)}")  # fmt: skip
+        printer = keep_prints(database, [found for found, _ in prints])
+    if as_json:
+        parts = [as_built_entry(found, verdict) for found, verdict in prints]
+        numbers = None if printer is None else as_built_numbers(printer)
+        write_json({"object": touched[0].object, "parts": parts, "stored": store,
+                    "printer": numbers})  # fmt: skip
         return 0
+    for found, verdict in prints:
+        write(as_built_sentences(found, verdict))
+    if printer is not None:
+        name = " ".join(filter(None, (printer.printer or "its printer", printer.material)))
+        message(f"kept in {database}; parts of {name} that are not known by touches of their "
+                f"own: {as_built_sizes(printer)}")  # fmt: skip
+    return 0
 
-    return action
 
-
-def _feel(
+def _touched_prints(
     recording: Path, database: str, sensor_type: str, overlay: str, calibration: Path | None
 ) -> tuple[FeltPrint, ...]:
-    """Return how the touches of a recording felt the print."""
+    """Return what each touch of a recording says of the print."""
     from encoded_objects.base.output import progress_bar, warning
     from probe.recording.read import Recording
     from recognizer.as_built.settings import settings_for_prints
@@ -122,11 +101,11 @@ def _feel(
         warning(source.notice)
     reader = Reader(lab, source.sensor, settings_for_prints())
     with progress_bar("reading", source.frames) as bar:
-        touches = _show_count(source.touches(opened.frames(), reader.settings), bar)
+        touches = _counted(source.touches(opened.frames(), reader.settings), bar)
         return feel_prints(reader, touches, calibration=source.calibration, place=str(recording))
 
 
-def _show_count(touches: Iterator[TouchImage], bar: ProgressBar) -> Iterator[TouchImage]:
+def _counted(touches: Iterator[TouchImage], bar: ProgressBar) -> Iterator[TouchImage]:
     for number, touch in enumerate(touches, start=1):
         yield touch
         bar.show(touch.seq + touch.frames, f"{number:,} touches")

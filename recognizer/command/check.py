@@ -6,10 +6,10 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from encoded_objects.base import console
-from encoded_objects.base.console import Action
+from encoded_objects.base.errors import UsageError
+from encoded_objects.base.options import Argument, Json, Option, command
+from recognizer.command.options import Database
 
 if TYPE_CHECKING:
     from recognizer.touch.contacts import TouchImage
@@ -32,49 +32,32 @@ def _commands() -> None:
     """Say how a sensor is mounted."""
 
 
-@app.command(name="check", help=HELP, epilog=EPILOG)
+@command(app, "check", help=HELP, epilog=EPILOG)
 def check(
-    at: Annotated[
-        str, typer.Option("--at", metavar="OBJECT/FACE", show_default=False,
-                          help="Face that is touched, as Cube/F1."),
-    ],
+    at: Annotated[str, Option("Face that is touched, as Cube/F1.", "OBJECT/FACE")],
     recording: Annotated[
-        Path | None, typer.Argument(metavar="RECORDING", show_default=False,
-                                    help="Touches placed so; or give --port."),
+        Path | None, Argument("Touches placed so; or give --port.", "RECORDING")
     ] = None,
-    port: Annotated[
-        str, typer.Option(metavar="URL", show_default=False, help="Read a port."),
-    ] = "",
-    database: Annotated[
-        str, typer.Option(metavar="URL", help="The lab's database."),
-    ] = "lab.db",
+    port: Annotated[str, Option("Read a port.", "URL")] = "",
+    database: Database = "lab.db",
     sensor_type: Annotated[
-        str, typer.Option(metavar="NAME|FILE", show_default=False,
-                          help="Type of the sensor; as the recording tells, fsr-16 by default."),
+        str, Option("Type of the sensor; as the recording tells, fsr-16 by default.", "NAME|FILE")
     ] = "",
-    every: Annotated[
-        bool, typer.Option("--every", help="Every frame is a touch."),
-    ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout, also for errors."),
-    ] = False,
-) -> Action:  # fmt: skip
+    every: Annotated[bool, Option("Every frame is a touch.")] = False,
+    as_json: Json = False,
+) -> int:
     """Check the mounting; `HELP` is what people see."""
     if (recording is None) == (not port):
-        raise typer.BadParameter("give a recording or --port URL")
+        raise UsageError("give a recording or --port URL")
     object_name, slash, face = at.rpartition("/")
     if not slash or not object_name or not face:
-        raise typer.BadParameter(f"--at {at}: give object and face, as Cube/F1")
+        raise UsageError(f"--at {at}: give object and face, as Cube/F1")
+    from recognizer.touch.lab import open_lab
+    from recognizer.touch.reader import Reader
 
-    def action() -> int:
-        from recognizer.touch.lab import open_lab
-        from recognizer.touch.reader import Reader
-
-        lab = open_lab(database)
-        source, touches = _placed_touches(recording, port, sensor_type, at, every)
-        return _report(Reader(lab, source.sensor), source, touches, (object_name, face), as_json)
-
-    return action
+    lab = open_lab(database)
+    source, touches = _placed_touches(recording, port, sensor_type, at, every)
+    return _report(Reader(lab, source.sensor), source, touches, (object_name, face), as_json)
 
 
 def _placed_touches(
@@ -102,27 +85,27 @@ def _report(
     reader: Reader, source: TouchSource, touches: list[TouchImage], face: tuple[str, str],
     as_json: bool,
 ) -> int:  # fmt: skip
-    """Say what touches tell of the mounting; returns the exit code."""
+    """Say how the sensor is mounted by these touches; returns the exit code."""
     from encoded_objects.base.output import write, write_json
     from recognizer.sensor.mounting import WORDS, FoundMounting, find_mounting
 
-    told = [
+    found = [
         find_mounting(reader, touch.counts, face, calibration=source.calibration)
         for touch in touches
     ]
-    known = [one for one in told if isinstance(one, FoundMounting)]
+    known = [one for one in found if isinstance(one, FoundMounting)]
     ways = {one.wiring.changes for one in known}
     agreed = next(iter(ways)) if len(ways) == 1 else None
     if as_json:
         write_json({
             "mounting": None if agreed is None else WORDS[agreed],
             "flip": None if agreed is None else list(agreed),
-            "touches": len(told), "agree": len(known) if agreed is not None else 0,
+            "touches": len(found), "agree": len(known) if agreed is not None else 0,
         })  # fmt: skip
-    elif not told:
+    elif not found:
         write("no touch")
     else:
-        for one in told:
+        for one in found:
             write(str(one) if isinstance(one, FoundMounting) else f"not told: {one}")
         if len(ways) > 1:
             write("the touches disagree: place each as --at says, within 40 degrees")

@@ -23,11 +23,8 @@ from typing import Any, Final
 from encoded_objects.base.errors import EncodedObjectsError, require
 from encoded_objects.base.output import json_value, message
 from probe.frame import Frame
-from probe.recording.cdr import cdr_bytes
-from probe.recording.ros import IMAGE, POSE_WITH_COVARIANCE, image_message
-from recognizer.command import report
-from recognizer.command.answer_sink import AnswerSink
-from recognizer.command.answers import Answer
+from probe.recording.ros import IMAGE, POSE_WITH_COVARIANCE, cdr_bytes, image_message
+from recognizer.command.answers import Answer, AnswerSink
 from recognizer.command.ros import object_message
 
 _URL = re.compile(
@@ -36,7 +33,7 @@ _URL = re.compile(
 KEY: Final = "touch"
 KEPT: Final = 1000  #: answers that late clients can fetch
 SEND_BUFFER: Final = 65_536  #: bytes of the socket: 60 images, a quarter of a second
-PATIENCE_S: Final = 60.0  #: for a client that takes no answer, before its line is cut
+TIMEOUT_S: Final = 60.0  #: for a client that takes no answer, before its line is cut
 
 
 class PublishSink(AnswerSink):
@@ -68,7 +65,7 @@ class PublishSink(AnswerSink):
             f"{self.key}/image", encoding=cdr(IMAGE), priority=Priority.DATA_LOW,
             congestion_control=CongestionControl.DROP,
         )  # fmt: skip
-        told: dict[str, Any] = {
+        reliable: dict[str, Any] = {
             "priority": Priority.INTERACTIVE_HIGH,
             "congestion_control": CongestionControl.BLOCK,
             "express": True,  # at once, in no batch
@@ -79,13 +76,13 @@ class PublishSink(AnswerSink):
             "publisher_detection": True,
         }
         self._answers = ext.declare_advanced_publisher(
-            self._session, f"{self.key}/answer", encoding=Encoding.APPLICATION_JSON, **told
+            self._session, f"{self.key}/answer", encoding=Encoding.APPLICATION_JSON, **reliable
         )
         self._objects = ext.declare_advanced_publisher(
-            self._session, f"{self.key}/object", encoding=cdr(POSE_WITH_COVARIANCE), **told
+            self._session, f"{self.key}/object", encoding=cdr(POSE_WITH_COVARIANCE), **reliable
         )
         self._waiting: queue.SimpleQueue[tuple[Any, bytes] | None] = queue.SimpleQueue()
-        self._thread = Thread(target=self._tell, name="publish", daemon=True)
+        self._thread = Thread(target=self._send_waiting, name="publish", daemon=True)
         self._thread.start()
         message(f"publishing {self.key}/image, /answer and /object at {endpoint}")
 
@@ -95,20 +92,19 @@ class PublishSink(AnswerSink):
 
     def answer(self, answer: Answer) -> None:
         """Publish an answer, and where the object is."""
-        entry = report.entry(answer.touch, answer.found, answer.in_base)
-        self._waiting.put((self._answers, json.dumps(json_value(entry)).encode()))
+        self._waiting.put((self._answers, json.dumps(json_value(answer.as_json())).encode()))
         placed = object_message(answer.found, answer.in_base, answer.touch.t_ns)
         if placed is not None:
             self._waiting.put((self._objects, cdr_bytes(POSE_WITH_COVARIANCE, placed)))
 
     def close(self) -> None:
-        """Tell what waits, and end the session."""
+        """Send the answers that wait, and end the session."""
         if self._thread.is_alive():
             self._waiting.put(None)
-            self._thread.join(PATIENCE_S)
+            self._thread.join(TIMEOUT_S)
             self._session.close()  # type: ignore[no-untyped-call, unused-ignore]
 
-    def _tell(self) -> None:
+    def _send_waiting(self) -> None:
         while (item := self._waiting.get()) is not None:
             publisher, payload = item
             publisher.put(payload)
@@ -149,7 +145,7 @@ def _config(endpoint: str) -> Any:
         ("transport/link/tx/queue/size/data_low", 1),
         (
             "transport/link/tx/queue/congestion_control/block/wait_before_close",
-            int(1e6 * PATIENCE_S),
+            int(1e6 * TIMEOUT_S),
         ),
     ):
         config.insert_json5(path, json.dumps(value))

@@ -1,33 +1,53 @@
-"""`recognize-object`: answers printed as they come; the pictures of a recording at its end."""
+"""`recognize-object`: touches -> answers, printed as they come; pictures of a recording at its end.
+
+A touch is read by itself, or added to the belief of a scan.
+"""
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
 from threading import Event
 from typing import Any
 
 from encoded_objects.base.console import FAILED, INTERRUPTED, interruption
-from encoded_objects.base.output import ProgressBar, message, progress_bar, warning, write_json
+from encoded_objects.base.errors import require
+from encoded_objects.base.files import file_exists_error, refuse_taken, staged_file
+from encoded_objects.base.output import (
+    ProgressBar,
+    count_of,
+    message,
+    progress_bar,
+    warning,
+    write_json,
+)
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
 from probe.recording.read import Recording
-from recognizer.command import report
-from recognizer.command.answer_pictures import draw_answer, draw_answers, refuse_pictures
-from recognizer.command.answer_sink import AnswerSink
-from recognizer.command.answers import Answer, RecognizeOptions, answers_of
+from recognizer.command.answers import Answer, AnswerSink
+from recognizer.command.app import RecognizeOptions
 from recognizer.command.learning import SensorLearning, learning_for
 from recognizer.command.port import listen, source_at
-from recognizer.command.scanning import touches_for
-from recognizer.command.sinks import sinks_for
+from recognizer.command.scanning import (
+    belief_for,
+    edges_of,
+    pose_during,
+    read_joints,
+    refuse_single,
+    touches_for,
+)
 from recognizer.touch.contacts import TouchImage
-from recognizer.touch.lab import Lab, open_lab
+from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognition import NO_CONTACT
+from recognizer.touch.recognition import NO_CONTACT, Recognition
+from recognizer.touch.robot import ObjectPose
 from recognizer.touch.source import TouchSource, source_of
 
-TRIED = 6  #: refused touches, none answered, after which it is asked how the sensor is wired
+TRIED = 6  #: refused touches, none answered, after which the wiring is checked
 
 
 def recognize_touches(options: RecognizeOptions) -> int:
@@ -41,8 +61,8 @@ def recognize_touches(options: RecognizeOptions) -> int:
         The database cannot be read, or holds no encoded object.
     """
     if options.plot is not None:
-        refuse_pictures(options.plot, replace=options.replace)
-    with interruption() as interrupted:
+        _refuse_pictures(options.plot, replace=options.replace)
+    with interruption() as interrupted, ExitStack() as stack:
         lab = open_lab(options.database)
         if options.recording is not None:
             recording = Recording(options.recording, live=options.live)
@@ -50,47 +70,27 @@ def recognize_touches(options: RecognizeOptions) -> int:
                 recording, options.sensor_type, overlay=options.overlay,
                 calibration=options.calibration, every=options.every,
             )  # fmt: skip
-            learning = _reader(options, lab, source)
-            frames = _rewire(options, source, recording.frames())
-            learning.learn_from(source.touches(frames, learning.reader.settings))
-            frames = _rewire(options, source, recording.frames())
-            return _print_answers(options, learning, source, frames, interrupted, recording.origin)
-        source = source_at(
-            options.port, sensor_type=options.sensor_type, overlay=options.overlay,
-            calibration=options.calibration, every=options.every,
-        )  # fmt: skip
-        learning = _reader(options, lab, source)  # before frames come
-        with listen(source, interrupted, options.sensor, options.calibration) as frames:
+            origin = recording.origin
+        else:
+            source = source_at(
+                options.port, sensor_type=options.sensor_type, overlay=options.overlay,
+                calibration=options.calibration, every=options.every,
+            )  # fmt: skip
             origin = RecordingOrigin(sensor=options.port)
-            frames = _rewire(options, source, frames)
-            return _print_answers(options, learning, source, frames, interrupted, origin)
-
-
-def _rewire(
-    options: RecognizeOptions, source: TouchSource, frames: Iterator[Frame]
-) -> Iterator[Frame]:
-    """Return frames as the sensor has them, where a person says that they arrive otherwise."""
-    if not options.flip:
-        return frames
-    from recognizer.sensor.wiring import wiring_named
-
-    wiring = wiring_named(options.flip)
-    return (wiring.frame(frame, source.sensor.full) for frame in frames)
-
-
-def _hint_wiring(reader: Reader, source: TouchSource, refused: list[TouchImage]) -> None:
-    """Say how the sensor seems to be wired, where refused touches tell."""
-    from recognizer.sensor.wiring import wiring_hint
-
-    hint = wiring_hint(reader, refused, calibration=source.calibration)
-    if hint:
-        message(hint)
-
-
-def _reader(options: RecognizeOptions, lab: Lab, source: TouchSource) -> SensorLearning:
-    if source.notice:
-        warning(source.notice)
-    return learning_for(Reader(lab, source.sensor), source, options.learn, options.state)
+        if source.notice:
+            warning(source.notice)
+        reader = Reader(lab, source.sensor)
+        learning = learning_for(reader, source, options.learn, options.state)
+        if options.recording is not None:
+            frames = _rewired(options.flip, source, recording.frames())
+            learning.learn_from(source.touches(frames, learning.reader.settings))
+            frames = recording.frames()
+        else:
+            frames = stack.enter_context(
+                listen(source, interrupted, options.sensor, options.calibration)
+            )
+        frames = _rewired(options.flip, source, frames)
+        return _print_answers(options, learning, source, frames, interrupted, origin)
 
 
 def _print_answers(
@@ -108,58 +108,54 @@ def _print_answers(
     refused: list[TouchImage] = []
     read = answered = 0
     lines = options.as_json and options.follow
-    reader = learning.reader
-    needed = touches_for(reader)
-    if options.scan and needed == 1:
+    needed = touches_for(learning.reader)
+    scan = bool(options.scan_method)
+    if scan and needed == 1:
         message("one touch is enough for these symbols; a scan helps where parts are worn or cut")
     with ExitStack() as stack:
-        bar = None
-        if options.as_json or not out.isatty():  # otherwise the answers show how far it is
+        if options.as_json or not out.isatty():  # otherwise the answers show the progress
             bar = stack.enter_context(progress_bar("reading", source.frames))
-            frames = _show_count(frames, bar)
-        sinks = [stack.enter_context(sink) for sink in sinks_for(options, origin)]
-        frames = _hand_on(frames, sinks)
-        for answer in answers_of(options, learning, source, frames, interrupted):
+            frames = _counted(frames, bar)
+        sinks = [stack.enter_context(sink) for sink in _sinks(options, origin)]
+        frames = _shared(frames, sinks)
+        for answer in _answers(options, learning, source, frames, interrupted):
             for sink in sinks:
                 sink.answer(answer)
             read += 1
-            if not answer.found and not options.scan and answer.found.reason != NO_CONTACT:
+            if not answer.found and not scan and answer.found.reason != NO_CONTACT:
                 refused.append(answer.touch)
                 if len(refused) == TRIED and not answered:
                     _hint_wiring(learning.reader, source, refused)
-            answered = bool(answer.found) + (0 if options.scan else answered)
+            answered = bool(answer.found) + (0 if scan else answered)
             if options.plot is not None:
                 if options.follow:
-                    draw_answer(learning.reader, source, answer, options.plot)
+                    _draw(learning.reader, source, answer, options.plot)
                 else:
                     kept.append(answer)
             if not options.as_json:
-                out.write(_sentence(answer, needed) + "\n")
+                out.write(answer.sentence(needed) + "\n")
                 out.flush()
-                continue
-            entry = report.entry(answer.touch, answer.found, answer.in_base)
-            if answer.touches is not None:
-                entry["touches"] = answer.touches
-            if answer.edges is not None:
-                entry["edges"] = [report.edge_entry(edge, answer.found) for edge in answer.edges]
-            if lines:
-                write_json(entry, line=True)
+            elif lines:
+                write_json(answer.printed_json(), line=True)
                 out.flush()
             else:
-                values.append(entry)
+                values.append(answer.printed_json())
     learning.end()
     if refused and not answered and len(refused) < TRIED and not interrupted.is_set():
         _hint_wiring(learning.reader, source, refused)
     if options.plot is not None and kept:
-        draw_answers(learning.reader, source, kept, options.plot, interrupted)
+        _draw_all(learning.reader, source, kept, options.plot, interrupted)
     if options.as_json and not lines:
         write_json(values)
-    elif options.scan and read:
+    elif scan and read:
         what = f"{answer.found.object}/{answer.found.face}" if answered else "not recognised"
         message(f"a scan of {answer.touches} touches: {what}")
-    elif read != 1:
-        message(report.summary(read, answered, source.frames))
-    if not answered and read and not options.scan and needed > 1:
+    elif read == 0:
+        message("no touch" + ("" if source.frames is None
+                              else f" in {count_of(source.frames, 'frame')}"))  # fmt: skip
+    elif read > 1:
+        message(f"{read:,} touches, {answered:,} recognised")
+    if not answered and read and not scan and needed > 1:
         message(f"symbols of this lab are read by a scan of about {needed} overlapping touches: "
                 "recognize-object --scan")  # fmt: skip
     if interrupted.is_set():
@@ -168,27 +164,176 @@ def _print_answers(
     return 0 if answered else FAILED
 
 
-def _sentence(answer: Answer, needed: int) -> str:
-    """Return an answer in a line; of a scan with the number of its touches."""
-    said = report.sentence(answer.touch, answer.found, answer.in_base)
-    if answer.touches is None:
-        return said
-    if not answer.found and answer.found.reason != NO_CONTACT:
-        more = f"; go on: about {needed} touches" if answer.touches < needed else ""
-        said = f"{answer.touch.seq}: not yet: {answer.found.reason}{more}"
-        said += f"; next: {answer.found.next}" if answer.found.next is not None else ""
-    said = f"{said} ({answer.touches} {'touch' if answer.touches == 1 else 'touches'})"
-    return "; ".join((said, *map(report.edge_words, answer.edges or ())))
+def _answers(
+    options: RecognizeOptions,
+    learning: SensorLearning,
+    source: TouchSource,
+    frames: Iterator[Frame],
+    interrupted: Event,
+) -> Iterator[Answer]:
+    """Yield the answer of every touch as it comes; of a scan its answer at last."""
+    reader, method = learning.reader, options.scan_method
+    belief = belief_for(reader, method) if method else None
+    most = options.most
+    if options.port and not options.follow and most is None and belief is None:
+        most = 1
+    by_touch = read_joints(options.joints_file) if options.joints_file else ()
+    touches = source.touches(_until(interrupted, frames), reader.settings)
+    if belief is not None and options.recording is not None:
+        touches = refuse_single(touches, source.place, touches_for(reader))
+    warned = ""
+    last: Answer | None = None  # that answers
+    for count, touch in enumerate(touches, start=1):
+        if interrupted.is_set():  # what an interruption cuts short is no touch
+            return
+        reader = learning.take(touch)
+        if belief is None:
+            found = reader.read(touch.counts, calibration=source.calibration, seq=touch.seq)
+        else:
+            signal = reader.signal(touch.counts, calibration=source.calibration)
+            pose = pose_during(touch, count, by_touch, options.joint_error)
+            found = belief.add(signal, pose, seq=touch.seq)
+        joints = by_touch[count - 1] if len(by_touch) >= count else options.joints_deg
+        in_base, trouble = _object_in_base(touch, found, joints, options.joint_error)
+        answer = Answer(touch, found, in_base, None if belief is None else belief.touches)
+        if method == "thesis":
+            answer = replace(answer, edges=edges_of(reader, signal))
+        if trouble and trouble != warned:
+            warning(f"touch {touch.seq}: the place in the robot's base is not known: {trouble}")
+            warned = trouble
+        yield answer
+        last = answer if found else last
+        until_answered = belief is not None and options.port and not options.follow
+        if count == most or (found and until_answered):
+            return
+    if belief is None or not belief.touches or found or not belief.answer:
+        return
+    # the answer of the scan, though its last touch could not be read
+    if last is not None and last.found is belief.answer:
+        yield last
+    else:
+        in_base, _ = _object_in_base(touch, belief.answer, joints, options.joint_error)
+        yield replace(answer, found=belief.answer, in_base=in_base)
 
 
-def _show_count(frames: Iterator[Frame], bar: ProgressBar) -> Iterator[Frame]:
+def _object_in_base(
+    touch: TouchImage,
+    found: Recognition,
+    joints_deg: tuple[float, ...] | None,
+    joint_error_deg: float,
+) -> tuple[ObjectPose | None, str]:
+    """Return the object in the robot's base, and why it is not known though angles are.
+
+    Parameters
+    ----------
+    touch, found
+        What was touched; without joint angles its recorded pose counts, taken as exact.
+    joints_deg, joint_error_deg
+        (5,) joint angles, and the standard deviation of each, degrees.
+    """
+    if joints_deg is None and touch.pose is None:
+        return None, ""
+    import numpy as np
+
+    from probe.arm.carried import SensorPose
+    from probe.arm.links import Arm
+    from probe.errors import PoseError
+    from probe.wrist.geometry import Wrist
+    from recognizer.touch.robot import carried_pose, object_pose
+
+    if joints_deg is None:
+        assert touch.pose is not None
+        return object_pose(found, SensorPose(touch.pose, np.zeros((6, 6)))), ""
+    errors = np.full(len(joints_deg), math.radians(joint_error_deg))
+    try:
+        sensor = carried_pose(Arm(), Wrist(), np.radians(joints_deg), errors, touch.wrist)
+    except PoseError as error:
+        return None, str(error)
+    return object_pose(found, sensor), ""
+
+
+def _sinks(options: RecognizeOptions, origin: RecordingOrigin) -> Iterator[AnswerSink]:
+    """Yield the sinks that are asked for; their libraries load now."""
+    if options.mcap is not None:
+        from recognizer.command.ros import McapSink
+
+        yield McapSink(options.mcap, origin, replace=options.replace)
+    if options.publish:
+        from recognizer.command.publish import PublishSink
+
+        yield PublishSink(options.publish)
+
+
+def _rewired(flip: str, source: TouchSource, frames: Iterator[Frame]) -> Iterator[Frame]:
+    """Return frames as the sensor has them, where a person says that they arrive otherwise."""
+    if not flip:
+        return frames
+    from recognizer.sensor.wiring import wiring_named
+
+    wiring = wiring_named(flip)
+    return (wiring.frame(frame, source.sensor.full) for frame in frames)
+
+
+def _hint_wiring(reader: Reader, source: TouchSource, refused: list[TouchImage]) -> None:
+    """Say how the sensor seems to be wired, if refused touches show it."""
+    from recognizer.sensor.wiring import wiring_hint
+
+    hint = wiring_hint(reader, refused, calibration=source.calibration)
+    if hint:
+        message(hint)
+
+
+def _until(interrupted: Event, frames: Iterator[Frame]) -> Iterator[Frame]:
+    for frame in frames:
+        if interrupted.is_set():
+            return
+        yield frame
+
+
+def _counted(frames: Iterator[Frame], bar: ProgressBar) -> Iterator[Frame]:
     for number, frame in enumerate(frames, start=1):
         bar.show(number, f"{number:,} frames")
         yield frame
 
 
-def _hand_on(frames: Iterator[Frame], sinks: Sequence[AnswerSink]) -> Iterator[Frame]:
+def _shared(frames: Iterator[Frame], sinks: Sequence[AnswerSink]) -> Iterator[Frame]:
     for frame in frames:
         for sink in sinks:
             sink.frame(frame)
         yield frame
+
+
+def _refuse_pictures(plot: Path, *, replace: bool) -> None:
+    """Refuse a picture's name that is taken, also by that of one of several touches."""
+    refuse_taken(plot, ".png", replace=replace)
+    require("matplotlib", extra="report", purpose="--plot")
+    there = [
+        path
+        for path in plot.parent.glob(f"{plot.stem}-*.png")
+        if path.stem.removeprefix(f"{plot.stem}-").isdecimal()
+    ]
+    if there and not replace:
+        raise file_exists_error(there[0])
+
+
+def _draw_all(
+    reader: Reader, source: TouchSource, answers: list[Answer], plot: Path, interrupted: Event
+) -> None:
+    """Draw the answers: one into the file, several into files with their numbers."""
+    with progress_bar("drawing", len(answers)) as bar:
+        for number, answer in enumerate(answers, start=1):
+            if interrupted.is_set():
+                return
+            one = len(answers) == 1
+            path = plot if one else plot.with_stem(f"{plot.stem}-{answer.touch.seq}")
+            _draw(reader, source, answer, path)
+            bar.show(number, f"{number:,} of {len(answers):,}")
+
+
+def _draw(reader: Reader, source: TouchSource, answer: Answer, path: Path) -> None:
+    from recognizer.command.picture import touch_picture
+
+    pose = None if answer.in_base is None else answer.in_base.T_robot_object
+    with staged_file(path) as draft:
+        signal = reader.signal(answer.touch.counts, calibration=source.calibration)
+        touch_picture(reader, signal, answer.found, draft, T_robot_object=pose)

@@ -5,7 +5,7 @@
     /touch/object   geometry_msgs/PoseWithCovarianceStamped  the object, in the robot's base where
                     that is known (frame_id "base"), else in the sensor's frame ("sensor")
     /touch/answer   encoded_objects_msgs/Recognition         every answer, refusals too
-    /touch/image, /touch/frame, /touch/pose                  see `probe.recording.mcap_writer`
+    /touch/image, /touch/frame, /touch/pose                  see `probe.recording.mcap`
 
 Positions in metres; covariances (x, y, z, rx, ry, rz) in the axes of the frame_id, in m and rad.
 """
@@ -24,7 +24,7 @@ from encoded_objects.base.output import json_value
 from probe.arm.carried import SensorPose
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
-from probe.recording.mcap_writer import McapWriter
+from probe.recording.mcap import McapWriter
 from probe.recording.ros import (
     BASE_FRAME,
     POSE_WITH_COVARIANCE,
@@ -32,9 +32,7 @@ from probe.recording.ros import (
     SENSOR_FRAME,
     covariance_message,
 )
-from recognizer.command import report
-from recognizer.command.answer_sink import AnswerSink
-from recognizer.command.answers import Answer
+from recognizer.command.answers import Answer, AnswerSink
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.robot import ObjectPose, object_pose
 
@@ -91,7 +89,7 @@ def recognition_message(answer: Answer) -> dict[str, Any]:
         "margin": np.nan if found.margin is None else found.margin,
         "doubt": np.nan if found.doubt is None else found.doubt,
         "reason": found.reason,
-        "json": json.dumps(json_value(report.entry(answer.touch, found, answer.in_base))),
+        "json": json.dumps(json_value(answer.as_json())),
     }
 
 
@@ -103,11 +101,11 @@ def object_message(
     Parameters
     ----------
     found
-        What a touch says.
+        The answer to a touch.
     in_base
-        Where the object is in the robot's base; None: it is told in the sensor's frame.
+        The object in the robot's base; None: the sensor's frame is used.
     t_ns
-        When.
+        Time of the touch.
     """
     placed, frame_id = in_base, BASE_FRAME
     if placed is None:

@@ -159,7 +159,7 @@ def read_joints(path: Path) -> Joints:
 
 def touches_for(reader: Reader) -> int:
     """Return about how many touches an answer takes, of the lab's array that takes most."""
-    from generator.array.touches import touches_needed
+    from generator.array.contract import touches_needed
 
     width = 2 * min(reader.sensor.half_mm)
 

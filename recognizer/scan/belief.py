@@ -1,54 +1,378 @@
-"""What the touches of one face say together, and what it rests on. Thesis 6.3."""
+"""The belief of one face: its touches, their accumulated evidence and the answer. Thesis 6.3.
+
+`extend_scan` adds a touch. Where the image matches a predicted pose, the touch is taken there;
+otherwise it is read by itself first. Its lattices join those of the other touches, and the
+evidence of all touches is located in the database.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.answer import (
-    LocatedComposite,
+    ScanHypothesis,
+    answer_scan,
+    distinct_places,
+    locate_evidence,
+    refine_last_pose,
 )
 from recognizer.scan.lattice import (
+    LEAST_VARIANCE,
+    Evidence,
     PlaneLattice,
+    accumulate,
+    predict_pose,
+    predicted_fit,
+    refine_agreement,
+    same_lattice,
+    seed_lattice,
 )
-from recognizer.scan.mosaic.planar import PlacedTouch
-from recognizer.scan.settings import ScanSettings
+from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief, relative_pose
+from recognizer.scan.path import follow_path, known_steps
 from recognizer.scan.views import (
     LatticeView,
+    LatticeViews,
+    ScanSettings,
     TouchPoses,
+    estimate_poses,
+    flat_views,
+    is_definite,
+    is_unmeasured,
+    position_sd_mm,
+    predicted_view,
+    round_views,
+    stack_views,
 )
+from recognizer.touch.belief import VerifiedHypothesis
+from recognizer.touch.felt_area import EarlierTouch
+from recognizer.touch.next_touch import PlaceHypothesis, propose_next
 from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import recognise_with_rivals
 from recognizer.touch.recognition import (
+    AMBIGUOUS,
+    NO_CONTACT,
+    NOT_ENCODED,
     TOO_FEW,
     Recognition,
     refusal,
 )
+from recognizer.touch.symbols.gain import Image, image_of_signal
 
 Array = NDArray[np.float64]
+Views = tuple[tuple[LatticeView, ...], ...]  #: of each touch
+
+FOLLOWED = 6  #: lattices of the plane
+CUT_OFF_NATS = 40.0  #: below the best lattice, from which one is dropped
+PREDICTING = 2  #: lattices whose predictions a touch is fitted to
+MOST_NOISE = 0.4  #: standard deviation of psi, beyond which a touch shows no symbols
+MOST_OUTLIERS = 3  #: touches in a row that may disagree while the answer holds
+MOST_POSITION_SD_MM = 0.6  #: of an answer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanBelief:
-    """The touches of one face so far and what they say together; `extend_scan` returns the next."""
+    """The touches of one face and their answer; `extend_scan` returns the next value."""
 
     reader: Reader
     settings: ScanSettings
     touches: tuple[PlacedTouch, ...]  #: those with contact
     touch_poses: TouchPoses | None
-    views: tuple[tuple[tuple[LatticeView, ...], ...], ...]  #: of each encoding, of each touch
-    lattices: tuple[tuple[PlaneLattice, ...], ...]  #: of each encoding, best first
-    astray: int  #: touches in a row that agree with nothing that the others say
-    told: tuple[str | None, str | None] | None  #: object and face by a touch that agreed
-    leading: LocatedComposite | None  #: the likeliest place, whether it is the answer or not
-    recognition: Recognition  #: of the probe's pose at the last touch
-    places: tuple[LocatedComposite, ...] = ()  #: that the face may be touched at, best first
-    begun: int = 0  #: how often a new belief began, because touches did not belong together
+    views: tuple[Views, ...]  #: of each array
+    lattices: tuple[tuple[PlaneLattice, ...], ...]  #: of each array, best first
+    recognition: Recognition  #: with the probe's pose at the last touch
+    places: tuple[ScanHypothesis, ...] = ()  #: likely places of the face, best first
+    outlier_run: int = 0  #: touches in a row that disagree with the others
+    #: object and face, once confirmed by at least one consistent touch
+    confirmed_face: tuple[str | None, str | None] | None = None
+    resets: int = 0  #: how often inconsistent touches began a new belief
+
+    @property
+    def best(self) -> ScanHypothesis | None:
+        """The likeliest place, accepted or not."""
+        return self.places[0] if self.places else None
 
 
 def begin_scan(reader: Reader, settings: ScanSettings | None = None) -> ScanBelief:
     """Return a scan without touches."""
-    none = tuple(() for _ in reader.prepared)
-    limits = settings or ScanSettings()
-    return ScanBelief(reader, limits, (), None, none, none, 0, None, None, refusal(0, TOO_FEW))
+    none: tuple[tuple[()], ...] = tuple(() for _ in reader.prepared)
+    return ScanBelief(reader, settings or ScanSettings(), (), None, none, none, refusal(0, TOO_FEW))
+
+
+def read_scan(
+    reader: Reader, touches: Iterable[PlacedTouch], settings: ScanSettings | None = None
+) -> Recognition:
+    """Return object and face of a scan, and the probe's pose at its last touch.
+
+    Parameters
+    ----------
+    touches
+        Of one face, in their order, each with a pose by the arm or a step from the touch before.
+
+    Raises
+    ------
+    MosaicError
+        Another sensor's image, or a touch without a frame.
+    """
+    scan = begin_scan(reader, settings)
+    for touch in touches:
+        scan = extend_scan(scan, touch)
+    return scan.recognition
+
+
+def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
+    """Return a scan with one touch added.
+
+    A touch without contact is answered by that reason and not kept. A touch with an answer of its
+    own that contradicts the prediction begins a new belief: the probe or the object slipped, or
+    the object was changed.
+
+    Raises
+    ------
+    MosaicError
+        Another sensor's image, or a touch without a frame.
+    """
+    reader = scan.reader
+    if not touch.signal.contact:
+        answer = refusal(touch.seq, NO_CONTACT)
+        step = propose_next(reader, touch.signal, answer, ())
+        return replace(scan, recognition=replace(answer, next=step))
+    touches = (*scan.touches, replace(touch, decoded=None))
+    finest = min(embossed.style.pitch_mm for embossed in reader.lab.arrays)
+    by_hand = any(is_unmeasured(each, finest) for each in touches)
+    poses = None if by_hand else estimate_poses(reader, touches, scan.touch_poses)
+    joined = _join_touch(scan, touches, poses, use_prediction=not by_hand)
+    if joined.alone is None and not joined.agrees:  # the prediction fails: read the touch alone
+        joined = _join_touch(scan, touches, poses, use_prediction=False)
+    answer, agrees, alone = joined.answer, joined.agrees, joined.alone
+    if alone and scan.touches and answer and not _is_one_place(answer, alone, finest):
+        if scan.confirmed_face is not None:
+            return _reset(scan, touch)
+        alone = answer = refusal(touch.seq, AMBIGUOUS, margin=answer.margin)
+    if alone and not answer and scan.confirmed_face is not None:  # the others contradict it
+        return _reset(scan, touch)
+    if alone is not None and not answer and (alone or not scan.touches):
+        answer, agrees = alone, agrees or bool(alone)
+    run = 0 if agrees or len(touches) == 1 else scan.outlier_run + 1
+    if scan.confirmed_face is not None and not by_hand and run > MOST_OUTLIERS:
+        return _reset(scan, *touches[-run:])
+    answer, confirmed = _accept(scan, answer, run, 0 if by_hand else MOST_OUTLIERS)
+    own = not agrees and bool(joined.rivals)
+    rivals: Sequence[PlaceHypothesis] = joined.rivals if own else joined.found
+    away = relative_pose(joined.touch_poses.poses[-1], joined.touch_poses.poses[:-1])
+    earlier = [EarlierTouch(p, one.signal) for p, one in zip(away, scan.touches, strict=True)]
+    step = propose_next(reader, touch.signal, answer, rivals, earlier)
+    return replace(
+        scan,
+        touches=touches,
+        touch_poses=joined.touch_poses,
+        views=joined.views,
+        lattices=joined.lattices,
+        recognition=replace(answer, next=step),
+        places=tuple(joined.found),
+        outlier_run=run,
+        confirmed_face=confirmed,
+    )
+
+
+def _reset(scan: ScanBelief, *touches: PlacedTouch) -> ScanBelief:
+    """Return a belief that rests on the last touches alone."""
+    fresh = begin_scan(scan.reader, scan.settings)
+    first, *rest = touches
+    if first.believed is None:
+        origin = planar_belief(np.zeros(3), scan.settings.first)
+        first = replace(first, stepped=None, believed=origin)
+    for touch in (first, *rest):
+        fresh = extend_scan(fresh, touch)
+    return replace(fresh, resets=scan.resets + 1)
+
+
+def _is_one_place(answer: Recognition, alone: Recognition, pitch_mm: float) -> bool:
+    """Whether two answers name one place."""
+    if (answer.object, answer.face) != (alone.object, alone.face):
+        return False
+    away = math.hypot(answer.x_mm - alone.x_mm, answer.y_mm - alone.y_mm)
+    turn = abs(math.remainder(answer.theta_deg - alone.theta_deg, 360.0))
+    return away < pitch_mm / 2 and turn < 45.0
+
+
+def _accept(
+    scan: ScanBelief, answer: Recognition, outlier_run: int, most_outliers: int
+) -> tuple[Recognition, tuple[str | None, str | None] | None]:
+    """Return an answer or its refusal, and the confirmed face.
+
+    An inconsistent touch is answered by the others, but only while it is one of few. Two different
+    answers about one face exclude each other: both are refused. A place with a large standard
+    deviation is refused.
+    """
+    if not answer:
+        return answer, scan.confirmed_face
+    named = answer.object, answer.face
+    if scan.confirmed_face is not None and named != scan.confirmed_face:
+        return refusal(answer.seq, AMBIGUOUS, margin=answer.margin), None
+    if outlier_run > 0 and (scan.confirmed_face is None or outlier_run > most_outliers):
+        return refusal(answer.seq, NOT_ENCODED, margin=answer.margin), scan.confirmed_face
+    if answer.covariance is not None and position_sd_mm(answer.covariance) > MOST_POSITION_SD_MM:
+        return refusal(answer.seq, TOO_FEW, margin=answer.margin), scan.confirmed_face or named
+    return answer, named
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _JoinedTouch:
+    """The last touch together with those before it."""
+
+    views: tuple[Views, ...]  #: as `ScanBelief.views`
+    alone: Recognition | None  #: the touch by itself; None: it matches its prediction, not read
+    rivals: list[VerifiedHypothesis]  #: likely places of the touch by itself
+    touch_poses: TouchPoses  #: of all touches
+    lattices: tuple[tuple[PlaneLattice, ...], ...]  #: as `ScanBelief.lattices`
+    found: list[ScanHypothesis]  #: places, best first
+    answer: Recognition
+    agrees: bool  #: whether the last touch agrees with the best of them
+
+
+def _join_touch(
+    scan: ScanBelief,
+    touches: Sequence[PlacedTouch],
+    touch_poses: TouchPoses | None,
+    *,
+    use_prediction: bool,
+) -> _JoinedTouch:
+    """Join the last of the touches with those before it.
+
+    Parameters
+    ----------
+    touch_poses
+        Of all touches; None: a step was not measured.
+    use_prediction
+        Whether the touch may be taken at its predicted pose, if its image matches.
+    """
+    reader, seq = scan.reader, touches[-1].seq
+    images, views, alone, rivals = _view_touch(scan, touches[-1], touch_poses, use_prediction)
+    steps = known_steps(touches, scan.settings)
+    lattices: list[tuple[PlaneLattice, ...]] = []
+    found: list[ScanHypothesis] = []
+    poses_by_array: list[TouchPoses] = []
+    for k, (embossed, _, _) in enumerate(reader.prepared):
+        pitch, stacked = embossed.style.pitch_mm, stack_views(views[k])
+        path, poses = None, touch_poses
+        if poses is None:
+            path = follow_path(embossed, views[k], steps, reader.settings.hypotheses)
+            poses = path.touch_poses(steps[0].covariance)
+            evidence = _evidence_along(stacked, poses, pitch)
+        else:
+            evidence = _evidence_of(stacked, poses, scan.lattices[k], pitch)
+        poses_by_array.append(poses)
+        lattices.append(tuple(item.agreement.lattice for item in evidence))
+        found += locate_evidence(embossed, evidence, path, reader.settings.hypotheses)
+    found = distinct_places(found)
+    answer, agrees, best_k = refusal(seq, TOO_FEW), False, 0
+    if found:
+        best_k = next(k for k, each in enumerate(reader.prepared) if each[0] is found[0].embossed)
+    poses = poses_by_array[best_k]
+    if found and found[0].evidence.agreement.touches > 1:
+        answer = answer_scan(reader, found, seq)
+        agrees = bool(found[0].evidence.agreement.chosen[-1] >= 0)
+        if answer:
+            found[0], agrees = _pose_last_touch(reader, best_k, images[best_k], found[0], poses)
+            answer = answer_scan(reader, found, seq)
+    return _JoinedTouch(views, alone, rivals, poses, tuple(lattices), found, answer, agrees)
+
+
+def _view_touch(
+    scan: ScanBelief, touch: PlacedTouch, touch_poses: TouchPoses | None, use_prediction: bool
+) -> tuple[list[Image], tuple[Views, ...], Recognition | None, list[VerifiedHypothesis]]:
+    """Return the last touch's images and all views by array, its own answer and places.
+
+    The answer is None where the touch matches its prediction.
+    """
+    reader = scan.reader
+    images = [
+        image_of_signal(reader.sensor, touch.signal, each.style.height_mm, reader.settings)
+        for each in reader.lab.arrays
+    ]
+    near = [_predicted_poses(each[:PREDICTING], touch_poses) for each in scan.lattices]
+    new: list[tuple[LatticeView, ...]] = [() for _ in images]
+    if use_prediction and scan.recognition and scan.outlier_run == 0:
+        for k, (_, template, _) in enumerate(reader.prepared):
+            new[k] = predicted_view(images[k], template, reader.settings.first, near[k])
+    alone: Recognition | None = None
+    rivals: list[VerifiedHypothesis] = []
+    if not any(new):
+        alone, rivals = recognise_with_rivals(reader, touch.signal, touch.seq)
+        for k, (embossed, template, bank) in enumerate(reader.prepared):
+            own = [one.fit for one in rivals if one.embossed is embossed and one.bend is None]
+            new[k] = flat_views(images[k], template, bank, reader.settings.first, near[k], own)
+            if embossed.radii_mm:
+                new[k] += round_views(images[k], template, bank, reader, embossed, near[k])
+    views = tuple(
+        (*before, tuple(view for view in each if view.fit.noise <= MOST_NOISE))
+        for before, each in zip(scan.views, new, strict=True)
+    )
+    return images, views, alone, rivals
+
+
+def _pose_last_touch(
+    reader: Reader, k: int, image: Image, best: ScanHypothesis, touch_poses: TouchPoses
+) -> tuple[ScanHypothesis, bool]:
+    """Return a place with the pose of the last touch, and whether that touch agrees with it."""
+    if best.evidence.agreement.chosen[-1] >= 0:
+        finer = refine_last_pose(reader, image, reader.prepared[k][1], best)
+        belief = reader.settings.belief
+        many = len(best.fit.cells) >= belief.many_inliers
+        least = belief.explained_by_many if many else belief.explained
+        if finer.explained >= least and is_definite(finer.fit.covariance):
+            return finer, True
+    return replace(best, fit=predicted_fit(best.evidence, touch_poses)), False
+
+
+def _predicted_poses(lattices: Sequence[PlaneLattice], touch_poses: TouchPoses | None) -> Array:
+    """Return the poses (k, 3) of the last touch that lattices predict."""
+    if touch_poses is None:
+        return np.zeros((0, 3))
+    return np.array([predict_pose(each, touch_poses)[0] for each in lattices]).reshape(-1, 3)
+
+
+def _evidence_along(
+    views: LatticeViews, touch_poses: TouchPoses, pitch_mm: float
+) -> list[Evidence]:
+    """Return the evidence that agrees with the array along a path; empty if none does."""
+    along = PlaneLattice(np.zeros(3), LEAST_VARIANCE * np.eye(3))
+    agreement = refine_agreement(views, touch_poses, along, pitch_mm)
+    found = accumulate(views, touch_poses, agreement, pitch_mm)
+    return [] if found is None else [found]
+
+
+def _evidence_of(
+    views: LatticeViews,
+    touch_poses: TouchPoses,
+    before: Sequence[PlaneLattice],
+    pitch_mm: float,
+) -> list[Evidence]:
+    """Return the evidence of the followed lattices and of those of the last touch, best first."""
+    last = len(touch_poses.poses) - 1
+    every = [refine_agreement(views, touch_poses, each, pitch_mm) for each in before]
+    followed = {int(agreement.chosen[last]) for agreement in every[:1]}
+    for view in np.flatnonzero(views.touch == last).tolist():
+        if view not in followed:
+            seed = seed_lattice(views, touch_poses, view)
+            every.append(refine_agreement(views, touch_poses, seed, pitch_mm))
+    every.sort(key=lambda agreement: -agreement.score)
+    at = touch_poses.poses[last]
+    distinct: list[PlaneLattice] = []
+    found: list[Evidence] = []
+    for agreement in every:
+        if any(same_lattice(agreement.lattice, other, at, pitch_mm) for other in distinct):
+            continue
+        distinct.append(agreement.lattice)
+        evidence = accumulate(views, touch_poses, agreement, pitch_mm)
+        if evidence is not None:
+            found.append(evidence)
+        if len(distinct) == FOLLOWED:
+            break
+    found.sort(key=lambda item: -item.fit.value)
+    return [item for item in found if item.fit.value > found[0].fit.value - CUT_OFF_NATS]

@@ -1,31 +1,38 @@
-"""Where touches stand whose motion nobody measured: a path through registered places. Thesis 6.3.
+"""Poses of touches without measured motion: a path through registered places. Thesis 4.3, 6.3.
 
-Views of touches + what is known of each step -> the path that explains all touches best, in array
+Views of touches + the knowledge of each step -> the path that explains all touches best, in array
 axes (cell (0, 0) of the array has its lower left corner at the origin, y against rows; mm, rad).
-What one touch leaves open (symbols look alike a pitch away) its neighbours and the database decide:
-each touch is at one of the places that it may be by itself, and a step from place to place costs
-what its length says. A. J. Viterbi, IEEE Trans. Inf. Theory 13 (1967) 260.
+One touch alone is ambiguous (symbols look alike a pitch away); its neighbours and the database
+decide: each touch is at one of its own likely places, and a step from place to place costs the
+nats of its length. A. J. Viterbi, IEEE Trans. Inf. Theory 13 (1967) 260.
 
-A path that the touches themselves would not have shown, had the database not asked for it, is worth
-little: `log_freedom` says how many other paths they allow as well.
+A path that the touches would not show without the database is weak evidence: `path_ambiguity`
+counts the other paths that they allow. Steps are poses (3,) of a touch in the axes of an earlier
+one: x, y (mm), theta (rad).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.scan.lattice import CELL_NATS, LEFT_OUT_NATS
 from recognizer.scan.mosaic.planar import (
+    PlacedTouch,
     PlanarBelief,
+    compose_poses,
+    composed_covariance,
+    pose_difference,
+    relative_covariance,
+    relative_pose,
     wrap_angle,
 )
-from recognizer.scan.settings import PATHS, ScanSettings
-from recognizer.scan.steps import log_freedom, step_between
-from recognizer.scan.views import LatticeView, TouchPoses
+from recognizer.scan.views import LatticeView, ScanSettings, TouchPoses
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import find_hypotheses
@@ -35,157 +42,222 @@ from recognizer.touch.symbols.fit import Fit
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+MOST_PLACES = 200  #: of each touch
+MOST_SKIPPED = 3  #: touches in a row
+SHIFTS = 3  #: pitches, each way, of alternative paths
+PLACED_SD = (0.4, 0.4, 0.01)  #: of x, y (mm) and the turn (rad) of a touch on the path
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RegisteredPath:
-    """Where touches stand as their images and the database have it."""
+    """Poses of touches by their images and the database."""
 
-    poses: Array  #: (n, 3) in array axes; of a touch that is left out, that of one beside it
+    poses: Array  #: (n, 3) in array axes; a skipped touch has that of a neighbour
     placed: NDArray[np.bool_]  #: (n,)
     margin: float  #: nats over the best path that ends elsewhere
-    log_freedom: float  #: log of the number of paths that the touches allow, by their weights
+    ambiguity: float  #: log of the number of paths that the touches allow, by their weights
+
+    def touch_poses(self, skipped: Array) -> TouchPoses:
+        """Return the poses with covariances; `skipped` (3, 3) is that of skipped touches."""
+        spread = np.where(self.placed[:, None, None], np.diag(np.square(PLACED_SD)), skipped)
+        return TouchPoses(self.poses, spread, None)
 
 
 def follow_path(
-    encoding: EmbossedArray,
+    embossed: EmbossedArray,
     views: Sequence[Sequence[LatticeView]],
     steps: Sequence[PlanarBelief],
-    hypotheses: HypothesisSettings,
-    settings: ScanSettings,
+    settings: HypothesisSettings,
 ) -> RegisteredPath:
-    """Return the likeliest path; where no touch may be anywhere, one without places.
+    """Return the likeliest path; without placed touches where no touch has a place.
 
     Parameters
     ----------
     views
         Of each touch.
     steps
-        To each touch from the one before, `steps_of`.
+        To each touch from the one before, by `known_steps`.
     """
-    places = [_places_of_touch(encoding, each, hypotheses) for each in views]
+    places = [_places_of_touch(embossed, each, settings) for each in views]
     trellis = _Trellis([], [])
     for t in range(len(places)):
-        _reach_touch(encoding, places, steps, t, trellis, settings)
+        _reach_touch(embossed, places, steps, t, trellis)
     ends = [float(each.max(initial=-math.inf)) for each in trellis.scores]
-    ends = [end - settings.left_out * (len(ends) - 1 - t) for t, end in enumerate(ends)]
+    ends = [end - LEFT_OUT_NATS * (len(ends) - 1 - t) for t, end in enumerate(ends)]
     last = int(np.argmax(ends))
     if not math.isfinite(ends[last]):
         return RegisteredPath(np.zeros((len(views), 3)), np.zeros(len(views), np.bool_), 0.0, 0.0)
     scores = trellis.scores[last]
     end = int(scores.argmax())
-    elsewhere = _lie_elsewhere(encoding, places[last], end)
+    elsewhere = _lie_elsewhere(embossed, places[last], end)
     margin = float(scores[end] - scores[elsewhere].max(initial=-math.inf))
     chosen: dict[int, int] = {}
     t, n = last, end
     while t >= 0:
         chosen[t] = n
-        t, n = trellis.came[t][n]
+        t, n = trellis.previous[t][n]
     poses, before = np.zeros((len(places), 3)), min(chosen)
     for t in range(len(places)):
         before = t if t in chosen else before
         poses[t] = places[before].poses[chosen[before]]
-    poses = poses[0] + _on_torus(encoding, poses - poses[0])
+    poses = poses[0] + _on_torus(embossed, poses - poses[0])
     placed = np.array([t in chosen for t in range(len(places))])
     fits = {t: places[t].fits[n] for t, n in sorted(chosen.items())}
-    freedom = log_freedom(
-        fits, poses, steps, encoding.style.pitch_mm, encoding.array.order, settings
-    )
-    return RegisteredPath(poses, placed, margin, freedom)
+    pitch, order = embossed.style.pitch_mm, embossed.array.order
+    return RegisteredPath(poses, placed, margin, path_ambiguity(fits, poses, steps, pitch, order))
 
 
-def path_touch_poses(path: RegisteredPath, steps: Sequence[PlanarBelief]) -> TouchPoses:
-    """Return where the touches of a path stand, in array axes."""
-    sure = np.diag(np.square(PATHS.sure))
-    spread = np.where(path.placed[:, None, None], sure, steps[0].covariance)
-    return TouchPoses(path.poses, spread, None)
+def known_steps(touches: Sequence[PlacedTouch], settings: ScanSettings) -> list[PlanarBelief]:
+    """Return the step to each touch from the one before; unknown for the first one."""
+    unknown = PlanarBelief(np.zeros(3), np.diag(np.square(settings.by_hand)))
+    steps = [unknown]
+    for before, touch in pairwise(touches):
+        if touch.stepped is not None:
+            steps.append(touch.stepped)
+        elif before.believed is not None and touch.believed is not None:
+            a, b = before.believed, touch.believed
+            spread = relative_covariance(a.pose, b.pose, a.covariance, b.covariance)
+            steps.append(PlanarBelief(relative_pose(a.pose, b.pose), spread))
+        else:
+            steps.append(unknown)
+    return steps
+
+
+def step_between(steps: Sequence[PlanarBelief], a: int, b: int) -> PlanarBelief:
+    """Return the step from a touch to a later one."""
+    pose, covariance = steps[a + 1].pose, steps[a + 1].covariance
+    for more in steps[a + 2 : b + 1]:
+        covariance = composed_covariance(pose, more.pose, covariance, more.covariance)
+        pose = compose_poses(pose, more.pose)
+    return PlanarBelief(pose, covariance)
+
+
+def path_ambiguity(
+    fits: Mapping[int, Fit],
+    poses: Array,
+    steps: Sequence[PlanarBelief],
+    pitch_mm: float,
+    order: int,
+) -> float:
+    """Return -log of the probability of a path by the touches alone.
+
+    Whole pitches away, a touch shows known cells with other symbols, or with the right ones by
+    chance.
+
+    Parameters
+    ----------
+    fits
+        Of the touches that are placed, in their order.
+    poses
+        (n, 3) of all touches, in array axes.
+    order
+        Number of symbols.
+    """
+    known: dict[tuple[int, int], Array] = {}
+    total, before = 0.0, -1
+    near = range(-SHIFTS, SHIFTS + 1)
+    for t, fit in fits.items():
+        cells = fit.cells + np.rint((poses[t, :2] - (fit.x_mm, fit.y_mm)) / pitch_mm).astype(int)
+        bounded = np.maximum(fit.scores, -CELL_NATS)
+        if before >= 0:
+            step, own = step_between(steps, before, t), _probabilities(bounded)
+            values = {}
+            for shift in ((i, j) for i in near for j in near):
+                shifted = poses[t] + np.array([*shift, 0.0]) * pitch_mm
+                away = pose_difference(relative_pose(poses[before], shifted), step.pose)
+                cost = 0.5 * float(away @ np.linalg.solve(step.covariance, away))
+                values[shift] = _log_agreement(known, cells + shift, own, order) - cost
+            total += float(np.logaddexp.reduce(list(values.values()))) - values[0, 0]
+        for cell, each in zip(map(tuple, cells.tolist()), bounded, strict=True):
+            known[cell] = known[cell] + each if cell in known else each
+        before = t
+    return total
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _TouchPlaces:
-    """Where one touch may be by itself."""
+    """Likely places of one touch by itself."""
 
-    fits: tuple[Fit, ...]  #: under which it is there, one of each place
+    fits: tuple[Fit, ...]  #: the fit of each place
     poses: Array  #: (k, 3) in array axes
     faces: Ints  #: (k,)
-    losses: Array  #: (k,) nats below what any symbols could reach, 0 or less
+    losses: Array  #: (k,) nats below the best symbols of any kind, 0 or less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trellis:
-    """Of each touch so far, how likely its places are and from where the best path comes."""
+    """The best path to each place of each touch so far."""
 
     scores: list[Array]  # (k,) nats
-    came: list[list[tuple[int, int]]]  # touch and place; (-1, -1): a path begins there
+    previous: list[list[tuple[int, int]]]  # touch and place; (-1, -1): a path begins here
 
 
 def _reach_touch(
-    encoding: EmbossedArray,
+    embossed: EmbossedArray,
     places: Sequence[_TouchPlaces],
     steps: Sequence[PlanarBelief],
     t: int,
     trellis: _Trellis,
-    settings: ScanSettings,
 ) -> None:
-    """Add a touch to a trellis: its places are reached from those of a touch before, or begin."""
+    """Add a touch to a trellis: paths reach its places from an earlier touch, or begin there."""
     at = places[t]
-    best = np.full(len(at.poses), -settings.left_out * t)  # all before are left out
-    fro = [(-1, -1)] * len(best)
-    for k in range(t - 1, max(t - 1 - PATHS.skipped, 0) - 1, -1):
+    best = np.full(len(at.poses), -LEFT_OUT_NATS * t)  # all earlier touches are left out
+    previous = [(-1, -1)] * len(best)
+    for k in range(t - 1, max(t - 1 - MOST_SKIPPED, 0) - 1, -1):
         if not len(trellis.scores[k]):
             continue
         step = step_between(steps, k, t)
-        reached = trellis.scores[k][:, None] - _step_costs(encoding, places[k], at, step)
-        reached -= settings.left_out * (t - 1 - k)
+        reached = trellis.scores[k][:, None] - _step_costs(embossed, places[k], at, step)
+        reached -= LEFT_OUT_NATS * (t - 1 - k)
         nearest = reached.argmax(axis=0)
         value = reached[nearest, np.arange(len(best))]
         for n in np.flatnonzero(value > best).tolist():
-            best[n], fro[n] = value[n], (k, int(nearest[n]))
+            best[n], previous[n] = value[n], (k, int(nearest[n]))
     trellis.scores.append(best + at.losses)
-    trellis.came.append(fro)
+    trellis.previous.append(previous)
 
 
 def _places_of_touch(
-    encoding: EmbossedArray, views: Sequence[LatticeView], settings: HypothesisSettings
+    embossed: EmbossedArray, views: Sequence[LatticeView], settings: HypothesisSettings
 ) -> _TouchPlaces:
-    """Return the places that a touch may be at."""
-    fits = tuple(view.fit for view in views if not view.led)
-    wide = replace(settings, kept=PATHS.places)
-    found = find_hypotheses(encoding, fits, wide)[: PATHS.places]
+    fits = tuple(view.fit for view in views if not view.predicted)
+    found = find_hypotheses(embossed, fits, replace(settings, kept=MOST_PLACES))[:MOST_PLACES]
     most = max((fit.value for fit in fits), default=0.0)
+    poses = [_pose_in_array(embossed, fits[one.fit], one) for one in found]
     return _TouchPlaces(
         fits=tuple(fits[one.fit] for one in found),
-        poses=np.array([_pose_in_array(encoding, fits[one.fit], one) for one in found]).reshape(
-            -1, 3
-        ),
+        poses=np.array(poses).reshape(-1, 3),
         faces=np.array([one.face for one in found], np.int64),
         losses=np.array([one.score - most for one in found]),
     )
 
 
-def _pose_in_array(encoding: EmbossedArray, fit: Fit, place: Hypothesis) -> Array:
-    pitch = encoding.style.pitch_mm
-    return np.array([fit.x_mm + place.column * pitch, fit.y_mm - place.row * pitch, fit.theta_rad])
+def _pose_in_array(embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis) -> Array:
+    pitch = embossed.style.pitch_mm
+    return np.array(
+        [fit.x_mm + hypothesis.column * pitch, fit.y_mm - hypothesis.row * pitch, fit.theta_rad]
+    )
 
 
-def _lie_elsewhere(encoding: EmbossedArray, places: _TouchPlaces, at: int) -> NDArray[np.bool_]:
-    """Whether places (k,) are others than one of them: half a pitch or an eighth turn away."""
-    away = np.abs(_on_torus(encoding, places.poses - places.poses[at]))
-    near = (away[:, :2].max(axis=1) < encoding.style.pitch_mm / 2) & (away[:, 2] < math.pi / 4)
+def _lie_elsewhere(embossed: EmbossedArray, places: _TouchPlaces, at: int) -> NDArray[np.bool_]:
+    """Whether places (k,) differ from one of them by half a pitch, an eighth turn or the face."""
+    away = np.abs(_on_torus(embossed, places.poses - places.poses[at]))
+    near = (away[:, :2].max(axis=1) < embossed.style.pitch_mm / 2) & (away[:, 2] < math.pi / 4)
     return np.asarray(~(near & (places.faces == places.faces[at])))
 
 
-def _on_torus(encoding: EmbossedArray, away: Array) -> Array:
-    """Return differences (..., 3) of poses the short way round."""
-    array, pitch = encoding.array, encoding.style.pitch_mm
+def _on_torus(embossed: EmbossedArray, away: Array) -> Array:
+    """Return differences (..., 3) of poses the short way round the torus."""
+    array, pitch = embossed.array, embossed.style.pitch_mm
     size = np.array([array.columns * pitch, array.rows * pitch, math.tau])
     return np.asarray(away - size * np.rint(away / size))
 
 
 def _step_costs(
-    encoding: EmbossedArray, a: _TouchPlaces, b: _TouchPlaces, step: PlanarBelief
+    embossed: EmbossedArray, a: _TouchPlaces, b: _TouchPlaces, step: PlanarBelief
 ) -> Array:
-    """Return what steps from places to places (k, m) cost, nats; infinite from face to face."""
-    away = _on_torus(encoding, b.poses[None] - a.poses[:, None])
+    """Return costs (k, m) of steps from places to places, nats; infinite from face to face."""
+    away = _on_torus(embossed, b.poses[None] - a.poses[:, None])
     c, s = np.cos(a.poses[:, 2, None]), np.sin(a.poses[:, 2, None])
     along = np.stack(
         [
@@ -197,3 +269,25 @@ def _step_costs(
     )
     cost = 0.5 * np.einsum("kmi,ij,kmj->km", along, np.linalg.inv(step.covariance), along)
     return np.where(a.faces[:, None] == b.faces[None], cost, np.inf)
+
+
+def _log_agreement(
+    known: Mapping[tuple[int, int], Array], cells: Ints, own: Array, order: int
+) -> float:
+    """Return the log-likelihood ratio that cells show their known symbols, not random ones."""
+    both = [
+        (known[at], share)
+        for at, share in zip(map(tuple, cells.tolist()), own, strict=True)
+        if at in known
+    ]
+    if not both:
+        return 0.0
+    earlier = _probabilities(np.array([one for one, _ in both]))
+    alike = (earlier * [share for _, share in both]).sum(axis=1)
+    return float(np.log(order * alike).sum())
+
+
+def _probabilities(scores: Array) -> Array:
+    """Return probabilities (m, q + 1) of the symbols of cells by their log-likelihoods."""
+    each = np.exp(scores - scores.max(axis=1, keepdims=True))
+    return np.asarray(each / each.sum(axis=1, keepdims=True))

@@ -1,15 +1,20 @@
-"""A scan as a program has it: touches in, the belief so far out. Thesis 4.3, 6.3.
+"""A scan of one object: touches in, the answer so far out. Thesis 4.3, 6.3.
 
-Where a touch stands against the first one of its face is what the arm says (its pose, with a
-covariance where it gives one), where overlapping images show it if that is vague
-(`recognizer.scan.mosaic`), or, where nobody measured a step, on a path through registered places
-(`path`). A pose that does not lie in the plane of
-the touches so far is of another face; what faces say of the object is joined (`faces`).
+The pose of a touch against the first one of its face comes from the arm (with a covariance where it
+gives one), from overlapping images where the arm is vague (`recognizer.scan.mosaic`), or from a
+path through registered places where a step was not measured (`path`). A pose out of the plane of
+the touches so far belongs to another face.
+
+Each likely place of a face names an object and, with known motion, its pose. A place loses the nats
+by which the touches of every other face contradict an object there, up to a bound: the object may
+have been changed in between. Another face may decide an ambiguous one, and two ambiguous faces may
+decide it together.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -18,9 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.arm.carried import SensorPose
-from recognizer.scan.belief import ScanBelief, begin_scan
-from recognizer.scan.faces import TouchedFace, contradict, join_faces
-from recognizer.scan.grow import extend_scan
+from recognizer.scan.answer import ScanHypothesis
+from recognizer.scan.belief import ScanBelief, begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import (
     PlacedTouch,
     PlanarBelief,
@@ -28,24 +32,34 @@ from recognizer.scan.mosaic.planar import (
     planar_covariance,
     planar_pose,
 )
-from recognizer.scan.settings import ScanSettings
+from recognizer.scan.views import ScanSettings
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import Lab
+from recognizer.touch.pose import face_pose, pose_on_object
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognition import Recognition
+from recognizer.touch.recognise import answer_at
+from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, Recognition, RunnerUp
 from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
 
+FACING_RAD = math.radians(20)  #: turned further against a face, a touch is on another one
+ABOVE_MM = 6.0  #: as far above or below a face, too
+CHANGED_NATS = 20.0  #: most that another face contributes: the object may have been changed
+#: differences of one object's pose as two faces give it: an edge, errors of plate and arm
+OBJECT_MM, OBJECT_RAD = 6.0, math.radians(6)
+
+_OPEN = (AMBIGUOUS, BY_CHANCE)  #: reasons of touches that leave a choice of registered places
+
 
 @dataclass(frozen=True, slots=True)
 class PlaceShare:
-    """A place that touches may have felt, and the share of the belief that it has."""
+    """A likely place of the touches, and its share of the belief."""
 
     object: str
     face: str
     index: tuple[int, int]  #: row and column of the array's cell under the sensor's centre
-    share: float  #: 0 ... 1, as if one of the places that come into question is the right one
+    share: float  #: 0 ... 1, as if one of the likely places is the right one
 
 
 class Scan:
@@ -54,11 +68,11 @@ class Scan:
     Parameters
     ----------
     lab
-        What can be touched; or a reader of it that is there already.
+        The database, or a prepared reader of it.
     sensor
-        The one that feels all touches; the usual one if not given.
+        The sensor of all touches; the usual one if not given.
     settings
-        Limits.
+        Uncertainty of the motion where no covariance is given.
 
     Examples
     --------
@@ -79,21 +93,21 @@ class Scan:
     ) -> None:
         self._reader = lab if isinstance(lab, Reader) else Reader(lab, sensor or SensorType())
         self._settings = settings or ScanSettings()
-        self._faces = [self._new_face()]  # the last one is being touched
+        self._faces = [self._new_face()]  # the last one is touched now
         self._answer = self._faces[0].belief.recognition
-        self._changed = 0
+        self._changes = 0
 
     @property
     def answer(self) -> Recognition:
-        """The best answer so far, of the probe's pose at the touch `answer.seq`; or why none.
+        """The best answer so far, with the probe's pose at the touch `answer.seq`, or a refusal.
 
-        A later touch that cannot be read does not take it back; one that contradicts it does.
+        A later touch that cannot be read does not withdraw it; one that contradicts it does.
         """
         return self._answer
 
     @property
     def places(self) -> tuple[PlaceShare, ...]:
-        """Places of the face touched last that come into question, likeliest first; shares of 1."""
+        """Likely places of the face touched last, likeliest first; their shares add up to 1."""
         found = self._faces[-1].belief.places
         scores = np.array([one.score for one in found])
         shares = np.exp(scores - scores.max()) if len(found) else scores
@@ -104,13 +118,13 @@ class Scan:
 
     @property
     def touches(self) -> int:
-        """How many touches the belief rests on: those with contact."""
+        """Number of touches that the belief rests on: those with contact."""
         return sum(len(face.belief.touches) for face in self._faces)
 
     @property
     def changes(self) -> int:
-        """How often what was told was given up: the object has slipped, or is another one."""
-        return self._changed
+        """How often an answer was given up: the object slipped or was replaced."""
+        return self._changes
 
     def add(
         self,
@@ -119,17 +133,17 @@ class Scan:
         *,
         seq: int | None = None,
     ) -> Recognition:
-        """Return what all touches say by now, with the pose of the probe at this one.
+        """Return the answer of all touches so far, with the probe's pose at this one.
 
         Parameters
         ----------
         touch
-            Of the same object as those before: counts (rows, columns), a signal, or a touch of
-            `recognizer.touch.contacts`. Where nobody knows how the probe moved, touches of a face
-            should lie within 8 mm or so of the one before (`ScanSettings.by_hand`).
+            Of one object: counts (rows, columns), a signal, or a touch of
+            `recognizer.touch.contacts`. Without poses, touches of a face should lie within 8 mm
+            or so of the one before (`ScanSettings.by_hand`).
         pose
             (4, 4) T_base_sensor, mm, in any fixed frame; with the arm's own covariance if it
-            is a `SensorPose`; by default the touch's own, if it has one. It tells when another
+            is a `SensorPose`; by default the touch's own, if it has one. It shows when another
             face is touched.
         seq
             Number of the touch; counted if not given.
@@ -145,28 +159,29 @@ class Scan:
         signal = touch if isinstance(touch, Signal) else self._reader.signal(touch)
         number = self.touches if given is None else given
         if signal.contact:
-            self._turn_to_face(pose)
+            self._select_face(pose)
         face = self._faces[-1]
         before = face.belief
         belief = extend_scan(before, face.places.place(signal, pose, number))
-        if belief.begun > before.begun:  # what was told so far may be true of another face
-            face = _Face(replace(belief, begun=before.begun), copy(face.places))
+        if belief.resets > before.resets:  # the earlier touches may be of another face
+            face = _Face(replace(belief, resets=before.resets), copy(face.places))
             self._faces.append(face)
-        face.belief = belief = replace(belief, begun=before.begun)
+        face.belief = belief = replace(belief, resets=before.resets)
         if not signal.contact:
             return belief.recognition
         face.places.keep(pose)
-        face.pose = None if pose is None else _matrix(pose)
+        face.T_base_probe = None if pose is None else _matrix(pose)
         found = self._join()
-        if found or not self._answer or (before.told is not None and belief.told is None):
+        withdrawn = before.confirmed_face is not None and belief.confirmed_face is None
+        if found or not self._answer or withdrawn:
             self._answer = found
         return found
 
     def _new_face(self) -> _Face:
         return _Face(begin_scan(self._reader, self._settings), TouchPlaces(self._settings))
 
-    def _turn_to_face(self, pose: SensorPose | ArrayLike | None) -> None:
-        """Let the face that a pose lies on be the last one, a new one if it lies on none."""
+    def _select_face(self, pose: SensorPose | ArrayLike | None) -> None:
+        """Move the face that contains a pose to the end of the list; a new one if none does."""
         if pose is None or self._faces[-1].places.holds(pose):
             return
         for k, face in enumerate(self._faces):
@@ -176,22 +191,13 @@ class Scan:
         self._faces.append(self._new_face())
 
     def _join(self) -> Recognition:
-        """Return what the last touch says, as those of other faces have it."""
-        *others, last = (TouchedFace(face.belief, face.pose) for face in self._faces)
-        if any(contradict(last, other, self._settings) for other in others):
-            self._faces = self._faces[-1:]
-            self._changed += 1
+        """Return the answer of the last face, decided by the other faces where it is open."""
+        *others, last = self._faces
+        if any(contradict(last, other) for other in others):
+            self._faces = [last]
+            self._changes += 1
             return last.belief.recognition
         return join_faces(last, others)
-
-
-@dataclass(slots=True)
-class _Face:
-    """A face that was touched."""
-
-    belief: ScanBelief
-    places: TouchPlaces
-    pose: Array | None = None  #: (4, 4) T_base_sensor of its last touch; None: not known
 
 
 class TouchPlaces:
@@ -200,7 +206,7 @@ class TouchPlaces:
     Parameters
     ----------
     settings
-        How well arms and hands are believed.
+        Uncertainty of poses and steps without a covariance.
     """
 
     def __init__(self, settings: ScanSettings) -> None:
@@ -210,21 +216,20 @@ class TouchPlaces:
         self._any = False  #: whether there was a touch
 
     def keep(self, pose: SensorPose | ArrayLike | None) -> None:
-        """Take a touch as one that later ones are placed against."""
+        """Keep the pose of a touch, which later touches are placed against."""
         if not self._any and pose is not None:
             self._T_first_base = _inverse(_matrix(pose))
         self._before, self._any = pose, True
 
     def holds(self, pose: SensorPose | ArrayLike) -> bool:
-        """Whether a pose lies in the plane of the touches so far, or nobody can tell."""
+        """Whether a pose lies in the plane of the touches so far, or may do."""
         if self._T_first_base is None:
             return True
         T = self._T_first_base @ _matrix(pose)
-        facing = float(T[2, 2]) > math.cos(self.settings.facing_rad)
-        return facing and abs(float(T[2, 3])) < self.settings.above_mm
+        return float(T[2, 2]) > math.cos(FACING_RAD) and abs(float(T[2, 3])) < ABOVE_MM
 
     def place(self, signal: Signal, pose: SensorPose | ArrayLike | None, seq: int) -> PlacedTouch:
-        """Return a touch with what is known of its place."""
+        """Return a touch with its place."""
         if not self._any:
             spread = self.settings.first if pose is None else self._spread(pose, _matrix(pose))
             return PlacedTouch(signal, believed=planar_belief(np.zeros(3), spread), seq=seq)
@@ -245,6 +250,105 @@ class TouchPlaces:
         if isinstance(pose, SensorPose) and pose.covariance.any():
             return planar_covariance(pose.covariance, T_base_plane[:3, :3].T)
         return self.settings.by_arm
+
+
+@dataclass(slots=True)
+class _Face:
+    """A face with its belief."""
+
+    belief: ScanBelief
+    places: TouchPlaces
+    T_base_probe: Array | None = None  #: (4, 4) of its last touch; None: not known
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _ObjectHypothesis:
+    """The object at a place of a face."""
+
+    object: str
+    T_base_object: Array | None  #: (4, 4); None: the probe's pose is not known
+    score: float  #: nats below the likeliest place of that face, 0 or less
+
+
+def join_faces(last: _Face, others: Sequence[_Face]) -> Recognition:
+    """Return the answer of the last face; where it leaves a choice, the other faces decide."""
+    belief, answer = last.belief, last.belief.recognition
+    if answer or answer.reason not in _OPEN or not belief.places:
+        return answer
+    by_face = [found for found in map(_hypotheses_of, others) if found]
+    if not by_face:
+        return answer
+    joined: list[tuple[float, ScanHypothesis]] = []
+    for place in belief.places:
+        one = _hypothesis_at(place, 0.0, last.T_base_probe)
+        joined.append((place.score - sum(_nats_against(one, each) for each in by_face), place))
+    joined.sort(key=lambda item: -item[0])
+    (score, best), rest = joined[0], joined[1:]
+    margin = math.inf if not rest else score - rest[0][0]
+    settings = belief.reader.settings
+    one = _hypothesis_at(best, 0.0, last.T_base_probe)
+    contradicted = all(_nats_against(one, each) >= CHANGED_NATS for each in by_face)
+    if margin < settings.belief.margin or contradicted:
+        return answer
+    runner_up = RunnerUp(*rest[0][1].face, rest[0][1].index) if rest else None
+    found = answer_at(
+        best.embossed, best.fit, best.hypothesis, settings, answer.seq,
+        reason="", margin=margin, runner_up=runner_up,
+    )  # fmt: skip
+    return replace(found, next=None) if found else answer
+
+
+def contradict(a: _Face, b: _Face) -> bool:
+    """Whether the answers of two faces exclude each other: the object was changed."""
+    if not (a.belief.recognition and b.belief.recognition):
+        return False
+    return not _is_one_object(_hypotheses_of(a)[0], _hypotheses_of(b)[0])
+
+
+def _hypotheses_of(face: _Face) -> list[_ObjectHypothesis]:
+    """Return the objects at the places of a face, likeliest first; empty if it is not encoded."""
+    belief, answer = face.belief, face.belief.recognition
+    if answer and answer.object is not None and answer.T_object_probe is not None:
+        at = _base_object(face.T_base_probe, answer.T_object_probe)
+        return [_ObjectHypothesis(answer.object, at, 0.0)]
+    if answer.reason not in _OPEN:
+        return []
+    return [
+        _hypothesis_at(place, place.score - belief.places[0].score, face.T_base_probe)
+        for place in belief.places
+    ]
+
+
+def _hypothesis_at(
+    place: ScanHypothesis, score: float, T_base_probe: Array | None
+) -> _ObjectHypothesis:
+    face = place.embossed.face(place.hypothesis.face)
+    pose = face_pose(place.embossed, face, place.hypothesis, place.fit)
+    at = _base_object(T_base_probe, pose_on_object(face, pose))
+    return _ObjectHypothesis(face.object, at, score)
+
+
+def _base_object(T_base_probe: Array | None, T_object_probe: Array) -> Array | None:
+    if T_base_probe is None:
+        return None
+    return np.asarray(T_base_probe @ _inverse(T_object_probe))
+
+
+def _nats_against(one: _ObjectHypothesis, others: Sequence[_ObjectHypothesis]) -> float:
+    """Return the nats by which the touches of another face contradict an object."""
+    agreeing = [-other.score for other in others if _is_one_object(one, other)]
+    return min([*agreeing, CHANGED_NATS])
+
+
+def _is_one_object(a: _ObjectHypothesis, b: _ObjectHypothesis) -> bool:
+    """Whether two faces may be of one object in one place."""
+    if a.object != b.object:
+        return False
+    if a.T_base_object is None or b.T_base_object is None:
+        return True
+    away = np.linalg.inv(a.T_base_object) @ b.T_base_object
+    turn = math.acos(min(1.0, max(-1.0, (float(np.trace(away[:3, :3])) - 1) / 2)))
+    return bool(np.linalg.norm(away[:3, 3]) < OBJECT_MM) and turn < OBJECT_RAD
 
 
 def _matrix(pose: SensorPose | ArrayLike) -> Array:

@@ -1,7 +1,7 @@
-"""Touch -> the few lattices that it may show; touches -> where they stand. Thesis 4.3, 6.2.
+"""The few lattices that a touch may show, and the poses of touches in a plane. Thesis 4.3, 6.2.
 
-Poses (3,) are x, y (mm) and theta (rad). The plane is the arm's, in which touches are believed
-to stand; a view's lattice has its own origin, whole pitches from that of any other view.
+Poses (3,) are x, y (mm) and theta (rad). The plane is that of the arm's beliefs; the lattice of a
+view has its own origin, whole pitches from that of any other view.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
-from recognizer.scan.mosaic.planar import PlacedTouch, wrap_angle
-from recognizer.scan.settings import VIEWS, ScanSettings
+from recognizer.scan.mosaic.planar import PlacedTouch, pose_difference
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
 from recognizer.touch.settings import FitSettings
@@ -30,14 +29,33 @@ from recognizer.touch.symbols.template import ResponseTemplate
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+UNCERTAIN_PITCHES = 0.25  #: standard deviation of a place from which the mosaic is used
+CLEAN_NOISE = 0.15  #: standard deviation of psi of a touch with the predicted symbols: no search
+LEAST_SD_RAD = 1e-5  #: standard deviation of poses that are believed
+MOST_SD_MM = 3.0  #: standard deviation of places that are believed
+SAME_MM, SAME_RAD = 0.3, 0.03  #: within which two fits of a touch are one
+MOST_VIEWS = 6  #: fits of a touch by itself that are views
+
+
+@dataclass(frozen=True, slots=True)
+class ScanSettings:
+    """Standard deviations of x, y (mm) and the turn (rad) where no covariance is given."""
+
+    #: of the first touch against itself
+    first: tuple[float, float, float] = (0.01, 0.01, 0.001)
+    by_arm: tuple[float, float, float] = (0.4, 0.4, 0.004)  #: of a pose by the arm
+    #: of a step without any measurement. Wide: a step of 14 mm must not look less likely than one
+    #: of 2 mm, a pitch away
+    by_hand: tuple[float, float, float] = (8.0, 8.0, math.radians(2))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TouchPoses:
-    """Where touches stand in the plane."""
+    """Poses of touches in the plane."""
 
     poses: Array  #: (n, 3) T_plane_touch
     covariances: Array  #: (n, 3, 3)
-    mosaic: Mosaic | None  #: None as long as the arm is enough
+    mosaic: Mosaic | None  #: None while the arm is certain enough
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,15 +63,15 @@ class LatticeView:
     """One lattice that a touch may show."""
 
     fit: Fit
-    led: bool  #: found only because other touches led there: that it agrees says little
+    predicted: bool  #: found only near a pose predicted by other touches: weak evidence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LatticeViews:
-    """All lattices that touches may show, one after the other: m views of n touches."""
+    """The views of n touches, one after the other: m views."""
 
     fits: tuple[Fit, ...]
-    led: NDArray[np.bool_]  #: (m,)
+    predicted: NDArray[np.bool_]  #: (m,)
     touch: Ints  #: (m,)
     poses: Array  #: (m, 3) T_lattice_touch
     covariances: Array  #: (m, 3, 3)
@@ -61,21 +79,22 @@ class LatticeViews:
     values: Array  #: (n,) nats of the best view of each touch; 0 for a touch without one
 
 
-def stands_of(
-    reader: Reader, touches: Sequence[PlacedTouch], before: TouchPoses | None, limits: ScanSettings
+def estimate_poses(
+    reader: Reader, touches: Sequence[PlacedTouch], before: TouchPoses | None
 ) -> TouchPoses:
-    """Return where touches stand, the last one being new.
+    """Return the poses of touches, the last one being new.
 
-    The mosaic is asked from the first touch on whose place is uncertain by more
-    than `loose` pitches.
+    The mosaic is used from the first touch on that the arm places with a standard deviation of
+    more than `UNCERTAIN_PITCHES`.
     """
-    last = touches[-1]
-    pitch = min(encoding.style.pitch_mm for encoding in reader.lab.arrays)
-    loose_mm = limits.loose * pitch
+    believed = touches[-1].believed
+    pitch = min(embossed.style.pitch_mm for embossed in reader.lab.arrays)
     mosaic = None if before is None else before.mosaic
-    sure = last.believed is not None and widest_mm(last.believed.covariance) <= loose_mm
-    if mosaic is None and sure and last.believed is not None:
-        pose, covariance = last.believed.pose[None], last.believed.covariance[None]
+    certain = (
+        believed is not None and position_sd_mm(believed.covariance) <= UNCERTAIN_PITCHES * pitch
+    )
+    if mosaic is None and certain and believed is not None:
+        pose, covariance = believed.pose[None], believed.covariance[None]
         if before is None:
             return TouchPoses(pose, covariance, None)
         poses = np.concatenate([before.poses, pose])
@@ -84,75 +103,61 @@ def stands_of(
         mosaic = no_touches(reader.sensor, pitch)
         for touch in touches[:-1]:
             mosaic = add_touch(mosaic, touch)
-    mosaic = add_touch(mosaic, last)
+    mosaic = add_touch(mosaic, touches[-1])
     return TouchPoses(mosaic.poses, mosaic.covariances, mosaic)
 
 
-def is_unmeasured(touch: PlacedTouch, loose_mm: float) -> bool:
-    """Whether nobody measured how a touch stands to the one before."""
+def is_unmeasured(touch: PlacedTouch, pitch_mm: float) -> bool:
+    """Whether the step to a touch was not measured."""
     step = touch.stepped
-    return touch.believed is None and step is not None and widest_mm(step.covariance) > loose_mm
+    if touch.believed is not None or step is None:
+        return False
+    return position_sd_mm(step.covariance) > UNCERTAIN_PITCHES * pitch_mm
 
 
-def widest_mm(covariance: Array) -> float:
+def position_sd_mm(covariance: Array) -> float:
     """Return the largest standard deviation of a place, mm."""
     return math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
 
 
-def expected_view(
-    image: Image, template: ResponseTemplate, reader: Reader, near: Array, clean: float
+def predicted_view(
+    image: Image, template: ResponseTemplate, settings: FitSettings, near: Array
 ) -> tuple[LatticeView, ...]:
-    """Return the lattice at the first of the poses (k, 3) that touches before lead to expect.
-
-    None unless it explains the image so well (`clean`, noise) that nothing else need be looked for.
-    """
-    expected = _refine_near(image, template, reader.settings.first, near[:1], None)
-    if expected and expected[0].noise <= clean:
-        return (LatticeView(expected[0], led=True),)
-    return ()
+    """Return the lattice at the first predicted pose (k, 3), if it explains the image alone."""
+    found = _refine_near(image, template, settings, near[:1], ())
+    return tuple(LatticeView(fit, predicted=True) for fit in found[:1] if fit.noise <= CLEAN_NOISE)
 
 
-def fits_of(
+def flat_views(
     image: Image,
     template: ResponseTemplate,
     bank: Bank,
-    reader: Reader,
+    settings: FitSettings,
     near: Array,
     alone: Sequence[Fit],
 ) -> tuple[LatticeView, ...]:
-    """Return the likeliest lattices of an image, and those that lie near given ones.
+    """Return the likeliest lattices of an image, and those near predicted poses.
 
-    The latter leave more unexplained, and so say less of each cell, if the image shows what
-    neither of them knows, such as the edge of a face.
+    Where the image contains more than symbols, such as the edge of a face, both leave more
+    unexplained, so each cell has less evidence.
 
     Parameters
     ----------
     near
-        (k, 3) T_lattice_touch that other touches lead to expect.
+        (k, 3) T_lattice_touch that other touches predict.
     alone
-        Fits of the touch read by itself, best first; none: they are looked for here.
+        Fits of the touch read by itself, best first; searched for if there are none.
     """
-    settings = reader.settings.first
-    found = _distinct_fits(alone, template.pitch_mm) or fit_lattices(
-        image, template, bank, settings
-    )
-    views = tuple(LatticeView(fit, led=False) for fit in found)
-    rest = [
-        pose for pose in near if not any(_same_as_fit(pose, f, template.pitch_mm) for f in found)
-    ]
-    for fit in _refine_near(image, template, settings, np.array(rest).reshape(-1, 3), found):
+    found: list[Fit] = []
+    for fit in alone:
+        if not any(_same_as_fit(fit.pose[:3], other, template.pitch_mm) for other in found):
+            found.append(fit)
+    fits = tuple(found[:MOST_VIEWS]) or fit_lattices(image, template, bank, settings)
+    views = tuple(LatticeView(fit, predicted=False) for fit in fits)
+    for fit in _refine_near(image, template, settings, near, fits):
         if not any(_same_as_fit(fit.pose[:3], view.fit, template.pitch_mm) for view in views):
-            views = (*views, LatticeView(fit, led=True))
+            views = (*views, LatticeView(fit, predicted=True))
     return views
-
-
-def _distinct_fits(fits: Sequence[Fit], pitch_mm: float) -> tuple[Fit, ...]:
-    """Return fits, each lattice once."""
-    kept: list[Fit] = []
-    for fit in fits:
-        if not any(_same_as_fit(fit.pose[:3], other, pitch_mm) for other in kept):
-            kept.append(fit)
-    return tuple(kept[: VIEWS.most])
 
 
 def round_views(
@@ -160,55 +165,34 @@ def round_views(
     template: ResponseTemplate,
     bank: Bank,
     reader: Reader,
-    encoding: EmbossedArray,
+    embossed: EmbossedArray,
     near: Array,
 ) -> tuple[LatticeView, ...]:
-    """Return the likeliest lattices of an image of a round face, and those near given ones.
+    """Return the likeliest lattices of an image of a round face, and those near predicted poses.
 
     Parameters
     ----------
     image
         As of a flat face.
     near
-        (k, 3) as for `fits_of`.
+        (k, 3) as for `flat_views`.
     """
     settings = reader.settings
     views: list[LatticeView] = []
     for guess in guess_bends(
-        image, reader.sensor, encoding.radii_mm, template.ink, settings.round.bends
+        image, reader.sensor, embossed.radii_mm, template.ink, settings.round.bends
     ):
         under = bend_image(image, reader.sensor, guess.bend)
-        found = fit_lattices(under, template, bank, settings.first, [guess.gain])
-        views += [LatticeView(fit, led=False) for fit in found]
-        rest = [
-            pose
-            for pose in near
-            if not any(_same_as_fit(pose, f, template.pitch_mm) for f in found)
-        ]
-        led = _refine_near(under, template, settings.first, np.array(rest).reshape(-1, 3), found)
-        views += [LatticeView(fit, led=True) for fit in led]
+        fits = fit_lattices(under, template, bank, settings.first, [guess.gain])
+        views += [LatticeView(fit, predicted=False) for fit in fits]
+        near_fits = _refine_near(under, template, settings.first, near, fits)
+        views += [LatticeView(fit, predicted=True) for fit in near_fits]
     return tuple(views)
 
 
-def _refine_near(
-    image: Image,
-    template: ResponseTemplate,
-    settings: FitSettings,
-    near: Array,
-    found: tuple[Fit, ...] | None,
-) -> tuple[Fit, ...]:
-    """Return the fits that are reached from given poses (k, 3)."""
-    gain = found[0].gain if found else first_gain(image, template.ink)
-    if gain is None or not len(near):
-        return ()
-    gains = np.repeat(gain[None], len(near), axis=0)
-    lattices = refine_lattices(image, template, near, gains, steps=settings.final_steps)
-    return score_cells(image, template, lattices)
-
-
-def views_of(found: Sequence[tuple[LatticeView, ...]]) -> LatticeViews:
-    """Return the views of touches. Fits that do not say where they lie are left out."""
-    kept = [tuple(view for view in each if tells_place(view.fit.covariance)) for each in found]
+def stack_views(found: Sequence[tuple[LatticeView, ...]]) -> LatticeViews:
+    """Return the views of touches. Fits with an indefinite pose are left out."""
+    kept = [tuple(view for view in each if is_definite(view.fit.covariance)) for each in found]
     every = tuple(view.fit for each in kept for view in each)
     touch = np.repeat(np.arange(len(kept)), [len(each) for each in kept])
     values = np.array([fit.value for fit in every])
@@ -216,7 +200,7 @@ def views_of(found: Sequence[tuple[LatticeView, ...]]) -> LatticeViews:
     np.maximum.at(best, touch, values)
     return LatticeViews(
         fits=every,
-        led=np.array([view.led for each in kept for view in each], np.bool_),
+        predicted=np.array([view.predicted for each in kept for view in each], np.bool_),
         touch=touch,
         poses=np.array([[f.x_mm, f.y_mm, f.theta_rad] for f in every]).reshape(-1, 3),
         covariances=np.array([f.covariance for f in every]).reshape(-1, 3, 3),
@@ -225,18 +209,34 @@ def views_of(found: Sequence[tuple[LatticeView, ...]]) -> LatticeViews:
     )
 
 
-def tells_place(covariance: Array) -> bool:
-    """Whether a covariance says where a touch stands: in all directions, and none too well."""
+def is_definite(covariance: Array) -> bool:
+    """Whether a covariance defines a pose in all directions, and none too well."""
     if not np.isfinite(covariance).all():
         return False
     lowest = np.linalg.eigvalsh(covariance)[0]
-    return bool(
-        lowest > VIEWS.least_rad**2 and max(covariance[0, 0], covariance[1, 1]) < VIEWS.most_mm**2
-    )
+    most = max(covariance[0, 0], covariance[1, 1])
+    return bool(lowest > LEAST_SD_RAD**2 and most < MOST_SD_MM**2)
+
+
+def _refine_near(
+    image: Image,
+    template: ResponseTemplate,
+    settings: FitSettings,
+    near: Array,
+    found: Sequence[Fit],
+) -> tuple[Fit, ...]:
+    """Return the fits reached from predicted poses (k, 3) that no found fit has."""
+    rest = [p for p in near if not any(_same_as_fit(p, fit, template.pitch_mm) for fit in found)]
+    gain = found[0].gain if found else first_gain(image, template.ink)
+    if gain is None or not rest:
+        return ()
+    gains = np.repeat(gain[None], len(rest), axis=0)
+    lattices = refine_lattices(image, template, np.array(rest), gains, steps=settings.final_steps)
+    return score_cells(image, template, lattices)
 
 
 def _same_as_fit(pose: Array, fit: Fit, pitch_mm: float) -> bool:
     """Whether a lattice is that of a fit, whole pitches apart."""
-    away = pose - (fit.x_mm, fit.y_mm, fit.theta_rad)
+    away = pose_difference(pose, fit.pose[:3])
     at = away[:2] - np.rint(away[:2] / pitch_mm) * pitch_mm
-    return math.hypot(*at) < VIEWS.same_mm and abs(float(wrap_angle(away[2]))) < VIEWS.same_rad
+    return math.hypot(*at) < SAME_MM and abs(float(away[2])) < SAME_RAD

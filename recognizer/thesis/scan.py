@@ -20,7 +20,7 @@ from probe.arm.carried import SensorPose
 from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import no_touches
 from recognizer.scan.session import TouchPlaces
-from recognizer.scan.settings import ScanSettings
+from recognizer.scan.views import ScanSettings
 from recognizer.thesis.image import MergedImage, merge_touches
 from recognizer.thesis.read import ClassicalReading, read_classically
 from recognizer.thesis.settings import MergingSettings, ThesisSettings

@@ -27,10 +27,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.files import whole_file
 from recognizer.touch.recognise import recognise
 from recognizer.validation.campaign import plan_of, series_of
 from recognizer.validation.draw import draw_touch
-from recognizer.validation.files import whole_file
 from recognizer.validation.progress import TouchProgress
 from recognizer.validation.record import RunRecord
 from recognizer.validation.settings import JUDGING
@@ -125,6 +125,7 @@ def write_npz(data: TouchDataset, folder: Path) -> Path:
     """Write the data set as one file of arrays; returns its name."""
     path = folder / "dataset.npz"
     arrays: dict[str, Any] = data.arrays | {"description": np.array(json.dumps(data.description))}
+    path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as file:
         np.savez_compressed(file, **arrays)
     return path

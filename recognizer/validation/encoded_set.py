@@ -17,9 +17,8 @@ from typing import Any
 import yaml
 
 from generator.database import DatabaseError
-from generator.database.entries import list_objects
 from generator.database.open import database_exists, open_database
-from generator.database.read import read_parts
+from generator.database.read import list_objects, read_parts
 from generator.database.transaction import read_transaction
 from recognizer.validation.errors import SetError
 

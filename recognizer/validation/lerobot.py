@@ -24,8 +24,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from encoded_objects.base.files import whole_file
 from recognizer.validation.dataset import TouchDataset
-from recognizer.validation.files import whole_file, write_json
+from recognizer.validation.files import write_json
 
 VERSION: Final = "v3.0"
 FPS: Final = 1  #: frames of an episode a second: there is one
@@ -154,6 +155,7 @@ def _write(
     table = pa.table(columns)
     if metadata:
         table = table.replace_schema_metadata(metadata)
+    path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as file:
         pq.write_table(table, file)
 

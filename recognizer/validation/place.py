@@ -38,12 +38,7 @@ def draw_on_face(
 @lru_cache(maxsize=512)
 def inradius_mm(database: str, object_name: str, face: str, files: bool, prints: str = "") -> float:
     """Return how far the inmost point of a face lies from its edges, mm, nearly."""
-    scene = scene_of(database, object_name, face, files, prints)
-    low, high = scene.region.box_mm
-    x, y = (low + (high - low) * np.linspace(0, 1, 64)[:, None]).T
-    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    points = points[scene.region.contains(points)]
-    return float(scene.region.distance_mm(points).max())
+    return scene_of(database, object_name, face, files, prints).inradius_mm()
 
 
 def draw_anywhere(rng: np.random.Generator, ranges: TouchRanges) -> Touch:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from generator.database.url import normal_url, part_path
+from generator.database.open import normal_url, part_path
 from probe.simulate.printed import (
     PROFILE,
     PartToPrint,

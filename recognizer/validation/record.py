@@ -11,7 +11,7 @@ import os
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from generator.database.url import normal_url
+from generator.database.open import normal_url
 from recognizer.validation.campaign import PRINTED, Campaign
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import write_json

@@ -100,7 +100,8 @@ def _draw_surface(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
     x = touch.x_mm + np.linspace(-reach, reach, GRID)
     y = touch.y_mm + np.linspace(-reach, reach, GRID)
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    heights = found.surface.heights_mm(points).reshape(GRID, GRID)
+    surface = found.contact.scene.under(touch).surface
+    heights = surface.heights_mm(points).reshape(GRID, GRID)
     shown = np.where(np.isfinite(heights), np.maximum(heights, -1.0), np.nan)
     image = axis.imshow(
         shown, origin="lower", extent=(x[0], x[-1], y[0], y[-1]), cmap="Greys_r", aspect="equal"
@@ -151,7 +152,7 @@ def _draw_answer(
     axis: Axes, found: DrawnTouch, reader: Reader, answer: Recognition, row: dict[str, Any]
 ) -> None:
     """Draw the face, the true place and the answered one."""
-    scene, touch = found.scene, found.touch
+    scene, touch = found.truth_of(None, None)
     if scene is not None:
         for start, end in zip(scene.region.starts, scene.region.ends, strict=True):
             axis.plot(*np.array([start, end]).T, color="#555c66", lw=1)

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from generator.database.entries import object_names
 from generator.database.open import open_database
-from generator.database.read import read_object
+from generator.database.read import object_names, read_object
 from generator.database.transaction import read_transaction
 from probe.contact.engines import ENGINES, engine_named, engine_table
 from probe.contact.press import LEVELS, level_for, table
@@ -68,16 +67,15 @@ def _objects(study: Study, reader: Reader) -> None:
 def _heights(study: Study, plan: TouchPlan, reader: Reader) -> None:
     """Heights asked: under the tips, not of the whole face."""
     found = draw_touch(plan, 0, reader)
-    if found.scene is None:
-        return
+    scene = found.contact.scene
     points = tip_points(reader.sensor, Tips())[0].reshape(-1, 2)
     under = found.touch.on_surface(points)
-    low, high = found.scene.region.box_mm
+    low, high = scene.region.box_mm
     sensor_area = 4 * reader.sensor.half_mm[0] * reader.sensor.half_mm[1]
     step = float(np.sqrt(sensor_area / len(under)))
     x, y = (np.arange(a, b, step) for a, b in zip(low, high, strict=True))
     whole = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    surface = found.scene.surface
+    surface = scene.surface
     surface.heights_mm(under)
     _add(study, "Places where the height of the surface is computed: only under the sensor's tips",
          len(under), len(whole), "places",
@@ -100,10 +98,11 @@ def _levels(study: Study, reader: Reader) -> None:
 def _triangles(study: Study, plan: TouchPlan, reader: Reader) -> None:
     """Triangles of the part that the engine of the run gets, if it takes meshes of parts."""
     triangles = engine_named(plan.engine).triangles
-    found = draw_touch(plan, 0, reader) if triangles else None
-    if triangles is None or found is None or found.scene is None:
+    if triangles is None:
         return
-    counted = triangles(found.surface, reader.sensor, found.touch)
+    found = draw_touch(plan, 0, reader)
+    surface = found.contact.scene.under(found.touch).surface
+    counted = triangles(surface, reader.sensor, found.touch)
     if counted is None:
         return
     needed, of = counted

@@ -20,18 +20,18 @@ class DrawSettings:
     inside_mm: float = 9.0
     """A touch inside a face keeps so far from its edges: a sensor of 25 mm then shows most of
     its window; nearer ones are of the kind `edge`, or `corner` about a corner."""
-    anew: tuple[tuple[str, str], ...] = (
+    unrest: tuple[tuple[str, str], ...] = (
         ("tips", "the plate tips"),
         ("under the", "nothing bears it"),
         ("too thin", "strokes too thin"),
         ("finds no rest", "no rest in the engine"),
         ("does not settle", "no rest in the engine"),
     )
-    """A touch without a rest is drawn anew: words of the cause, and what is counted."""
+    """A touch without a rest is drawn again: words of the cause, and the reason that is counted."""
 
-    def why_anew(self, cause: str) -> str:
+    def why_resampled(self, cause: str) -> str:
         """Return the reason that is counted for a cause of the contact."""
-        return next((reason for words, reason in self.anew if words in cause), "other")
+        return next((reason for words, reason in self.unrest if words in cause), "other")
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from encoded_objects.base.files import whole_file
 from recognizer.validation.campaign import Series, shards_of
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.files import whole_file
 from recognizer.validation.rows import COLUMNS, CpuTime, Row
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def write_table(table: pa.Table, path: Path) -> None:
     """Write a table under a name that it gets when all of it is on the disk."""
     import pyarrow.parquet as pq
 
+    path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as file:
         pq.write_table(table, file, compression="zstd", row_group_size=GROUP)
 

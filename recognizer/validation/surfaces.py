@@ -1,7 +1,7 @@
 """Surfaces that no database knows, as `--kinds foreign` names them.
 
 EmbossedArray + rng -> HeightMap in the style of the lab's symbols. What they are stands in
-`probe.simulate.world.foreign`; everything else than a registered face must be refused.
+`probe.simulate.world.surfaces`; everything else than a registered face must be refused.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from generator.alphabet import alphabet_named
 from generator.array import FoldedArray, ProductArray, profile
-from probe.simulate.world.foreign import draw_dots, draw_ridges, draw_rough, draw_text
+from probe.simulate.world.surfaces import draw_dots, draw_ridges, draw_rough, draw_text
 from probe.surface.contract import HeightMap
 from probe.surface.face import endless_face
 from probe.surface.indenters import FlatPlate

@@ -122,5 +122,5 @@ def judge(
         margin=math.nan if answer.margin is None else answer.margin,
         noise=math.nan if answer.noise is None else answer.noise,
         seconds=seconds,
-        drawn_anew=" | ".join(found.drawn_anew),
+        drawn_anew=" | ".join(found.resampled),
     )

@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Engine
 
-from generator.database.open import open_database
+from generator.database.open import normal_url, open_database, part_path
 from generator.database.read import read_object
 from generator.database.registered import RegisteredObject, RegisteredPart
 from generator.database.transaction import read_transaction
-from generator.database.url import normal_url, part_path
-from probe.simulate.registered_part import scene_of_part
+from probe.simulate.registered import scene_of_part
 from probe.simulate.scene import Scene
 from recognizer.validation.errors import SetError
 

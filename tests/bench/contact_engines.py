@@ -30,9 +30,9 @@ from encoded_objects import encode
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import WristStiffness
 from probe.contact.engines import engine_named
-from probe.contact.engines.mujoco import MujocoSettings
+from probe.contact.mujoco import STIFFER
 from probe.contact.tips import Tips
-from probe.simulate.part import part_surface
+from probe.simulate.target import part_surface
 from probe.surface.body import body_of
 from probe.surface.mesh import mesh
 
@@ -114,7 +114,7 @@ def lines_of(engine, surface, touches, repeat):
     """Yield (points, (error, distance from our own, ms)) for one indenter."""
     press, own = engine_named(engine).press, engine_named("own").press
     sensor = SensorType()
-    stiff = replace(sensor.overlay, young_mpa=MujocoSettings().stiffer * sensor.overlay.young_mpa)
+    stiff = replace(sensor.overlay, young_mpa=STIFFER * sensor.overlay.young_mpa)
     ours = replace(sensor, overlay=stiff)
     wanted = [press(surface, sensor, touch, Tips(REFERENCE)).forces_n for touch in touches]
     others = [own(surface, ours, touch, Tips(REFERENCE)).forces_n for touch in touches]

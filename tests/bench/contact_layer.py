@@ -30,11 +30,9 @@ from contact_precision import ROUND, cases, places, reference
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer, press_patch
-from probe.contact.layer_active_set import equilibrium
+from probe.contact.layer_equilibrium import contact_system, equilibrium, plate_of, solve_glued
 from probe.contact.layer_influence import influence
-from probe.contact.layer_levels import DepthWindow, levels_of
-from probe.contact.layer_patch import patch_under
-from probe.contact.layer_solve import contact_system, plate_of, solve_glued
+from probe.contact.layer_patch import DepthWindow, levels_of, patch_under
 from probe.contact.plate import PlatePose
 from probe.errors import ContactError
 from probe.surface.indenters import (

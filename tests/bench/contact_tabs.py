@@ -22,11 +22,8 @@ import numpy as np
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
-from probe.contact.plate import load_of, rest
-from probe.contact.plate_newton import Columns
-from probe.contact.settings import TABS
-from probe.contact.tab_law import tip_laws
-from probe.contact.tabs import heights_under, tabs, tabs_at_rest
+from probe.contact.plate import Columns, load_of, rest
+from probe.contact.tabs import TOLERANCE, heights_under, tabs, tabs_at_rest, tip_laws
 from probe.contact.tips import Tips, tip_points
 from probe.surface.face import endless_face
 from probe.surface.indenters import Cross, HalfPlane, RaisedStrip, Sphere, Washer
@@ -116,7 +113,7 @@ def unculled(points, heights, load):
         skin,
         load,
         columns=columns,
-        tolerance=TABS.tolerance,
+        tolerance=TOLERANCE,
     )
 
 

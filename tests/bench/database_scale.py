@@ -11,9 +11,10 @@ is left between them, so the search for a free place must look at all of it. `pl
 object of a mixture (cubes, boxes, prisms, tetrahedra) found its place by the layout, beside all
 before it. The same objects are registered on each engine, 100 in a transaction.
 
-At each number of objects it prints medians: one more cube placed and registered by `in_turn`
-(open, taken cells, layout, rows, commit), wall time and CPU time of this process (a server's is
-its own), reading the taken cells alone, and the object and face of a 3 x 4 window of cells, on an
+At each number of objects it prints medians: one more cube placed and registered by
+`retry_on_conflict` (open, taken cells, layout, rows, commit), wall time and CPU time of this
+process (a server's is its own), reading the taken cells alone, and the object and face of a 3 x 4
+window of cells, on an
 open connection and with opening it. `opened` is used cells by those of the corner that placing
 has opened (`generator.layout.torus.board_size`: it grows when nothing fits into it any more),
 `array` by those of the array.
@@ -40,13 +41,10 @@ from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import next_larger, profile
 from generator.database import tables
 from generator.database.cells import faces_at, find_array, occupancy
-from generator.database.entries import list_objects
 from generator.database.open import open_database
-from generator.database.race import in_turn
-from generator.database.read import read_layout
-from generator.database.register import ObjectRecord, register
-from generator.database.retire import remove
-from generator.database.transaction import read_transaction, write_transaction
+from generator.database.read import list_objects, read_layout
+from generator.database.register import ObjectRecord, register, remove
+from generator.database.transaction import read_transaction, retry_on_conflict, write_transaction
 from generator.errors import LayoutError
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Occupancy
@@ -159,7 +157,7 @@ def place(url, name, array):
         layout = laid_out(CUBE, array, occupancy(connection, array))
         return register(connection, registration(name, CUBE, layout, array))
 
-    return in_turn(open_database(url), work)
+    return retry_on_conflict(open_database(url), work)
 
 
 def timed(action, times):

@@ -28,7 +28,7 @@ import numpy as np
 from decoder import Decodings, Likelihood, MethodError, decode_exact
 from decoder.exact import METHODS, conversion
 from generator.array import FoldedArray, array_from, next_larger, profile
-from generator.array.keyed import keyed_array
+from generator.array.lab_key import keyed_array
 
 SIZES = (12, 16, 20, 24, 32, 48, 64)
 BATCH = 10_000

@@ -221,8 +221,8 @@ def _frames(made: Scene) -> list[Any]:
 
 def this_project(made: Scene, folder: Path) -> Made:
     """Faces with loops, proved closed, written without a kernel."""
+    from generator.export.meshes import stl_chunks
     from generator.export.step import step_chunks
-    from generator.export.stl import stl_chunks
     from generator.solid import emboss_whole, prove_closed, triangles
 
     part = emboss_whole(made.polyhedron, made.layout, made.tiers, "cube")
@@ -293,8 +293,8 @@ def _import_for(way: str) -> None:
     elif way.startswith("manifold3d"):
         import manifold3d  # noqa: F401
     else:
+        import generator.export.meshes
         import generator.export.step
-        import generator.export.stl
         import generator.solid  # noqa: F401
 
 

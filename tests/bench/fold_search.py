@@ -25,11 +25,10 @@ from pathlib import Path
 
 import numpy as np
 
-from generator.array.field import field_of_order
-from generator.array.notation import format_polynomial
-from generator.array.primitive import primitive_polynomial, search_primitive
+from generator.array.field import field_of_order, format_polynomial
+from generator.array.fold import folds
+from generator.array.polynomial import primitive_polynomial, search_primitive
 from generator.array.sequence import Sequence
-from generator.array.size import folds
 from generator.array.window import null_space
 from generator.errors import ArrayError
 

@@ -21,7 +21,7 @@ from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.contact.contract import Touch
 from probe.simulate.registered import registered_surface
 from probe.simulate.world.levels import LEVELS
-from probe.simulate.world.reading import read_sensor
+from probe.simulate.world.sensor import LevelSensor
 
 
 def make_lab(folder: Path, pitch_mm: float, shapes: dict[str, object]) -> str:
@@ -58,7 +58,7 @@ def print_small_faces(
                 touch = Touch(
                     x, y, float(turn), float(force), *rng.uniform(-0.01, 0.01, 2).tolist()
                 )
-                counts, _ = read_sensor(scene.surface, sensor, touch, LEVELS[level], rng)
+                counts = LevelSensor(sensor, LEVELS[level]).read(scene, touch, rng).counts
                 answer = reader.read(counts)
                 same = (answer.object, answer.face) == (name, "F1")
                 near = bool(answer) and math.hypot(answer.x_mm - x, answer.y_mm - y) < 1.5

@@ -26,8 +26,7 @@ from probe.errors import ContactError
 from probe.simulate.registered import registered_surface
 from probe.simulate.touch import TouchRanges, random_touches
 from probe.simulate.world.levels import TYPICAL, Level
-from probe.simulate.world.reading import read_sensor
-from probe.simulate.world.sensor_copy import SensorCopy, draw_copy
+from probe.simulate.world.sensor import LevelSensor, SensorInstance, sample_sensor
 from recognizer.touch.recognise import recognise
 from recognizer.validation.statistics import chi2_quantile
 
@@ -73,9 +72,9 @@ def defects(sensor: SensorType) -> Iterator[Defect]:
         yield Defect("tilt of the housing", f"{by:g} degrees", tilt)
 
 
-def copy_of(defect: Defect, sensor: SensorType, rng: np.random.Generator) -> SensorCopy:
+def instance_of(defect: Defect, sensor: SensorType, rng: np.random.Generator) -> SensorInstance:
     """Return a sensor whose tips are moved together beside each by itself."""
-    drawn = draw_copy(sensor, rng)
+    drawn = sample_sensor(sensor, rng)
     moved = defect.grown * sensor.centres_mm() + np.array([defect.moved_mm, 0.0])
     return replace(drawn, shifts=drawn.shifts + moved / max(defect.level.shift_mm, 1e-12))
 
@@ -99,8 +98,9 @@ def measure(
                 touch, tilt_x_rad=by * math.cos(towards), tilt_y_rad=by * math.sin(towards)
             )
             try:
-                counts, _ = read_sensor(scene.surface, defect.sensor or sensor, at, defect.level,
-                                        rng, copy=copy_of(defect, sensor, rng))  # fmt: skip
+                used, instance = defect.sensor or sensor, instance_of(defect, sensor, rng)
+                worse = LevelSensor(used, defect.level, instance=instance)
+                counts = worse.read(scene, at, rng).counts
                 break
             except ContactError:
                 continue

@@ -29,13 +29,17 @@ from encoded_objects.base.sensor_type import SensorType  # noqa: E402
 from generator.alphabet import SymbolStyle, alphabet_named  # noqa: E402
 from generator.array import next_larger, profile  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
+from probe.simulate.scene import Scene  # noqa: E402
 from probe.simulate.world.levels import TYPICAL  # noqa: E402
-from probe.simulate.world.reading import read_sensor  # noqa: E402
-from probe.surface.face import FaceSurface  # noqa: E402
-from probe.surface.lattice import LatticeSurface, list_lookup  # noqa: E402
+from probe.simulate.world.sensor import LevelSensor  # noqa: E402
+from probe.surface.face import (  # noqa: E402
+    FaceSurface,
+    LatticeSurface,
+    list_lookup,
+    template,
+)
 from probe.surface.polygon import polygon  # noqa: E402
 from probe.surface.symbols import Relief, emboss  # noqa: E402
-from probe.surface.template import template  # noqa: E402
 from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab, cell_keys  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
@@ -115,9 +119,9 @@ def measured(faces: int, touches: int) -> str:
         lattice = LatticeSurface(drawn, list_lookup(R, C, held.labels), 0.0, -2.5, -57.5)
         x, y = rng.uniform(12, 48, 2)
         touch = Touch(x, y, rng.uniform(-math.pi, math.pi), rng.uniform(20, 120))
-        image, _ = read_sensor(
-            FaceSurface(lattice, polygon([SQUARE])), SensorType(), touch, TYPICAL, rng
-        )
+        region = polygon([SQUARE])
+        scene = Scene(FaceSurface(lattice, region), region, "")
+        image = LevelSensor(SensorType(), TYPICAL).read(scene, touch, rng).counts
         start = time.process_time()
         found = recognise(reader, signal_of(image.astype(float)))
         ms.append(1e3 * (time.process_time() - start))

@@ -36,10 +36,11 @@ from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.simulate.registered import registered_surface
+from probe.simulate.scene import bare_scene
 from probe.simulate.world.levels import LEVELS
-from probe.simulate.world.reading import READOUT, read_sensor
-from probe.simulate.world.worn import wear_face
-from recognizer.scan.grow import begin_scan, extend_scan
+from probe.simulate.world.sensor import BIAS, LevelSensor
+from probe.simulate.world.surfaces import worn_scene
+from recognizer.scan.belief import begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import (
     PlacedTouch,
     inverse,
@@ -170,11 +171,10 @@ def scanned(scene, encoding, kind, level, sigma_tactels, most, rng, manner=None)
         believed, true = np.array(wanted), np.array(wanted)
         true[:, :2, 3] += rng.normal(0, sigma, (len(true), 2))
         spread = [np.array([sigma, sigma, 0.003])] * len(true)
-    surface = scene.surface
     if kind == "worn":
-        surface = wear_face(surface, 0.2, rng)
+        scene = worn_scene(scene, np.zeros((0, 2)), 0.0, 1.0, 0.2, rng)
     elif kind in FOREIGN:
-        surface = FOREIGN[kind](encoding, rng)
+        scene = bare_scene(FOREIGN[kind](encoding, rng))
     back, number = np.linalg.inv(T_base_face), int(rng.integers(1 << 30))
     felt = Felt([], [], np.zeros((0, 3)))
     stood = []
@@ -186,9 +186,8 @@ def scanned(scene, encoding, kind, level, sigma_tactels, most, rng, manner=None)
         touch = Touch(x, y, turn, float(rng.uniform(*manner.force_n)),
                       tilt * math.cos(towards), tilt * math.sin(towards))  # fmt: skip
         try:
-            counts, _ = read_sensor(
-                surface, SENSOR, touch, LEVELS[level], np.random.default_rng(number)
-            )
+            one_sensor = np.random.default_rng(number)
+            counts = LevelSensor(SENSOR, LEVELS[level]).read(scene, touch, one_sensor).counts
         except ContactError:
             continue  # the plate slips off
         felt.counts.append(counts.astype(float))
@@ -265,7 +264,7 @@ def classical(lab, felt, name, sigma, tally):
     """Read a scan the thesis's way, after every eighth touch and at the end."""
     merging = MergingSettings(window_tactels=max(0.75, 2 * (sigma or 0)))
     poses = np.array([touch.believed.pose for touch in felt.touches])
-    images = [np.maximum(counts - READOUT.bias, 0) for counts in felt.counts]
+    images = [np.maximum(counts - BIAS, 0) for counts in felt.counts]
     first, n = None, len(images)
     for k in [*range(8, n, 8), n]:
         start = time.process_time()

@@ -38,17 +38,17 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from encoded_objects.base.sensor_type import SensorType  # noqa: E402
-from generator.database.url import normal_url, part_path  # noqa: E402
+from generator.database.open import normal_url, part_path  # noqa: E402
 from generator.pipeline import encode  # noqa: E402
 from generator.spec import read_specs  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
 from probe.errors import ContactError  # noqa: E402
 from probe.simulate.registered import registered_object  # noqa: E402
-from probe.simulate.round import RoundPart, round_part  # noqa: E402
 from probe.simulate.touch import TouchRanges, random_touches  # noqa: E402
 from probe.simulate.world.levels import LEVELS  # noqa: E402
-from probe.simulate.world.reading import read_sensor  # noqa: E402
-from recognizer.scan.grow import begin_scan, extend_scan  # noqa: E402
+from probe.simulate.world.sensor import LevelSensor  # noqa: E402
+from probe.simulate.written import RoundPart, round_part  # noqa: E402
+from recognizer.scan.belief import begin_scan, extend_scan  # noqa: E402
 from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
@@ -150,9 +150,9 @@ def one_touch(job: tuple[str, str, str, int]) -> Outcome:
     database, name, level, number = job
     touched, rng = part(database, name), np.random.default_rng([1, number])
     for touch in touches(touched, rng):
-        surface = touched.under(touch).surface
+        sensor = LevelSensor(SensorType(), LEVELS[level])
         try:
-            counts, _ = read_sensor(surface, SensorType(), touch, LEVELS[level], rng)
+            counts = sensor.read(touched.scene(), touch, rng).counts
         except ContactError:
             continue  # the plate slips off: no touch
         start = time.process_time()
@@ -174,8 +174,8 @@ def one_scan(job: tuple[str, str, str, int]) -> Outcome:
         )
         if inside:
             try:
-                surface = touched.under(touch).surface
-                counts, _ = read_sensor(surface, SensorType(), touch, LEVELS[level], rng)
+                sensor = LevelSensor(SensorType(), LEVELS[level])
+                counts = sensor.read(touched.scene(), touch, rng).counts
             except ContactError:
                 inside = False
         if inside:
@@ -239,9 +239,8 @@ def strips(options: argparse.Namespace, databases: dict[str, str]) -> None:
             for _ in range(min(options.touches, 12)):
                 ranges = TouchRanges((force, force), 0.0, DRAWING.inside_mm)
                 drawn = next(random_touches(touched.region, rng, ranges))
-                _, contact = read_sensor(
-                    touched.under(drawn).surface, sensor, drawn, LEVELS["low"], rng
-                )
+                worse = LevelSensor(sensor, LEVELS["low"])
+                contact = worse.read(touched.scene(), drawn, rng).contact
                 bend = touched.face.round.bend(drawn.x_mm, drawn.y_mm).turned(drawn.theta_rad)
                 c, s = math.cos(bend.towards_rad), math.sin(bend.towards_rad)
                 forces = contact.forces_n.reshape(-1)
@@ -258,10 +257,10 @@ def picture(options: argparse.Namespace, databases: dict[str, str]) -> None:
 
     touched, touch = part(databases["R40"], "R40"), Touch(100.0, 31.0, math.radians(25), 80.0)
     surface = touched.under(touch).surface
-    counts, contact = read_sensor(
-        surface, SensorType(), touch, LEVELS["typical"], np.random.default_rng(1)
-    )
-    touch_picture(surface, SensorType(), touch, contact.forces_n, counts, Path(options.output),
+    sensor = LevelSensor(SensorType(), LEVELS["typical"])
+    reading = sensor.read(touched.scene(), touch, np.random.default_rng(1))
+    forces, counts = reading.contact.forces_n, reading.counts
+    touch_picture(surface, SensorType(), touch, forces, counts, Path(options.output),
                   title="a cylinder of 80 mm, 80 N")  # fmt: skip
 
 

@@ -22,14 +22,16 @@ import numpy as np
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
-from probe.circuit import Electronics, fsr_of, read_counts
+from probe.circuit import read_counts
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.contact.tips import Tips, tip_points
-from probe.simulate.part import part_surface
 from probe.simulate.registered import registered_surface
+from probe.simulate.scene import bare_scene
+from probe.simulate.sensor import simulated_sensor
 from probe.simulate.source import frames_of
-from probe.simulate.touch import TouchRanges, random_touches, simulate
+from probe.simulate.target import part_surface
+from probe.simulate.touch import TouchRanges, random_touches
 from probe.surface.face import endless_face
 from probe.surface.indenters import RoughSurface, Sphere, Washer
 
@@ -63,12 +65,10 @@ def asked(name, make, places, points):
 
 def touched(name, surface, sensor, touches, accuracy):
     """Print the time of touches from surface to counts."""
-    board, film, rng = Electronics(), fsr_of(), np.random.default_rng(0)
+    simulated, scene = simulated_sensor(sensor, accuracy=accuracy), bare_scene(surface)
+    board, film, rng = simulated.board, simulated.film, np.random.default_rng(0)
     press(surface, sensor, touches[0], accuracy=accuracy)  # what is made once
-    whole = [
-        cpu(lambda t=t: simulate(surface, sensor, t, board, film, rng, accuracy))[1]
-        for t in touches
-    ]
+    whole = [cpu(lambda t=t: simulated.read(scene, t, rng))[1] for t in touches]
     alone = [cpu(lambda t=t: press(surface, sensor, t, accuracy=accuracy)) for t in touches]
     counts = [cpu(lambda c=c: read_counts(c.forces_n, board, film, None, rng))[1] for c, _ in alone]
     times = (statistics.median(part) for part in (whole, [ms for _, ms in alone], counts))

@@ -15,8 +15,8 @@ import pytest
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import PROFILES
+from generator.export.meshes import stl_chunks
 from generator.export.step import step_chunks
-from generator.export.stl import stl_chunks
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.shapes import cube
 from generator.solid import emboss_whole, prove_closed, triangles

@@ -25,10 +25,10 @@ import numpy as np  # noqa: E402
 
 from encoded_objects import encode  # noqa: E402
 from probe.errors import ContactError  # noqa: E402
-from probe.simulate.part import part_surface  # noqa: E402
+from probe.simulate.target import part_surface  # noqa: E402
 from probe.simulate.touch import TouchRanges, random_touches  # noqa: E402
 from probe.simulate.world.levels import LEVELS  # noqa: E402
-from probe.simulate.world.reading import read_sensor  # noqa: E402
+from probe.simulate.world.sensor import LevelSensor  # noqa: E402
 from probe.simulate.written import written_triangles  # noqa: E402
 from probe.surface.mesh import mesh  # noqa: E402
 from recognizer.as_built.estimate import estimate_print  # noqa: E402
@@ -82,7 +82,7 @@ def touched(scene, reader, seed, touches, level):
         while True:
             touch = next(random_touches(scene.region, rng, ON_FACE))
             try:
-                counts, _ = read_sensor(scene.surface, reader.sensor, touch, LEVELS[level], rng)
+                counts = LevelSensor(reader.sensor, LEVELS[level]).read(scene, touch, rng).counts
             except ContactError:
                 continue
             break

@@ -19,8 +19,8 @@ import as_built
 import numpy as np
 from as_built import summary
 
-from generator.database.entries import list_objects
 from generator.database.open import open_database
+from generator.database.read import list_objects
 from generator.database.transaction import read_transaction
 from probe.errors import SurfaceError
 from probe.simulate.printed import printed_scene, read_listing

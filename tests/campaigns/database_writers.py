@@ -34,12 +34,10 @@ from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import next_larger, profile
 from generator.database import tables
 from generator.database.cells import find_array, held_cells, occupied_cells
-from generator.database.entries import find_object, list_objects
 from generator.database.open import open_database
-from generator.database.race import in_turn
-from generator.database.read import read_layout, read_object
+from generator.database.read import find_object, list_objects, read_layout, read_object
 from generator.database.register import ObjectRecord, register
-from generator.database.transaction import read_transaction
+from generator.database.transaction import read_transaction, retry_on_conflict
 from generator.layout.layout import lay_out
 from generator.polyhedron import shapes
 
@@ -83,7 +81,7 @@ def write(url: str, writer: int, names: list[str], acknowledge: int) -> None:
             ))  # fmt: skip
             return layout
 
-        layout = in_turn(engine, work)
+        layout = retry_on_conflict(engine, work)
         os.write(acknowledge, f"{name} {digest(layout)} {len(tries)}\n".encode())
 
 

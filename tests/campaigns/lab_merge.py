@@ -17,11 +17,10 @@ import numpy as np
 
 from generator.array import array_from
 from generator.array.lab_key import lab_key_of
-from generator.database.entries import list_objects
 from generator.database.exchange import import_objects
 from generator.database.lab import lab_key
 from generator.database.open import open_database
-from generator.database.read import read_array, read_object
+from generator.database.read import list_objects, read_array, read_object
 from generator.database.transaction import read_transaction
 from generator.pipeline import encode
 from generator.spec import read_specs

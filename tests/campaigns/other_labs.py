@@ -115,7 +115,7 @@ def touch_labs(
         answer, _ = recognise_with_rivals(reader, reader.signal(drawn.counts), number)
         accepted = bool(answer) and bool(usual.read(drawn.counts, seq=number))
         if not registered:  # every answer is wrong
-            drawn = replace(drawn, scene=None)
+            drawn = replace(drawn, contact=replace(drawn.contact, registered=False))
         return {
             "number": number, "lab": lab + 1, "kind": kind, "level": level,
             "verdict": judge(plan, number, drawn, answer, 0.0).verdict,

@@ -17,12 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from generator.export.stl import stl_chunks
+from generator.export.meshes import stl_chunks
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import place_object
 from generator.pipeline.plan import ObjectPlan, plan_object
 from generator.printed import PROFILES, deposit, face_surface, print_faults, slice_part
-from generator.printed.picture import check_png
+from generator.printed.check import check_png
 from generator.printed.survey import LOST, SURVIVES, survey_face
 from generator.solid.part import Part
 from generator.solid.triangulate import triangles

@@ -33,9 +33,8 @@ from numpy.typing import ArrayLike, NDArray
 from encoded_objects import encode
 from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named
-from generator.database.entries import object_names
 from generator.database.open import open_if_there
-from generator.database.read import read_object
+from generator.database.read import object_names, read_object
 from generator.database.transaction import read_transaction
 from generator.layout.placement import FaceLayout
 from generator.layout.recognition_rate import (
@@ -235,7 +234,7 @@ def touch_face(face: Face, lab: str, number: int, most: int, reader: Reader, see
     views = views_at(face.loops, face.layout, face.pitch_mm, face.view, at, turn)
     return Touched(
         face.group, face.name, face.size_mm, face.pitch_mm, level,
-        anew=len(made[0].found.drawn_anew), x_mm=round(first.x_mm, 3), y_mm=round(first.y_mm, 3),
+        anew=len(made[0].found.resampled), x_mm=round(first.x_mm, 3), y_mm=round(first.y_mm, 3),
         turn_rad=round(float(turn[0]), 5), edge_mm=round(first.edge_mm, 3),
         seen=int(views.seen[0]), lines=int(views.lines[0]), loaded=round(float(views.loaded[0]), 4),
         around=int(views.around[0]), most=most, touches=len(made),

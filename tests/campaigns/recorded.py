@@ -22,8 +22,7 @@ import numpy as np
 from rosbags.highlevel import AnyReader
 
 from encoded_objects.base.sensor_type_file import shipped_names
-from probe.recording.mcap_reader import import_mcap
-from probe.recording.mcap_writer import export_mcap
+from probe.recording.mcap import export_mcap, import_mcap
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 

@@ -21,7 +21,7 @@ from manifold3d import Manifold, Mesh
 from verified import random_spec
 
 from generator.errors import GeneratorError
-from generator.export.stl import stl_chunks
+from generator.export.meshes import stl_chunks
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object

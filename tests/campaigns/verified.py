@@ -26,15 +26,14 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import GeneratorError
-from generator.export.check import verify
-from generator.export.fit_check import PanelFile, verify_fit
+from generator.export.check import PanelFile, verify_fit, verify_step, verify_stl
+from generator.export.meshes import stl_chunks
 from generator.export.step import step_chunks
-from generator.export.stl import stl_chunks
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
 from generator.polyhedron import Polyhedron
-from generator.solid import prove_closed, round_volume, triangles, volume
+from generator.solid import prove_closed, triangles
 from generator.spec import LocatedSpec, read_specs
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -106,14 +105,11 @@ def outcome(located: LocatedSpec) -> Outcome:
                 prove_closed(part)
                 step.write_bytes(b"".join(step_chunks(part)))
                 stl.write_bytes(b"".join(stl_chunks(triangles(part))))
-                excess = round_volume(part)
-                report = verify(part.name, volume(part), step=step, stl=stl, round_mm3=excess)
+                step_read, stl_read = verify_step(part, step), verify_stl(part, stl)
             except GeneratorError as error:
                 return Outcome(name, len(parts), symbols, step_error, mesh_error, "", str(error))
-            assert report.step is not None
-            assert report.stl is not None
-            step_error = max(step_error, abs(report.step.volume_error))
-            mesh_error = max(mesh_error, abs(report.stl.volume_error))
+            step_error = max(step_error, abs(step_read.volume_error))
+            mesh_error = max(mesh_error, abs(stl_read.volume_error))
         try:
             fit = verify_fit(panels, located.spec.gap_mm) if len(panels) > 1 else None
         except GeneratorError as error:

@@ -23,7 +23,7 @@ import numpy as np
 from verified import random_spec
 
 from generator.errors import GeneratorError
-from generator.export.glb import glb_bytes
+from generator.export.meshes import glb_bytes
 from generator.export.threemf import print_files
 from generator.pipeline.files import parts_of, settings_of
 from generator.pipeline.place import NO_CELLS, lay_out_object

@@ -14,8 +14,13 @@ import pytest
 
 from generator.array import array_from, profile
 from generator.array.field import field_of_order
-from generator.array.polynomial import is_primitive, order, powmod
-from generator.array.primitive import known_polynomials, primitive_polynomial
+from generator.array.polynomial import (
+    is_primitive,
+    known_polynomials,
+    order,
+    powmod,
+    primitive_polynomial,
+)
 from generator.array.product import ProductArray
 from generator.array.sequence import Sequence
 from generator.array.window import windows_are_unique

@@ -11,8 +11,8 @@ from encoded_objects.base.sensor_type import Overlay, SensorType, choose_sensor_
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import profile
+from generator.export.meshes import stl_chunks
 from generator.export.step import step_chunks
-from generator.export.stl import stl_chunks
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import cube
 from generator.polyhedron.winged import polyhedron

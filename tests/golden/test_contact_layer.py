@@ -10,12 +10,12 @@ from reference.elements_round import indented, washer_pad
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer
-from probe.contact.layer_influence import influence
-from probe.contact.layer_kernel import (
+from probe.contact.layer_influence import (
     base_ratio,
     compliance_over_s,
     compliance_ratio,
     edge_compliance,
+    influence,
     layer_compliance,
 )
 from probe.surface.indenters import Paraboloid, RaisedStrip, Washer

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from generator.export.colours import BODY_RGB
-from generator.export.glb import glb_bytes
+from generator.export.meshes import glb_bytes
 from generator.export.step import assembly_chunks, step_chunks
 from generator.layout.placement import Layout
 from generator.polyhedron.shapes import SHAPES

@@ -162,10 +162,10 @@ from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import profile
 from generator.export.array_svg import FaceOnArray, array_svg
-from generator.export.glb import glb_bytes
+from generator.export.meshes import glb_bytes
 from generator.export.preview import preview_png
 from generator.export.step import step_chunks
-from generator.export.stl import stl_chunks
+from generator.export.meshes import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.layout import lay_out
 from generator.polyhedron.frame import face_polygon

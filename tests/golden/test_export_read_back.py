@@ -17,12 +17,10 @@ from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import profile
 from generator.errors import SolidError
-from generator.export.check import verify
+from generator.export.check import STEP_VOLUME, verify_step, verify_stl
 from generator.export.colours import SYMBOL_RGB
-from generator.export.glb import glb_bytes
-from generator.export.settings import READ_BACK
+from generator.export.meshes import glb_bytes, stl_chunks
 from generator.export.step import step_chunks
-from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import cube, octahedron
@@ -96,23 +94,20 @@ def written(part: Part, folder: Path) -> tuple[Path, Path]:
 
 def test_step_and_stl_are_one_valid_closed_solid(part: Part, tmp_path: Path) -> None:
     step, stl = written(part, tmp_path)
-    report = verify(part.name, volume(part), step=step, stl=stl)
-    assert report.step is not None
-    assert report.stl is not None
-    assert report.step.solids == 1
-    assert report.step.valid
-    assert abs(report.step.volume_error) <= READ_BACK.step_volume
-    assert report.stl.boundary_edges == report.stl.non_manifold_edges == 0
-    assert report.stl.self_intersections == 0
-    assert abs(report.stl.volume_error) <= 1e-6
+    solid, mesh = verify_step(part, step), verify_stl(part, stl)
+    assert solid.solids == 1
+    assert solid.valid
+    assert abs(solid.volume_error) <= STEP_VOLUME
+    assert mesh.boundary_edges == mesh.non_manifold_edges == 0
+    assert mesh.self_intersections == 0
+    assert abs(mesh.volume_error) <= 1e-6
 
 
 def test_engraved_symbols(panel: Part, tmp_path: Path) -> None:
     part = engraved(panel)
     step, stl = written(part, tmp_path)
-    report = verify(part.name, volume(part), step=step, stl=stl)
-    assert report.step is not None
-    assert report.step.volume_mm3 < volume(panel)
+    assert verify_step(part, step).volume_mm3 < volume(panel)
+    verify_stl(part, stl)
 
 
 def test_names_and_colours_in_step(part: Part, tmp_path: Path) -> None:
@@ -174,36 +169,33 @@ def test_a_broken_file_is_named_with_its_reason(
     panel: Part, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     step, stl = written(panel, tmp_path)
-    exact = volume(panel)
+    larger = replace(panel, vertices=panel.vertices * (1 + 4e-9))
     with pytest.raises(SolidError, match=r"part 'Cube-F1'.*volume"):
-        verify(panel.name, exact * (1 + 1e-8), step=step)
+        verify_step(larger, step)
     step.write_bytes(step.read_bytes()[:-5000])
     with pytest.raises(SolidError, match="0 solids") as caught:
-        verify(panel.name, exact, step=step)
+        verify_step(panel, step)
     assert caught.value.place == str(step)
     whole_file = stl.read_bytes()
     count = struct.unpack_from("<I", whole_file, 80)[0]
     stl.write_bytes(whole_file[:80] + struct.pack("<I", count - 1) + whole_file[84:-50])
     with pytest.raises(SolidError, match="3 open edges"):
-        verify(panel.name, exact, stl=stl)
+        verify_stl(panel, stl)
     stl.write_bytes(b"")
     with pytest.raises(SolidError, match="no triangles"):
-        verify(panel.name, exact, stl=stl)
+        verify_stl(panel, stl)
     assert capfd.readouterr().out == ""
 
 
 def test_missing_extras_say_how_to_install_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    panel: Part, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import sys
 
-    for module, arguments in (
-        ("OCP.BRepCheck", {"step": tmp_path / "a.step"}),
-        ("pymeshlab", {"stl": tmp_path / "a.stl"}),
-    ):
+    for module, verify in (("OCP.BRepCheck", verify_step), ("pymeshlab", verify_stl)):
         monkeypatch.setitem(sys.modules, module, None)
         with pytest.raises(MissingExtraError) as caught:
-            verify("a", 1.0, **arguments)
+            verify(panel, tmp_path / "a.part")
         assert "pip install 'encoded-objects[cad,mesh]'" in caught.value.fix
 
 

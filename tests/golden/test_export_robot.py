@@ -21,7 +21,8 @@ from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
 from generator.errors import SolidError
-from generator.export.robot import check
+from generator.export.formats import EXPORTERS
+from generator.export.robot import mjcf, sdf, urdf, usd
 from generator.pipeline import encode
 from generator.spec import SpecError, read_specs
 
@@ -64,8 +65,9 @@ def read_models(part):
     """Yield what every program reads: mass, centre, inertia, frames."""
     frames = tuple(SimpleNamespace(face=name, name=f"Part-{name}") for name in part.faces)
     named = SimpleNamespace(name="Part", frames=frames)
-    for suffix, read in check.READERS.items():
-        yield suffix, read(named, part.folder / f"Part{suffix}")
+    for kind in (mjcf, urdf, sdf, usd):
+        suffix = EXPORTERS[kind.__name__.rpartition(".")[2]].suffix
+        yield suffix, kind.read(named, part.folder / f"Part{suffix}")
 
 
 def test_mass_centre_and_inertia_are_the_kernels(part):
@@ -211,13 +213,10 @@ def test_the_same_input_gives_the_same_bytes(part, tmp_path):
 
 
 def test_another_file_than_was_meant_is_refused(tmp_path, monkeypatch):
-    from generator.export.robot import files
-    from generator.export.robot.mjcf import mjcf_bytes
-
-    def heavier(model):
-        return mjcf_bytes(model).replace(b' mass="0.', b' mass="1.', 3)
-
-    monkeypatch.setitem(files.WITH_MESHES, "mjcf", (".xml", heavier))
+    right = mjcf.mjcf_bytes
+    monkeypatch.setattr(
+        mjcf, "mjcf_bytes", lambda model: right(model).replace(b' mass="0.', b' mass="1.', 3)
+    )
     with pytest.raises(SolidError, match=r"'Part.xml' has a mass of 1\.\d+ kg where 0\."):
         make(tmp_path, TEXTS["panels"], verify=True)
     assert not (tmp_path / "out").exists()

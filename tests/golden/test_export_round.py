@@ -10,13 +10,12 @@ import pytest
 
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
-from generator.export.check import verify
-from generator.export.settings import READ_BACK
+from generator.export.check import BENT_VOLUME, verify_step
 from generator.export.step import step_chunks
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.read import read_shape
 from generator.polyhedron.round import cone, cylinder
-from generator.solid import emboss_whole, round_volume, volume
+from generator.solid import emboss_whole
 
 pytest.importorskip("OCP")
 
@@ -55,10 +54,10 @@ def test_round_faces_are_one_valid_solid(name, chamfer_mm, tmp_path):
     part = part_of(name, chamfer_mm)
     step = tmp_path / "part.step"
     step.write_bytes(b"".join(step_chunks(part)))
-    report = verify(part.name, volume(part), step=step, round_mm3=round_volume(part)).step
+    report = verify_step(part, step)
     assert report.solids == 1
     assert report.valid
-    assert abs(report.volume_error) <= READ_BACK.bent_volume
+    assert abs(report.volume_error) <= BENT_VOLUME
     kinds, edge_mm, names = read_faces(step)
     round_kind = "Cylinder" if name in ("cylinder", "bore") else "Cone"
     assert kinds[round_kind] == len(part.analytic) + part.symbols + islands(part)

@@ -42,7 +42,10 @@ def test_errors_lie_within_the_ellipse_as_often_as_it_says(reader, engine, touch
         answer = reader.read(found.counts.astype(float))
         if not answer:
             continue
-        assert (answer.object, answer.face) == (found.scene.object_name, found.scene.face)
+        assert (answer.object, answer.face) == (
+            found.contact.scene.object_name,
+            found.contact.scene.face,
+        )
         T, touch = answer.T_face_probe, found.touch
         turn = math.remainder(math.atan2(T[1, 0], T[0, 0]) - touch.theta_rad, math.tau)
         away = np.array([T[0, 3] - touch.x_mm, T[1, 3] - touch.y_mm, turn])

@@ -13,9 +13,8 @@ import pytest
 from sqlalchemy import text
 
 from generator.database.cells import held_cells, occupied_cells
-from generator.database.entries import list_objects
 from generator.database.open import open_database
-from generator.database.read import read_layout
+from generator.database.read import list_objects, read_layout
 from generator.database.transaction import read_transaction, write_transaction
 
 # One process loads everything and forks a writer per line that it reads, so that a kill

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from generator.database.entries import list_objects
 from generator.database.open import open_database
-from generator.database.read import read_object
+from generator.database.read import list_objects, read_object
 from generator.database.transaction import read_transaction
 from generator.errors import DatabaseError
 from generator.pipeline import encode

@@ -11,8 +11,8 @@ from bench_page import PATIENCE_MS, opened, press_known_loads, rest, shown, touc
 from playwright.sync_api import expect
 
 from generator.database.as_built import read_as_built
-from generator.database.entries import object_entry
 from generator.database.open import open_database
+from generator.database.read import object_entry
 from generator.database.transaction import read_transaction
 from probe.recording.read import Recording
 

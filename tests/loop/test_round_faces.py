@@ -28,10 +28,11 @@ from generator.polyhedron.developable import developable_from
 from generator.polyhedron.development import development
 from generator.spec import read_specs
 from probe.simulate.registered import registered_object
-from probe.simulate.round import round_part
+from probe.simulate.scene import bare_scene
 from probe.simulate.touch import TouchRanges, random_touches
 from probe.simulate.world.levels import LEVELS
-from probe.simulate.world.reading import read_sensor
+from probe.simulate.world.sensor import LevelSensor
+from probe.simulate.written import round_part
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
@@ -210,13 +211,12 @@ def test_a_plate_sees_the_written_face_fall_away_under_it(touched, name):
 def test_one_touch_of_the_written_part_tells_object_face_and_pose(touched, name):
     database, parts = touched
     reader, part = Reader(open_lab(database), SensorType()), parts[name]
+    sensor = LevelSensor(reader.sensor, LEVELS["typical"])
     surface = part.face.round.surface
     rng, answered = np.random.default_rng(8), 0
     drawn = random_touches(part.region, rng, TouchRanges((40.0, 120.0), margin_mm=INSIDE_MM))
     for _, touch in zip(range(5), drawn, strict=False):
-        counts, _ = read_sensor(
-            part.under(touch).surface, reader.sensor, touch, LEVELS["typical"], rng
-        )
+        counts = sensor.read(part.scene(), touch, rng).counts
         answer = recognise(reader, signal_of(counts.astype(np.float64)))
         if not answer:
             continue
@@ -248,8 +248,8 @@ def test_the_reader_takes_no_blank_round_face_for_an_encoded_one(touched):
     rng = np.random.default_rng(2)
     drawn = random_touches(part.region, rng, TouchRanges(margin_mm=INSIDE_MM))
     for _, touch in zip(range(3), drawn, strict=False):
-        blank = Blank(radius, (touch.x_mm, touch.y_mm))
-        counts, _ = read_sensor(blank, reader.sensor, touch, LEVELS["typical"], rng)
+        blank = bare_scene(Blank(radius, (touch.x_mm, touch.y_mm)))
+        counts = LevelSensor(reader.sensor, LEVELS["typical"]).read(blank, touch, rng).counts
         assert not recognise(reader, signal_of(counts.astype(np.float64)))
 
 

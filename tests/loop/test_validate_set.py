@@ -248,11 +248,11 @@ def test_written_files_are_what_is_registered(reference):
         )
         assert said.touch == written.touch
         points = said.touch.on_surface(reader.sensor.centres_mm()).reshape(-1, 2)
-        points = points[said.scene.region.distance_mm(points) > 0.5]
-        points = points[said.scene.region.contains(points)]
-        a, b = (each.surface.heights_mm(points) for each in (said, written))
+        points = points[said.contact.scene.region.distance_mm(points) > 0.5]
+        points = points[said.contact.scene.region.contains(points)]
+        a, b = (each.contact.scene.surface.heights_mm(points) for each in (said, written))
         np.testing.assert_allclose(a, b, atol=2e-5)
-        near = said.scene.region.distance_mm(points).min() > 1
+        near = said.contact.scene.region.distance_mm(points).min() > 1
         assert not near or np.array_equal(said.counts, written.counts)
 
 

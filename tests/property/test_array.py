@@ -9,11 +9,9 @@ from hypothesis import strategies as st
 
 from generator.array import FoldedArray, ProductArray, Sequence, array_from
 from generator.array.factor import is_decodable
-from generator.array.field import field_of_order
-from generator.array.notation import format_polynomial, parse_polynomial
-from generator.array.polynomial import is_primitive, mulmod, norm, powmod
-from generator.array.primitive import known_polynomials
-from generator.array.size import folds
+from generator.array.field import field_of_order, format_polynomial, parse_polynomial
+from generator.array.fold import folds
+from generator.array.polynomial import is_primitive, known_polynomials, mulmod, norm, powmod
 from generator.array.window import windows_are_unique
 
 ON_FILE = known_polynomials()

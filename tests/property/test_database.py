@@ -8,13 +8,11 @@ from hypothesis.extra import numpy as arrays
 from generator.alphabet.known import ALPHABETS
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
-from generator.database.canonical import canonical
 from generator.database.cells import faces_at, find_array, held_cells, occupied_cells
-from generator.database.entries import find_object, list_objects, object_names
 from generator.database.open import open_database
-from generator.database.read import read_object
+from generator.database.read import find_object, list_objects, object_names, read_object
 from generator.database.register import ObjectRecord, register, remove_object, same_layout
-from generator.database.registered import RegisteredPart
+from generator.database.registered import RegisteredPart, canonical
 from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError
 from generator.layout.placement import FaceLayout, Layout, Placement

@@ -9,13 +9,11 @@ from hypothesis import strategies as st
 from shapely.geometry import MultiPoint
 
 from probe.errors import SurfaceError
-from probe.surface.lattice import LatticeSurface, list_lookup
+from probe.surface.body import symbol_triangles
+from probe.surface.face import LatticeSurface, list_lookup, template
 from probe.surface.mesh import mesh
-from probe.surface.outline import outline
 from probe.surface.polygon import polygon
-from probe.surface.solids import symbol_triangles
-from probe.surface.symbols import Relief, emboss
-from probe.surface.template import template
+from probe.surface.symbols import Relief, emboss, outline
 
 NODE = st.tuples(st.integers(-1, 1), st.integers(-1, 1))
 SEEDS = st.integers(0, 2**32 - 1)

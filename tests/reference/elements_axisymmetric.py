@@ -23,7 +23,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 
-from probe.contact.elements_line import Array, LineBasis, integral, line_bases
+from probe.contact.elements_pad import Array, LineBasis, integral, line_bases
 from probe.errors import ContactError
 
 Kind = Literal["q1", "q2", "q1p0", "q2q1"]

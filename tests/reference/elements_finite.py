@@ -20,7 +20,7 @@ import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 from skfem import Basis, ElementHex1, ElementQuad1, MeshHex, MeshQuad
 
-from probe.contact.elements_line import Array
+from probe.contact.elements_pad import Array
 from probe.errors import ContactError
 
 NEWTON = 25  #: iterations of a load step

@@ -19,7 +19,7 @@ import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.elements_line import Array
+from probe.contact.elements_pad import Array
 from probe.errors import ContactError
 from reference.elements_axisymmetric import Kind, Section, section
 

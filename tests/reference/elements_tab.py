@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from skfem import MeshHex, MeshQuad
 
-from probe.contact.elements_line import Array
+from probe.contact.elements_pad import Array
 from probe.errors import ContactError
 from reference.elements_finite import Block, block, deformed
 

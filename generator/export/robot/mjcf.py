@@ -5,10 +5,36 @@ Geoms in group 2 are seen, those in group 3 are hit, as in MuJoCo's own models.
 
 from __future__ import annotations
 
+from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from generator.export.robot.model import RobotModel
-from generator.export.robot.text import document, numbers, quaternion, rgba
+import numpy as np
+
+from encoded_objects.base.errors import require
+from generator.export.formats import ExportedObject, Files
+from generator.export.robot.model import (
+    ReadModel,
+    RobotModel,
+    compare_model,
+    document,
+    mesh_files,
+    numbers,
+    pose_of,
+    quaternion,
+    rgba,
+    rotation_of,
+)
+
+
+def write(exported: ExportedObject) -> Files:
+    """Yield the meshes and the file."""
+    yield from mesh_files(exported.robot)
+    yield f"{exported.name}.xml", mjcf_bytes(exported.robot)
+
+
+def verify(exported: ExportedObject, path: Path) -> None:
+    """Read a file back by another program; raises `SolidError` where it is not the model."""
+    compare_model(exported.robot, read(exported.robot, path), path)
 
 
 def mjcf_bytes(model: RobotModel) -> bytes:
@@ -48,3 +74,21 @@ def mjcf_bytes(model: RobotModel) -> bytes:
             quat=numbers(quaternion(T[:3, :3])), size="0.001", group="4",
         )  # fmt: skip
     return document(root)
+
+
+def read(model: RobotModel, path: Path) -> ReadModel:
+    """Return what MuJoCo makes of a file."""
+    require("mujoco", extra="robot", purpose="--verify of mjcf")
+    import mujoco
+
+    read = mujoco.MjModel.from_xml_path(str(path))
+    body = read.body(model.name).id
+    turn = rotation_of(read.body_iquat[body])
+    frames = {}
+    for frame in model.frames:
+        site = read.site(frame.name).id
+        frames[frame.face] = pose_of(rotation_of(read.site_quat[site]), read.site_pos[site])
+    return ReadModel(
+        float(read.body_mass[body]), np.array(read.body_ipos[body]),
+        turn @ np.diag(read.body_inertia[body]) @ turn.T, frames,
+    )  # fmt: skip

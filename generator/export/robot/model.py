@@ -1,16 +1,22 @@
-"""Parts -> the object as one rigid body: what is seen, what is hit, mass, and frames of faces.
+"""Parts -> the object as one rigid body, and what the files of robots share.
 
 Seen: the bodies of all parts in one mesh, and the symbols. Hit: the plain shape as convex
 pieces, and where asked for the symbols as convex pieces of their own, each piece one mesh that
 stands wherever its symbol does. Mass, centre and inertia: of the parts as they are printed,
-symbols and marks included, all solid; an object of panels is hollow. Object frame, m, kg.
+symbols and marks included, all solid; an object of panels is hollow. Metres, kilograms, radians;
+the origin is that of the object frame, so that the frame of a face is its `T_object_face`.
+
+`mjcf`, `urdf`, `sdf` and `usd` each write the model and read it back by another program.
 """
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +28,16 @@ from generator.polyhedron import Polyhedron, face_frame
 from generator.solid import Mesh, Part, body_mesh, emboss_whole, symbol_meshes
 from generator.solid.convex import ConvexPieces, ConvexSettings, convex_pieces
 from generator.solid.emboss import to_part, turn
-from generator.solid.inertia import inertia_of
-from generator.solid.template import closed_template
+from generator.solid.measure import inertia_of
+from generator.solid.triangulate import closed_template
 
 Floats = NDArray[np.float64]
 M = 1e-3  #: metres in a millimetre
+ZERO = 1e-16  #: nothing in a file is smaller: rotations, metres, kilograms
+GIMBAL = 1e-12  #: a cosine of the pitch below it leaves roll and yaw one freedom
+_BLOCK = 65_536  #: lines written at once
+SHARE = 1e-6  #: by which a mass or inertia that is read may be off: USD has 32-bit floats
+POSE_M = 1e-7  #: the same of a point, m, and of the elements of a rotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -216,3 +227,128 @@ def _mesh_of(
 def _moved(T: Floats, points: Floats) -> Floats:
     moved: Floats = points @ T[:3, :3].T + T[:3, 3]
     return moved
+
+
+def mesh_files(model: RobotModel) -> Iterator[tuple[str, Iterator[bytes]]]:
+    """Yield name and content of the files of meshes, Wavefront OBJ."""
+    for mesh in model.meshes:
+        yield f"{mesh.name}.obj", _obj(mesh)
+
+
+def _obj(mesh: ModelMesh) -> Iterator[bytes]:
+    """Yield a Wavefront OBJ: metres, so that no slicer takes it for a part."""
+    yield b"# metres\n"
+    for line, rows in (
+        ("v %.8g %.8g %.8g\n", mesh.vertices + 0.0),
+        ("f %d %d %d\n", mesh.triangles + 1),
+    ):
+        for start in range(0, len(rows), _BLOCK):
+            block = rows[start : start + _BLOCK]
+            yield (line * len(block) % tuple(block.ravel().tolist())).encode()
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Return numbers with spaces between, to 15 digits; what is rounding about zero is zero."""
+    return " ".join(f"{value if abs(value) > ZERO else 0.0:.15g}" for value in values)
+
+
+def rgba(colour: RGB) -> str:
+    """Return a colour of 0 to 255 as four numbers of 0 to 1."""
+    return numbers([*(round(value / 255, 4) for value in colour), 1])
+
+
+def quaternion(R: Floats) -> Floats:
+    """Return (w, x, y, z) of a rotation (3, 3), w not below 0; by the largest of the four."""
+    square = np.array(
+        [
+            1 + R[0, 0] + R[1, 1] + R[2, 2],
+            1 + R[0, 0] - R[1, 1] - R[2, 2],
+            1 - R[0, 0] + R[1, 1] - R[2, 2],
+            1 - R[0, 0] - R[1, 1] + R[2, 2],
+        ]
+    )
+    largest = int(np.argmax(square))
+    products = np.array(
+        [
+            [square[0], R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
+            [R[2, 1] - R[1, 2], square[1], R[1, 0] + R[0, 1], R[0, 2] + R[2, 0]],
+            [R[0, 2] - R[2, 0], R[1, 0] + R[0, 1], square[2], R[2, 1] + R[1, 2]],
+            [R[1, 0] - R[0, 1], R[0, 2] + R[2, 0], R[2, 1] + R[1, 2], square[3]],
+        ]
+    )
+    found: Floats = products[largest] / np.linalg.norm(products[largest])
+    return -found if found[0] < 0 else found
+
+
+def roll_pitch_yaw(R: Floats) -> tuple[float, float, float]:
+    """Return the angles with R = Rz(yaw) Ry(pitch) Rx(roll), rad; yaw is 0 where it is free."""
+    cosine = math.hypot(R[0, 0], R[1, 0])
+    pitch = math.atan2(-R[2, 0], cosine)
+    if cosine < GIMBAL:
+        return math.atan2(-R[1, 2], R[1, 1]), pitch, 0.0
+    return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
+
+
+def pose(T: Floats) -> str:
+    """Return x y z roll pitch yaw of a pose (4, 4)."""
+    return numbers([*T[:3, 3], *roll_pitch_yaw(T[:3, :3])])
+
+
+def document(root: ElementTree.Element) -> bytes:
+    """Return an XML file, indented."""
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReadModel:
+    """A model as a program read it."""
+
+    mass_kg: float
+    centre_m: Floats  #: (3,)
+    inertia_kg_m2: Floats  #: (3, 3) about the centre, axes of the object
+    frames: Mapping[str, Floats]  #: (4, 4) m, by face
+
+
+def compare_model(model: RobotModel, read: ReadModel, path: Path) -> None:
+    """Compare a file, as a program read it, with the model.
+
+    Raises
+    ------
+    SolidError
+        It says something else than was meant.
+    """
+    moment = float(np.abs(model.inertia_kg_m2).max())
+    wrong = []
+    if abs(read.mass_kg / model.mass_kg - 1) > SHARE:
+        wrong.append(f"a mass of {read.mass_kg:g} kg where {model.mass_kg:g} kg was meant")
+    if np.abs(read.centre_m - model.centre_m).max() > POSE_M:
+        wrong.append("another centre of mass than was meant")
+    if np.abs(read.inertia_kg_m2 - model.inertia_kg_m2).max() > SHARE * moment:
+        wrong.append("another inertia than was meant")
+    for frame in model.frames:
+        found = read.frames.get(frame.face)
+        if found is None or np.abs(found - frame.T_object_face).max() > POSE_M:
+            wrong.append(f"another frame of {frame.face} than was meant")
+    if wrong:
+        raise SolidError(
+            f"'{path.name}' has " + ", ".join(wrong),
+            fix="do not load it; report the spec together with this message",
+            place=str(path),
+        )
+
+
+def rotation_of(quaternion: Floats) -> Floats:
+    """Return (3, 3) of (w, x, y, z)."""
+    from scipy.spatial.transform import Rotation
+
+    turned: Floats = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
+    return turned
+
+
+def pose_of(R: Floats, at: Floats) -> Floats:
+    """Return the pose (4, 4) of a rotation and a point."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, at
+    return T

@@ -5,12 +5,39 @@ Frames are `F1`, `F2`, ... in the scope of the model: `Cube::F1` from outside.
 
 from __future__ import annotations
 
+from pathlib import Path
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from generator.export.robot.model import ModelMesh, RobotModel
-from generator.export.robot.text import document, numbers, pose, rgba
+import numpy as np
+
+from generator.export.formats import ExportedObject, Files
+from generator.export.robot.model import (
+    Floats,
+    ModelMesh,
+    ReadModel,
+    RobotModel,
+    compare_model,
+    document,
+    mesh_files,
+    numbers,
+    pose,
+    pose_of,
+    rgba,
+)
 
 LINK = "body"
+
+
+def write(exported: ExportedObject) -> Files:
+    """Yield the meshes and the file."""
+    yield from mesh_files(exported.robot)
+    yield f"{exported.name}.sdf", sdf_bytes(exported.robot)
+
+
+def verify(exported: ExportedObject, path: Path) -> None:
+    """Read a file back; raises `SolidError` where it is not the model."""
+    compare_model(exported.robot, read(exported.robot, path), path)
 
 
 def sdf_bytes(model: RobotModel) -> bytes:
@@ -45,3 +72,29 @@ def sdf_bytes(model: RobotModel) -> bytes:
 def _geometry(parent: Element, mesh: ModelMesh) -> None:
     shape = SubElement(SubElement(parent, "geometry"), "mesh")
     SubElement(shape, "uri").text = f"{mesh.name}.obj"
+
+
+def read(_model: RobotModel, path: Path) -> ReadModel:
+    """Return what a file says, taken as XML."""
+    from scipy.spatial.transform import Rotation
+
+    body = ElementTree.parse(path).find("model")  # noqa: S314  our own file
+    inertial = None if body is None else body.find("link/inertial")
+    if body is None or inertial is None:
+        return ReadModel(0.0, np.zeros(3), np.zeros((3, 3)), {})
+
+    def values(element: ElementTree.Element, name: str) -> Floats:
+        return np.array(element.findtext(name, "").split(), np.float64)
+
+    tensor = np.zeros((3, 3))
+    for i in range(3):
+        for k in range(3):
+            key = f"inertia/i{'xyz'[min(i, k)]}{'xyz'[max(i, k)]}"
+            tensor[i, k] = values(inertial, key)[0]
+    frames = {
+        frame.attrib["name"]: pose_of(Rotation.from_euler("xyz", at[3:]).as_matrix(), at[:3])
+        for frame in body.findall("frame")
+        for at in [values(frame, "pose")]
+    }
+    mass, centre = values(inertial, "mass"), values(inertial, "pose")
+    return ReadModel(float(mass[0]), centre[:3], tensor, frames)

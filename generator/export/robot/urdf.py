@@ -6,13 +6,37 @@ Mesh files are named relative to the file, which yourdfpy, PyBullet and Drake fo
 
 from __future__ import annotations
 
+from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
+from encoded_objects.base.errors import require
 from generator.export.colours import hexadecimal
-from generator.export.robot.model import ModelMesh, RobotModel
-from generator.export.robot.text import Floats, document, numbers, rgba, roll_pitch_yaw
+from generator.export.formats import ExportedObject, Files
+from generator.export.robot.model import (
+    Floats,
+    ModelMesh,
+    ReadModel,
+    RobotModel,
+    compare_model,
+    document,
+    mesh_files,
+    numbers,
+    rgba,
+    roll_pitch_yaw,
+)
 
 Attributes = dict[str, str]
+
+
+def write(exported: ExportedObject) -> Files:
+    """Yield the meshes and the file."""
+    yield from mesh_files(exported.robot)
+    yield f"{exported.name}.urdf", urdf_bytes(exported.robot)
+
+
+def verify(exported: ExportedObject, path: Path) -> None:
+    """Read a file back by another program; raises `SolidError` where it is not the model."""
+    compare_model(exported.robot, read(exported.robot, path), path)
 
 
 def urdf_bytes(model: RobotModel) -> bytes:
@@ -54,3 +78,14 @@ def _origin(T: Floats) -> Attributes:
 
 def _geometry(parent: Element, mesh: ModelMesh) -> None:
     SubElement(SubElement(parent, "geometry"), "mesh", filename=f"{mesh.name}.obj")
+
+
+def read(model: RobotModel, path: Path) -> ReadModel:
+    """Return what yourdfpy makes of a file."""
+    require("yourdfpy", extra="robot", purpose="--verify of urdf")
+    import yourdfpy
+
+    read = yourdfpy.URDF.load(str(path))
+    inertial = read.link_map[model.name].inertial
+    frames = {frame.face: read.get_transform(frame.name, model.name) for frame in model.frames}
+    return ReadModel(inertial.mass, inertial.origin[:3, 3], inertial.inertia, frames)

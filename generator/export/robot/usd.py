@@ -9,16 +9,36 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from encoded_objects.base.errors import require
 from generator.export.colours import RGB
-from generator.export.robot.model import ModelMesh, PlacedMesh, RobotModel
-from generator.export.robot.text import numbers, quaternion
+from generator.export.formats import ExportedObject, Files
+from generator.export.robot.model import (
+    Floats,
+    ModelMesh,
+    PlacedMesh,
+    ReadModel,
+    RobotModel,
+    compare_model,
+    numbers,
+    quaternion,
+    rotation_of,
+)
 
-Floats = NDArray[np.float64]
 _ROW = 4096  #: points or triangles on a line of text
+
+
+def write(exported: ExportedObject) -> Files:
+    """Yield the file, which holds the meshes."""
+    yield f"{exported.name}.usda", usd_chunks(exported.robot)
+
+
+def verify(exported: ExportedObject, path: Path) -> None:
+    """Read a file back by another program; raises `SolidError` where it is not the model."""
+    compare_model(exported.robot, read(exported.robot, path), path)
 
 
 def usd_chunks(model: RobotModel) -> Iterator[bytes]:
@@ -116,3 +136,27 @@ def _matrix(T: Floats, indent: int = 8) -> str:
 
 def _tuple(values: Floats) -> str:
     return f"({numbers(values.tolist()).replace(' ', ', ')})"
+
+
+def read(model: RobotModel, path: Path) -> ReadModel:
+    """Return what OpenUSD makes of a file."""
+    require("pxr.Usd", extra="usd", purpose="--verify of usd")
+    from pxr import Usd, UsdGeom, UsdPhysics
+
+    stage = Usd.Stage.Open(str(path))
+    root = stage.GetDefaultPrim()
+    mass = UsdPhysics.MassAPI(root)
+    quaternion = mass.GetPrincipalAxesAttr().Get()
+    turn = rotation_of(np.array([quaternion.GetReal(), *quaternion.GetImaginary()], np.float64))
+    frames = {
+        frame.face: np.array(
+            UsdGeom.Xformable(
+                root.GetChild(prim_name(frame.face))
+            ).ComputeLocalToWorldTransform(Usd.TimeCode.Default())
+        ).T
+        for frame in model.frames
+    }  # fmt: skip
+    return ReadModel(
+        mass.GetMassAttr().Get(), np.array(mass.GetCenterOfMassAttr().Get(), np.float64),
+        turn @ np.diag(np.array(mass.GetDiagonalInertiaAttr().Get(), np.float64)) @ turn.T, frames,
+    )  # fmt: skip

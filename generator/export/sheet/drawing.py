@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from generator.export.bed import BedPlace, Plate
 from generator.export.colours import BODY_RGB, SYMBOL_RGB, hexadecimal
 from generator.plane.polygon import face_vector
-from generator.solid.frame import in_frame, plane_frame
-from generator.solid.part import Embossing, Part
+from generator.solid.part import Embossing, Part, in_frame, plane_frame
 
 Points = NDArray[np.float64]
 

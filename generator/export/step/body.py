@@ -15,8 +15,7 @@ from generator.export.step.entities import (
     triple,
     unit,
 )
-from generator.solid.analytic import AnalyticFace, Rim
-from generator.solid.part import Part
+from generator.solid.part import AnalyticFace, Part, Rim
 
 
 class StepBody:

@@ -22,7 +22,7 @@ from generator.export.step.entities import (
     triple,
     unit,
 )
-from generator.solid.analytic import AnalyticFace, BentSymbol
+from generator.solid.part import AnalyticFace, BentSymbol
 
 Points = NDArray[np.float64]
 

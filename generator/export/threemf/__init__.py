@@ -26,6 +26,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from generator.export.bed import Plate, Size, arrange_plates
+from generator.export.formats import ExportedObject, Files
 from generator.export.slicer_settings import SlicerSettings
 from generator.export.threemf.meshes import BedPart, bed_part, bed_part_of_mesh
 from generator.export.threemf.model import plate_packages
@@ -40,6 +41,14 @@ class PrintFile:
     plate: Plate
     content: bytes  #: body and symbols as components
     prusaslicer: bytes  #: as volumes
+
+
+def write_plates(exported: ExportedObject) -> Files:
+    """Yield both 3MF files of each plate of an object."""
+    for number, plate in enumerate(exported.plates, 1):
+        stem = exported.name + (f"-plate-{number}" if len(exported.plates) > 1 else "")
+        yield f"{stem}.3mf", plate.content
+        yield f"{stem}-prusaslicer.3mf", plate.prusaslicer
 
 
 def print_files(

@@ -1,6 +1,6 @@
 """STL, binary and ASCII: bytes -> triangles in mm. Normals in the file are not used.
 
-The one reader of STL, for models that people bring and (`generator.database.part_triangles`)
+The one reader of STL, for models that people bring and (`generator.database.part_file`)
 for written parts: it names the line or the byte at fault.
 """
 

@@ -3,10 +3,26 @@
 Every facet that is made is planar: the strip's own ones less the feet, the tops piece by piece,
 the sides as triangles. Points that pieces share have one number, so the part stays closed, which
 `prove_closed` checks edge by edge. Object frame, mm. Thesis 6.3.
+
+A strip of facets: from the plane in which symbols are laid out to the solid.
+
+A point is (x, y) in the plane and z above it, mm. Facet i lies between line i and line i + 1.
+At height z over a facet the strip is the facet's plane moved outward by z; over a line it is
+where the moved planes of both neighbours meet. In between a point is carried along by the share
+at which it lies between the two lines, so that what meets on a line in the plane meets there on
+the solid, and what is level in the plane is level over its facet.
+
+A symbol in the plane of a strip, cut along the lines between its facets.
+
+Tiers at their place -> the pieces of foot, sides and top on each facet. Every cut point is
+made once and shared by all pieces that meet there, so the pieces close up as the symbol did.
+A corner nearer to a line than `nudge_mm` is moved to that distance, on its own side: no
+point lies on a line, no edge runs along one, and no piece is thinner. Lengths in mm.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -16,16 +32,314 @@ from numpy.typing import NDArray
 from generator.alphabet.outline import Tiers
 from generator.errors import SolidError
 from generator.layout.placement import FaceLayout
+from generator.plane.polygon import points_inside, signed_area
 from generator.polyhedron.developable import Developable
-from generator.polyhedron.development import development
+from generator.polyhedron.development import Development, development
 from generator.polyhedron.winged import Polyhedron
 from generator.solid.emboss import turn
 from generator.solid.part import Facet, WrappedSymbols
-from generator.solid.wrap.cut import CutSymbol, cut_symbol
-from generator.solid.wrap.strip import Strip, strip_of
-from generator.solid.wrap.walk import Loop, loops_of, with_holes
+from generator.solid.settings import EMBOSS
 
 Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Strip:
+    """A development with what is asked of it again and again."""
+
+    development: Development
+    right: Points  #: (n + 1, 2) unit normals of the lines, to the right
+
+    @property
+    def facets(self) -> int:
+        """Number of facets."""
+        return len(self.development.T_object_flat)
+
+    def beside(self, line: int, points: Points) -> Points:
+        """Return how far points (k, 2) lie to the right of a line, mm."""
+        distance: Points = (points - self.development.low[line]) @ self.right[line]
+        return distance
+
+    def along(self, line: int, points: Points) -> Points:
+        """Return how far up a line points (k, 2) lie, from its lower end, mm."""
+        up = self.development.high[line] - self.development.low[line]
+        height: Points = (points - self.development.low[line]) @ (up / np.hypot(*up))
+        return height
+
+    def facet_of(self, point: Points) -> int:
+        """Return the facet that holds a point (2,) of the plane; -1 where none does."""
+        d = self.development
+        offset = point - d.low
+        side = (offset * self.right).sum(axis=1)
+        up = d.high - d.low
+        length = np.hypot(up[:, 0], up[:, 1])
+        height = (offset * up).sum(axis=1) / length
+        # Beyond the tip of a cone there is a mirror image of every facet; ends are not square.
+        slack = np.abs(np.diff(d.low, axis=0)).max() + np.abs(np.diff(d.high, axis=0)).max()
+        near = (height > -slack) & (height < length + slack)
+        held = (side[:-1] >= 0.0) & (side[1:] < 0.0) & near[:-1]
+        return int(np.argmax(held)) if held.any() else -1
+
+    def lifted(self, facet: int, points: Points, z_mm: Points) -> Points:
+        """Return points (k, 2) of a facet at heights (k,) on the solid, (k, 3) object frame."""
+        d = self.development
+        left, right = self.beside(facet, points), -self.beside(facet + 1, points)
+        share = (left / (left + right))[:, None]
+        bend = (1.0 - share) * d.bends[facet] + share * d.bends[facet + 1]
+        T = d.T_object_flat[facet]
+        lifted: Points = points @ T[:3, :2].T + T[:3, 3] + z_mm[:, None] * bend
+        return lifted
+
+    def lifted_line(self, line: int, points: Points, z_mm: Points) -> Points:
+        """Return points (k, 2) on a line at heights (k,) on the solid, (k, 3) object frame."""
+        d = self.development
+        T = d.T_object_flat[min(line, self.facets - 1)]
+        lifted: Points = points @ T[:3, :2].T + T[:3, 3] + z_mm[:, None] * d.bends[line]
+        return lifted
+
+
+def strip_of(development: Development) -> Strip:
+    """Return the strip of a development."""
+    up = development.high - development.low
+    up = up / np.hypot(up[:, 0], up[:, 1])[:, None]
+    return Strip(development, np.column_stack([up[:, 1], -up[:, 0]]))
+
+
+Loop = tuple[int, ...]
+
+
+def loops_of(edges: Sequence[tuple[int, int]], place: str) -> list[Loop]:
+    """Return the loops that directed edges make.
+
+    Raises
+    ------
+    SolidError
+        A point has not exactly one edge in and one out.
+    """
+    after = dict(edges)
+    if len(after) != len(edges) or set(after) != set(after.values()):
+        raise SolidError("the cut of a symbol does not close", place=place)
+    loops = []
+    while after:
+        first, at = next(iter(after.items()))
+        loop = [first]
+        del after[first]
+        while at != first:
+            loop.append(at)
+            at = after.pop(at)
+        loops.append(tuple(loop))
+    return loops
+
+
+def with_holes(loops: Sequence[Loop], points: NDArray[np.float64]) -> list[tuple[Loop, ...]]:
+    """Return each counter-clockwise loop with the clockwise ones that lie in it.
+
+    Parameters
+    ----------
+    loops
+        Of numbers into `points`; none crosses another.
+    points
+        (k, 2).
+    """
+    areas = [signed_area(points[list(loop)]) for loop in loops]
+    outer = sorted((k for k, area in enumerate(areas) if area > 0), key=lambda k: areas[k])
+    found: dict[int, list[Loop]] = {k: [loops[k]] for k in outer}
+    for k, area in enumerate(areas):
+        if area > 0:
+            continue
+        corner = points[list(loops[k][:1])]
+        holder = next(  # the smallest that holds it
+            (o for o in outer if points_inside(corner, [points[list(loops[o])]])[0]), None
+        )
+        if holder is None:
+            raise SolidError("a hole lies outside of every outline")
+        found[holder].append(loops[k])
+    return [tuple(found[k]) for k in sorted(found)]
+
+
+@dataclass(slots=True)
+class CutSymbol:
+    """A symbol in pieces; points are numbered, pieces name them."""
+
+    flat: list[Points] = field(default_factory=list)  #: (2,) in the plane
+    z_mm: list[float] = field(default_factory=list)
+    facet: list[int] = field(default_factory=list)  #: that a point lies in; -1 on a line
+    line: list[int] = field(default_factory=list)  #: that a point lies on; -1 in a facet
+    sides: list[tuple[int, Loop]] = field(default_factory=list)  #: facet, convex piece
+    tops: list[tuple[int, tuple[Loop, ...]]] = field(default_factory=list)  #: facet, with holes
+    feet: list[tuple[int, tuple[Loop, ...]]] = field(default_factory=list)
+    outline: dict[int, list[tuple[int, int]]] = field(default_factory=dict)  #: foot, by facet
+    crossed: dict[int, list[int]] = field(default_factory=dict)  #: line -> points of the foot
+
+
+def cut_symbol(
+    strip: Strip, rings: list[list[Points]], z_mm: list[float], centre: Points, place: str
+) -> CutSymbol:
+    """Cut a symbol.
+
+    Parameters
+    ----------
+    strip
+        The facets.
+    rings
+        [tier][ring] (k, 2) in the plane, outer counter-clockwise, holes clockwise.
+    z_mm
+        Height of each tier.
+    centre
+        (2,) of the symbol; inside a facet.
+    place
+        Names the symbol in errors.
+    """
+    return _Knife(strip, rings, z_mm, centre, place).cut()
+
+
+class _Knife:
+    """Cuts one symbol."""
+
+    def __init__(
+        self, strip: Strip, rings: list[list[Points]], z_mm: list[float], centre: Points, place: str
+    ) -> None:
+        self.strip, self.z_mm, self.place = strip, z_mm, place
+        self.made = CutSymbol()
+        home = strip.facet_of(centre)
+        if home < 0:
+            raise SolidError("a symbol lies beside its face", place=place)
+        foot = np.concatenate([ring for tier in rings for ring in tier])
+        first, last = home, home + 1  # lines around the symbol, neither of which it meets
+        while first > 0 and strip.beside(first, foot).min() < EMBOSS.nudge_mm:
+            first -= 1
+        while last < strip.facets and strip.beside(last, foot).max() > -EMBOSS.nudge_mm:
+            last += 1
+        if strip.beside(first, foot).min() <= 0.0 or strip.beside(last, foot).max() >= 0.0:
+            raise SolidError("a symbol reaches over the side of its face", place=place)
+        self.first, self.lines = first, range(first + 1, last)
+        self.points = [[self._numbered(ring, z) for ring in tier]
+                       for tier, z in zip(rings, z_mm, strict=True)]  # fmt: skip
+        self.on_edge: dict[tuple[int, int], list[int]] = {}
+
+    def cut(self) -> CutSymbol:
+        """Return all pieces."""
+        made = self.made
+        cycles = [[self._cycle(ring) for ring in tier] for tier in self.points]
+        for lower, upper in pairwise(self.points):
+            for a, b in zip(lower, upper, strict=True):
+                for k in range(len(a)):
+                    j = (k + 1) % len(a)
+                    made.sides += self._convex([a[k], a[j], b[j], b[k]])
+        made.tops = list(self._pieces(cycles[-1]))
+        made.feet = list(self._pieces(cycles[0]))
+        for cycle in cycles[0]:
+            for start, end in self._edges(cycle):
+                made.outline.setdefault(self._facet_between(start, end), []).append((start, end))
+            for number in cycle:
+                if made.line[number] >= 0:
+                    made.crossed.setdefault(made.line[number], []).append(number)
+        return made
+
+    def _numbered(self, ring: Points, z: float) -> list[int]:
+        """Add the corners of a ring; return their numbers."""
+        ring = ring.copy()
+        facet = np.full(len(ring), self.first)
+        for line in self.lines:
+            beside = self.strip.beside(line, ring)
+            off = np.where(
+                beside < 0.0,
+                np.minimum(beside, -EMBOSS.nudge_mm),
+                np.maximum(beside, EMBOSS.nudge_mm),
+            )
+            ring += (off - beside)[:, None] * self.strip.right[line]
+            facet = np.where(off > 0.0, line, facet)
+        first = len(self.made.flat)
+        for point, number in zip(ring, facet.tolist(), strict=True):
+            self._add(point, z, number, -1)
+        return list(range(first, first + len(ring)))
+
+    def _add(self, point: Points, z: float, facet: int, line: int) -> int:
+        made = self.made
+        made.flat.append(point)
+        made.z_mm.append(z)
+        made.facet.append(facet)
+        made.line.append(line)
+        return len(made.flat) - 1
+
+    def _between(self, start: int, end: int) -> list[int]:
+        """Return the points at which the edge from one corner to another meets lines."""
+        if (end, start) in self.on_edge:
+            return self.on_edge[end, start][::-1]
+        if (start, end) not in self.on_edge:
+            made = self.made
+            a, b = made.facet[start], made.facet[end]
+            lines = range(a + 1, b + 1) if a < b else range(a, b, -1)
+            ends = np.array([made.flat[start], made.flat[end]])
+            found = []
+            for line in lines:
+                one, two = self.strip.beside(line, ends).tolist()
+                share = one / (one - two)
+                z = made.z_mm[start] + share * (made.z_mm[end] - made.z_mm[start])
+                found.append(self._add(ends[0] + share * (ends[1] - ends[0]), z, -1, line))
+            self.on_edge[start, end] = found
+        return self.on_edge[start, end]
+
+    def _cycle(self, corners: list[int]) -> list[int]:
+        """Return corners and cut points around a ring."""
+        cycle = []
+        for start, end in pairwise([*corners, corners[0]]):
+            cycle += [start, *self._between(start, end)]
+        return cycle
+
+    def _edges(self, cycle: list[int]) -> Iterator[tuple[int, int]]:
+        return pairwise([*cycle, cycle[0]])
+
+    def _facet_between(self, start: int, end: int) -> int:
+        """Return the facet that an uncut edge lies in."""
+        made = self.made
+        for number in (start, end):
+            if made.facet[number] >= 0:
+                return made.facet[number]
+        return min(made.line[start], made.line[end])  # from line to line across one facet
+
+    def _convex(self, corners: list[int]) -> list[tuple[int, Loop]]:
+        """Return the pieces of a side, a convex quadrilateral when it stands."""
+        made = self.made
+        cycle = self._cycle(corners)
+        facets = {made.facet[k] for k in corners}
+        found = []
+        for facet in range(min(facets), max(facets) + 1):
+            piece = tuple(
+                k for k in cycle if made.facet[k] == facet or made.line[k] in (facet, facet + 1)
+            )
+            for line in (facet, facet + 1):
+                if sum(made.line[k] == line for k in piece) not in (0, 2):
+                    raise SolidError("a side of a symbol is not convex", place=self.place)
+            found.append((facet, piece))
+        return found
+
+    def _pieces(self, cycles: list[list[int]]) -> Iterator[tuple[int, tuple[Loop, ...]]]:
+        """Yield the pieces of a level area."""
+        made = self.made
+        edges: dict[int, list[tuple[int, int]]] = {}
+        crossed: dict[int, list[int]] = {}
+        for cycle in cycles:
+            for start, end in self._edges(cycle):
+                edges.setdefault(self._facet_between(start, end), []).append((start, end))
+            for number in cycle:
+                if made.line[number] >= 0:
+                    crossed.setdefault(made.line[number], []).append(number)
+        for line, numbers in crossed.items():
+            ordered = up_the_line(self.strip, line, numbers, made)
+            for low, high in zip(ordered[::2], ordered[1::2], strict=True):
+                edges.setdefault(line - 1, []).append((low, high))
+                edges.setdefault(line, []).append((high, low))
+        points = np.array(made.flat)
+        for facet in sorted(edges):
+            for loops in with_holes(loops_of(edges[facet], self.place), points):
+                yield facet, loops
+
+
+def up_the_line(strip: Strip, line: int, numbers: list[int], made: CutSymbol) -> list[int]:
+    """Return points of a line from the lowest to the highest."""
+    heights = strip.along(line, np.array([made.flat[k] for k in numbers])).tolist()
+    return [number for _, number in sorted(zip(heights, numbers, strict=True))]
 
 
 @dataclass(slots=True)

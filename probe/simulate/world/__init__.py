@@ -2,11 +2,9 @@
 
 ::
 
-    levels     how bad sensors and prints are: a table;  sensor_copy  one sensor among its like
-    reading    what a sensor of a level reads of a touch;  mounting  wired otherwise than drawn
-    distorted  a print that is off in scale and stroke;  worn  one whose symbols are gone
-    foreign    surfaces that no database knows
-    extremes   stiff and extreme scenes for the contact models
+    levels     how bad sensors and prints are: a table
+    sensor     a sensor of a level among its like: scene + touch -> counts
+    surfaces   prints that are off, symbols that are gone, parts side by side, foreign surfaces
 
-Nothing here knows a reader: counts go out, and the truth stays with who asked.
+Nothing here knows a reader: counts go out, and the truth stays with the caller.
 """

@@ -1,4 +1,4 @@
-"""How bad sensors and prints are: a table of values, a line a level, none known to a reader.
+"""How bad sensors and prints are: a table of values, a level a line, none known to a reader.
 
 `low`, `typical`, `hard` and `mismatch` are sensors as they are made and prints as they come, in
 rising severity; `mismatch` is wrong in everything at once. The others are `TYPICAL` with one

@@ -6,7 +6,7 @@ import pytest
 from decoder import MethodError, WindowError, decode_exact
 from decoder.exact import conversion
 from generator.array import PROFILES, array_from
-from generator.array.primitive import search_primitive
+from generator.array.polynomial import search_primitive
 
 METHODS = ("table", "serial", "milestones", "logarithm")
 

@@ -18,8 +18,8 @@ from generator.array import (
     profile,
 )
 from generator.array.field import field_of_order
-from generator.array.primitive import primitive_polynomial
-from generator.array.size import folds, usual_fold
+from generator.array.fold import folds, usual_fold
+from generator.array.polynomial import primitive_polynomial
 from generator.array.window import (
     echelon,
     least_weight_by_dual,

@@ -6,8 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from generator.array import factor, notation, polynomial, primitive
-from generator.array.field import MINIMAL_POLYNOMIALS, field_of_order
+from generator.array import factor, polynomial
+from generator.array.field import (
+    MINIMAL_POLYNOMIALS,
+    field_of_order,
+    format_polynomial,
+    parse_polynomial,
+)
 from generator.array.residue import Powers, Residues, pack_words, rank_modulo
 from generator.errors import ArrayError
 
@@ -132,7 +137,7 @@ def test_period_factors_multiply_to_the_period(q):
 
 
 def test_every_polynomial_on_file_is_primitive():
-    entries = primitive.known_polynomials()
+    entries = polynomial.known_polynomials()
     degrees = {q: {p.degree for p in entries if p.order == q} for q in ORDERS}
     assert degrees[2] == set(range(2, 65))
     assert degrees[4] == set(range(1, 33))
@@ -149,16 +154,16 @@ def test_every_polynomial_on_file_is_primitive():
 
 @pytest.mark.parametrize(("q", "n"), [(2, 17), (2, 40), (3, 11), (4, 12), (5, 6), (9, 1), (16, 2)])
 def test_search_repeats_what_is_on_file(q, n):
-    assert primitive.search_primitive(q, n) == primitive.primitive_polynomial(q, n)
+    assert polynomial.search_primitive(q, n) == polynomial.primitive_polynomial(q, n)
 
 
 def test_primitive_polynomial_that_is_not_on_file():
     with pytest.raises(ArrayError, match=r"degrees 1 to 8.*search_primitive\(32, 9\)"):
-        primitive.primitive_polynomial(32, 9)
+        polynomial.primitive_polynomial(32, 9)
     with pytest.raises(ArrayError, match="none is for this field"):
-        primitive.primitive_polynomial(121, 2)
+        polynomial.primitive_polynomial(121, 2)
     with pytest.raises(ArrayError, match=r"from table 5\.1 is on file; on file: degrees 4 to 10"):
-        primitive.primitive_polynomial(2, 12, "table 5.1")
+        polynomial.primitive_polynomial(2, 12, "table 5.1")
 
 
 @pytest.mark.parametrize("q", [2, 3, 4, 5, 8, 9])
@@ -208,8 +213,8 @@ def test_orders_of_reducible_and_unsuitable_polynomials():
 )
 def test_written_polynomials(q, text, labels):
     field = field_of_order(q)
-    assert notation.parse_polynomial(field, text) == labels
-    assert notation.parse_polynomial(field, notation.format_polynomial(field, labels)) == labels
+    assert parse_polynomial(field, text) == labels
+    assert parse_polynomial(field, format_polynomial(field, labels)) == labels
 
 
 @pytest.mark.parametrize(
@@ -219,7 +224,7 @@ def test_written_polynomials(q, text, labels):
 )  # fmt: skip
 def test_polynomials_that_are_not_understood(q, text):
     with pytest.raises(ArrayError):
-        notation.parse_polynomial(field_of_order(q), text)
+        parse_polynomial(field_of_order(q), text)
 
 
 @pytest.mark.parametrize(("p", "modulus"), [(2, (1, 1, 0, 0, 1)), (3, (2, 1, 1)), (5, (3, 1))])

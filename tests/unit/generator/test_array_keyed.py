@@ -9,11 +9,9 @@ from reference.visible import PoseGrid, visible_sets
 
 from generator.array import FoldedArray, Sequence, array_from, profile
 from generator.array.field import field_of_order
-from generator.array.keyed import decimated_polynomial, keyed_array
-from generator.array.lab_key import lab_key_of
-from generator.array.labelling import translation
-from generator.array.polynomial import is_primitive
-from generator.array.primitive import primitive_polynomial
+from generator.array.fold import translation
+from generator.array.lab_key import decimated_polynomial, keyed_array, lab_key_of
+from generator.array.polynomial import is_primitive, primitive_polynomial
 from generator.array.profiles import PROFILES, next_larger
 from generator.array.window import windows_are_unique
 from generator.database.cells import array_key

@@ -1,6 +1,6 @@
 """About how many touches name a place."""
 
-from generator.array.touches import touches_needed
+from generator.array.contract import touches_needed
 
 
 def test_profiles_are_read_by_as_many_touches_as_was_measured():

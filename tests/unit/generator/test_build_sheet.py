@@ -15,7 +15,7 @@ from generator.pipeline.encode import encode
 from generator.polyhedron import SHAPES
 from generator.polyhedron.assembly import assembly_order, face_area_mm2, telling_faces
 from generator.polyhedron.frame import face_frame
-from generator.printed.sliced_plate import PlateCost, read_cost
+from generator.printed.slicer import PlateCost, read_cost
 from generator.spec import read_specs
 
 SET = """objects:

@@ -53,7 +53,7 @@ def test_help_loads_nothing_heavy(arguments):
 
 def test_a_scene_loads_what_it_needs():
     unused = ("scipy", "matplotlib", "pandas", "OCP", "trimesh", "multiprocessing.pool",
-              "generator.polyhedron.read", "generator.export.fit_check", "generator.export.check",
+              "generator.polyhedron.read", "generator.export.check",
               "generator.export.robot.model", "generator.printed",
               "generator.pipeline.sets")  # fmt: skip
     program = (

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from generator.command import run
-from generator.database.canonical import spec_hash
+from generator.database.registered import spec_hash
 
 CUBE = "name: {name}\nshape: {{cube: {edge} mm}}\noutput: {{formats: stl}}\n"
 ENTRY = "import sys; from generator.command import main; main()"

@@ -9,11 +9,11 @@ from sqlalchemy import insert
 
 from generator.database import tables
 from generator.database.as_built import AsBuilt, read_as_built, write_as_built
-from generator.database.carry import copy_objects
 from generator.database.migrations import v3
 from generator.database.open import open_database
 from generator.database.register import remove_object
 from generator.database.transaction import read_transaction, write_transaction
+from generator.database.transfer import copy_objects
 from generator.errors import DatabaseError
 
 STYLE = {"pitch_mm": 7, "height_mm": 1, "stroke_mm": 1.4, "draft_rad": 0.1, "chamfer_mm": 0}
@@ -120,9 +120,9 @@ def test_a_covariance_is_a_finite_matrix_of_four(engine, covariance):
 
 
 def test_prints_go_with_their_object_to_another_lab(engine, new_database, monkeypatch):
-    monkeypatch.setattr("generator.database.carry.array_here", lambda *_: None)
-    monkeypatch.setattr("generator.database.carry.check_alphabet", lambda *_: None)
-    monkeypatch.setattr("generator.database.carry.check_cells", lambda *_: None)
+    monkeypatch.setattr("generator.database.transfer.array_here", lambda *_: None)
+    monkeypatch.setattr("generator.database.transfer.check_alphabet", lambda *_: None)
+    monkeypatch.setattr("generator.database.transfer.check_cells", lambda *_: None)
     other = open_database(new_database("sqlite"))
     with write_transaction(engine) as connection:
         write_as_built(connection, measured())

@@ -13,13 +13,11 @@ from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
 from generator.database.cells import find_array, held_cells, occupied_cells
-from generator.database.entries import find_object, list_objects
 from generator.database.exchange import export_objects, import_objects
 from generator.database.open import database_exists, open_database
-from generator.database.read import read_object
-from generator.database.register import ObjectRecord, register, same_layout
+from generator.database.read import find_object, list_objects, read_object
+from generator.database.register import ObjectRecord, register, remove, restore, retire, same_layout
 from generator.database.registered import RegisteredPart
-from generator.database.retire import remove, restore, retire
 from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError
 from generator.layout.layout import lay_out

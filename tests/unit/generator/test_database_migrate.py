@@ -21,10 +21,9 @@ from generator.array.definition import array_from
 from generator.database import migrate, tables
 from generator.database.as_built import AsBuilt, read_as_built, write_as_built
 from generator.database.cells import held_cells, occupied_cells
-from generator.database.entries import list_objects
 from generator.database.migrations import v3
 from generator.database.open import database_exists, open_database
-from generator.database.read import read_array, read_layout, read_object
+from generator.database.read import list_objects, read_array, read_layout, read_object
 from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError
 

@@ -5,8 +5,7 @@ import pytest
 from sqlalchemy import func, insert, select
 
 from generator.database import tables
-from generator.database.cells import occupied_cells
-from generator.database.occupancy import free_cells, take_cells
+from generator.database.cells import free_cells, occupied_cells, take_cells
 from generator.database.open import open_database
 from generator.database.transaction import read_transaction, write_transaction
 from generator.layout.occupancy import TILE

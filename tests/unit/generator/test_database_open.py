@@ -13,10 +13,9 @@ from sqlalchemy import select, text
 
 from generator.array.lab_key import read_lab_key
 from generator.database.lab import lab_key
-from generator.database.open import database_exists, open_database
+from generator.database.open import database_exists, normal_url, open_database
 from generator.database.tables import SCHEMA_VERSION, meta, metadata
 from generator.database.transaction import read_transaction, write_transaction
-from generator.database.url import normal_url
 from generator.errors import DatabaseError
 
 

@@ -10,11 +10,15 @@ from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
 from generator.database.cells import find_array, held_cells, occupied_cells
-from generator.database.entries import find_object, list_objects
 from generator.database.open import open_database
-from generator.database.race import in_turn
+from generator.database.read import find_object, list_objects
 from generator.database.register import ObjectRecord, register
-from generator.database.transaction import LostRaceError, read_transaction, write_transaction
+from generator.database.transaction import (
+    WriteConflictError,
+    read_transaction,
+    retry_on_conflict,
+    write_transaction,
+)
 from generator.errors import DatabaseError
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import tetrahedron
@@ -56,7 +60,7 @@ def test_the_loser_of_a_race_places_anew(lab_url):
             layout = early if tries[name] == 1 else placed(connection)
             return register(connection, registration(name, layout))
 
-        in_turn(engine, work)
+        retry_on_conflict(engine, work)
 
     writers = [threading.Thread(target=write, args=(name,)) for name in tries]
     for writer in writers:
@@ -83,7 +87,7 @@ def test_a_lost_race_leaves_nothing_behind(lab_url):
         layout = first if len(seen) < 3 else placed(connection)
         return register(connection, registration("second", layout))
 
-    in_turn(engine, work, rng=no_pause())
+    retry_on_conflict(engine, work, rng=no_pause())
     assert seen == [["first"]] * 3
 
 
@@ -98,8 +102,8 @@ def test_who_always_loses_gives_up_and_says_why(lab_url):
         tries.append(1)
         return register(connection, registration("second", first))
 
-    with pytest.raises(LostRaceError, match="another object holds") as caught:
-        in_turn(engine, work, tries=3, rng=no_pause())
+    with pytest.raises(WriteConflictError, match="another object holds") as caught:
+        retry_on_conflict(engine, work, tries=3, rng=no_pause())
     assert len(tries) == 3
     assert caught.value.exit_code == 4
     assert caught.value.fix
@@ -116,7 +120,7 @@ def test_errors_that_are_no_race_are_not_tried_again(lab_url):
         return register(connection, registration("one", layout, other=1))
 
     with pytest.raises(DatabaseError, match="another spec"):
-        in_turn(engine, work)
+        retry_on_conflict(engine, work)
     assert len(tries) == 1
     with read_transaction(engine) as connection:
         assert list_objects(connection) == ()
@@ -157,7 +161,7 @@ def test_a_writer_without_turns_on_a_server_is_a_race_too(new_database):
         layout = lay_out(SOLID, ARRAY, 7.0, 2.7, CLEARANCES, (rows, columns))
         return register(connection, registration("mine", layout))
 
-    in_turn(engine, work)
+    retry_on_conflict(engine, work)
     thread.join(30)
     assert len(tries) == 2
     with read_transaction(engine) as connection:

@@ -12,14 +12,12 @@ from generator.alphabet.outline import SymbolStyle
 from generator.array.definition import array_from
 from generator.array.profiles import PROFILES
 from generator.database import tables
-from generator.database.canonical import canonical, spec_hash
 from generator.database.cells import cells_of, faces_at, find_array, occupancy, occupied_cells
-from generator.database.entries import find_object, list_objects
-from generator.database.face_type import face_type
 from generator.database.open import open_database
-from generator.database.read import read_layout, read_object
+from generator.database.read import find_object, list_objects, read_layout, read_object
 from generator.database.register import ObjectRecord, register, remove_object, same_layout
-from generator.database.registered import RegisteredPart
+from generator.database.registered import RegisteredPart, canonical, spec_hash
+from generator.database.rows import face_type
 from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError
 from generator.layout.placement import FaceLayout, Layout, Placement

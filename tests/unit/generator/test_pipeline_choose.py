@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from generator.database import engine
 from generator.database import open as open_module
 from generator.database.open import open_if_there
 from generator.database.transaction import read_transaction
@@ -60,11 +59,11 @@ def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
 @pytest.mark.parametrize("profile", ["auto", "one-touch"])
 @pytest.mark.parametrize("copies", [1, 3])
 def test_a_run_opens_the_database_once(tmp_path, monkeypatch, profile, copies):
-    calls = []
+    calls, database_engine = [], open_module.database_engine
 
     def connectable(*arguments, **options):
         calls.append(arguments)
-        return engine.database_engine(*arguments, **options)
+        return database_engine(*arguments, **options)
 
     monkeypatch.setattr(open_module, "database_engine", connectable)
     text = f"name: A\nprofile: {profile}\nshape: {{cube: 30 mm}}\ncopies: {copies}\n"

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from generator.database import cells as cells_module
-from generator.database.entries import natural_key
-from generator.database.occupancy import taken_tiles
+from generator.database.cells import taken_tiles
 from generator.database.open import open_database
-from generator.database.read import read_layout
+from generator.database.read import natural_key, read_layout
 from generator.database.transaction import read_transaction
 from generator.errors import DatabaseError
 from generator.layout import occupancy

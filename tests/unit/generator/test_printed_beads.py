@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from generator.errors import PrintError
-from generator.printed.above import heights_from_above
 from generator.printed.beads import Beads, beads_of, cap_mm, dot_size, section_size
 from generator.printed.deposit import Deposit
 from generator.printed.gcode import toolpath_of
-from generator.printed.sideways import heights_sideways
-from generator.printed.view import face_surface
+from generator.printed.view import face_surface, heights_from_above, heights_sideways
 
 FILAMENT = math.pi * 1.75**2 / 4
 W, H = 0.5, 0.2

@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 
 from generator.errors import PrintError
-from generator.printed.arc import ArcError, chords
-from generator.printed.dialect import role_of
-from generator.printed.gcode import read_gcode, toolpath_of
+from generator.printed.gcode import ArcError, chords, read_gcode, role_of, toolpath_of
 from generator.printed.toolpath import ROLES, Toolpath
 
 FILES = Path(__file__).parent / "gcode"

@@ -24,8 +24,14 @@ from generator.printed.prints import (
     surface_path,
 )
 from generator.printed.slicer import SlicedPart
-from generator.printed.surface import Coverage, PrintedSurface
-from generator.printed.surface_file import UNIT_MM, is_written, read_surface, write_surface
+from generator.printed.surface import (
+    UNIT_MM,
+    Coverage,
+    PrintedSurface,
+    is_written,
+    read_surface,
+    write_surface,
+)
 from generator.solid.part import Embossing
 
 SIZE = np.array([9.0, 6.0, 0.6])

@@ -10,10 +10,9 @@ import pytest
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.plane.polygon import points_inside
-from generator.printed.middle import symbols_shift
+from generator.printed.prints import symbols_shift
 from generator.printed.surface import Coverage, PrintedSurface
-from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, SymbolTile, survey_face
-from generator.printed.symbol_design import rings_at
+from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, SymbolTile, rings_at, survey_face
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
 

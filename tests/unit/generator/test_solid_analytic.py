@@ -14,7 +14,7 @@ from generator.polyhedron.winged import Face
 from generator.solid import emboss_whole, round_volume, volume
 from generator.solid.settings import EMBOSS
 from generator.solid.wrap import analytic_faces
-from generator.solid.wrap.bend import RoundSurfaceMap, bend_lines
+from generator.solid.wrap.analytic import RoundSurfaceMap, bend_lines
 from tests.unit.generator.test_solid_wrap import STYLE, TIERS, layout_on
 
 SOLIDS = {

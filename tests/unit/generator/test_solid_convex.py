@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from generator.export.robot.text import numbers, quaternion, roll_pitch_yaw
 from manifold3d import Manifold
 
 from generator.errors import SolidError
-from generator.export.robot.text import numbers, quaternion, roll_pitch_yaw
 from generator.solid.convex import ConvexSettings, convex_pieces
-from generator.solid.inertia import inertia_of
+from generator.solid.measure import inertia_of
 
 
 def mesh_of(body: Manifold):

@@ -9,8 +9,8 @@ from manifold3d import Manifold, Mesh64
 from random_shapes import convex_hull, extruded, random_convex
 
 from generator.errors import SolidError
-from generator.export.fit_check import PanelFile, verify_fit
-from generator.export.stl import stl_chunks
+from generator.export.check import PanelFile, verify_fit
+from generator.export.meshes import stl_chunks
 from generator.layout.placement import Layout
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
@@ -20,8 +20,8 @@ from generator.polyhedron.shapes import cube, dodecahedron, pyramid
 from generator.polyhedron.winged import polyhedron
 from generator.printers import PRINTERS
 from generator.solid import panels, plain_panels, prove_closed, triangles, volume
-from generator.solid.clip import PlainBody, beyond, body_volume, cut_off, shortest_edge_mm
 from generator.solid.emboss import turn
+from generator.solid.fit import PlainBody, beyond, body_volume, cut_off, shortest_edge_mm
 from generator.spec import read_specs
 
 FDM = PRINTERS["fdm-0.4"]

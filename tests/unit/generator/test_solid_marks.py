@@ -8,8 +8,7 @@ from generator.layout.placement import Layout
 from generator.polyhedron import polyhedron
 from generator.printers import printer_named
 from generator.solid import panels
-from generator.solid.mark_name import NameMark, name_places
-from generator.solid.mark_room import Pen
+from generator.solid.marks import NameMark, Pen, name_places
 
 LEG_MM = 12.0
 

@@ -16,17 +16,17 @@ from generator.polyhedron.winged import polyhedron
 from generator.printers import PRINTERS
 from generator.solid import (
     panels,
-    polygon,
     prove_closed,
     symbol_clearance_mm,
     top_inset_mm,
     top_insets_mm,
+    triangulate,
 )
 from generator.solid.emboss import turn
-from generator.solid.frame import in_frame
 from generator.solid.inset import inset, regular, shared_insets
 from generator.solid.mitre import mitre
-from generator.solid.polygon import triangulate_rings
+from generator.solid.part import in_frame
+from generator.solid.triangulate import triangulate_rings
 
 FDM = PRINTERS["fdm-0.4"]
 EMPTY = Layout("faces", 7.0, ())
@@ -232,14 +232,14 @@ def test_points_on_a_line_are_kept_without_flat_triangles():
 def test_an_area_is_turned_where_its_triangles_come_out_wrong(monkeypatch):
     outer = np.array([[0, 0], [9, 0], [9, 9], [0, 9.0]])
     hole = np.array([[3, 3], [3, 6], [6, 6], [6, 3.0]])
-    right, seen = polygon.ear_clipped, []
+    right, seen = triangulate.ear_clipped, []
 
     def wrong_at_first(rings, allow_convex):
         seen.append(rings[0].copy())
         found = right(rings, allow_convex=allow_convex)
         return found if len(seen) > 2 else found[:, ::-1]
 
-    monkeypatch.setattr(polygon, "ear_clipped", wrong_at_first)
+    monkeypatch.setattr(triangulate, "ear_clipped", wrong_at_first)
     found = triangulate_rings([outer, hole], np.arange(8), "plate")
     assert len(found) == 8
     assert len(seen) == 3

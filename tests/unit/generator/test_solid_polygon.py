@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from generator.plane.polygon import triangle_areas
-from generator.solid.polygon import without_slivers
+from generator.solid.triangulate import without_slivers
 
 OFF_MM = 5e-7  #: of a point from a line of 10 mm: less than 32 bits hold at 20 mm
 

@@ -23,8 +23,7 @@ from generator.solid.closed import edges_once
 from generator.solid.measure import symbol_volume
 from generator.solid.settings import EMBOSS
 from generator.solid.wrap import bend_problem
-from generator.solid.wrap.cut import cut_symbol
-from generator.solid.wrap.strip import strip_of
+from generator.solid.wrap.wrapped import cut_symbol, strip_of
 
 STYLE = SymbolStyle()
 TIERS = outlines(alphabet_named("dense-4"), STYLE)

@@ -7,10 +7,9 @@ import pytest
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.deblur import blur_of, deblur, thickest_mm, transmitted_share
+from probe.contact.deblur import LEAST_SHARE, blur_of, deblur, thickest_mm, transmitted_share
 from probe.contact.layer import layer
 from probe.contact.layer_influence import influence
-from probe.contact.settings import DEBLUR
 from probe.errors import ContactError
 from probe.surface.indenters import Washer
 
@@ -54,9 +53,9 @@ def test_pads_of_4_mm_and_more_are_refused(height):
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.4999, 0.5])
 def test_the_thickest_pad_is_where_the_refusal_begins(poisson):
     most = thickest_mm(pad(2.0, poisson=poisson))
-    assert transmitted_share(pad(most, poisson=poisson)) == pytest.approx(DEBLUR.least, rel=1e-6)
+    assert transmitted_share(pad(most, poisson=poisson)) == pytest.approx(LEAST_SHARE, rel=1e-6)
     read = np.ones((16, 16))
-    assert deblur(read, pad(0.99 * most, poisson=poisson), noise_n=0.1).arrives > DEBLUR.least
+    assert deblur(read, pad(0.99 * most, poisson=poisson), noise_n=0.1).arrives > LEAST_SHARE
     with pytest.raises(ContactError, match="at most"):
         deblur(read, pad(1.01 * most, poisson=poisson), noise_n=0.1)
 

@@ -14,12 +14,12 @@ from scipy.optimize import brentq
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Contact, Touch, WristStiffness
 from probe.contact.engines import ENGINES, Engine, EngineEntry, engine_named
-from probe.contact.engines.mujoco import MujocoSettings
-from probe.contact.engines.under_sensor import UNDER, mesh_under
+from probe.contact.mujoco import AROUND_MM, DEEP_MM, STIFFER, mesh_under
 from probe.contact.tips import Tips
 from probe.errors import ContactError, ProbeError
+from probe.simulate.scene import bare_scene
 from probe.simulate.world.levels import LEVELS
-from probe.simulate.world.reading import read_sensor
+from probe.simulate.world.sensor import LevelSensor
 from probe.surface.mesh import mesh
 
 RIGID = WristStiffness(math.inf, math.inf)
@@ -48,7 +48,7 @@ def plate_with_bars(wide=0.0):
 def compression_mm(force_n, overlay=SENSOR.overlay):
     """Return how far one tab is pressed by a force: neo-Hookean, of MuJoCo's stiffer elastomer."""
     area = math.pi * overlay.tab_diameter_mm**2 / 4
-    modulus = MujocoSettings().stiffer * overlay.young_mpa
+    modulus = STIFFER * overlay.young_mpa
 
     def miss(c):
         stretch = 1 - c / overlay.height_mm
@@ -133,10 +133,10 @@ class Heights:
 
 def test_only_what_lies_under_the_sensor_is_kept():
     part = mesh(block((-90, -90, -40), (90, 90, 0)))
-    reach, deep = 12.7 + UNDER.around_mm, UNDER.deep_mm
+    reach, deep = 12.7 + AROUND_MM, DEEP_MM
     # A body is cut; heights are closed by a floor deep enough for what is cut off.
     for surface, under, count in ((part, deep, 12), (Heights(part), 2 * deep, 12)):
-        corners, faces = mesh_under(surface, SENSOR, Touch(50, 0, 0, 1.0), UNDER)
+        corners, faces = mesh_under(surface, SENSOR, Touch(50, 0, 0, 1.0))
         low, high = corners.min(axis=0), corners.max(axis=0)
         assert low == pytest.approx([50 - reach, -reach, -under], abs=1e-4)
         assert high == pytest.approx([50 + reach, reach, 0], abs=1e-4)
@@ -194,9 +194,9 @@ def test_a_third_engine_is_one_module_and_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "third_engine", module)
     monkeypatch.setitem(ENGINES, "third", EngineEntry("third_engine", "everything"))
     rng = np.random.default_rng(3)
-    counts, contact = read_sensor(
-        Void(), SENSOR, Touch(0, 0, 0, 128.0), LEVELS["sound"], rng, "third"
-    )
+    sensor = LevelSensor(SENSOR, LEVELS["sound"], "third")
+    reading = sensor.read(bare_scene(Void()), Touch(0, 0, 0, 128.0), rng)
+    counts, contact = reading.counts, reading.contact
     assert (contact.level, contact.z_mm) == ("third", 0.25)
     assert np.ptp(counts.astype(int)) <= 2  # every tactel bears half a newton; the board rounds
     assert counts.min() > 60

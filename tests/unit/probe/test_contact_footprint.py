@@ -7,7 +7,7 @@ import pytest
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch
-from probe.contact.footprint import footprint
+from probe.contact.press import footprint
 from probe.contact.tips import Tips
 from probe.errors import ContactError
 from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip, Sphere, TiltedPlane

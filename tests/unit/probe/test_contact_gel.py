@@ -13,9 +13,10 @@ from probe.contact.contract import Touch
 from probe.contact.gel import bridge, depths_mm, gel
 from probe.contact.press import level_for, press
 from probe.errors import ContactError
-from probe.simulate.readout import readout_of
+from probe.simulate.scene import bare_scene
+from probe.simulate.sensor import simulated_sensor
 from probe.simulate.world.levels import LEVELS
-from probe.simulate.world.reading import read_sensor
+from probe.simulate.world.sensor import LevelSensor
 from probe.surface.indenters import Washer
 
 GEL = sensor_type_named("gel-24x32")
@@ -106,16 +107,19 @@ def test_readings_are_depths_in_the_unit_of_the_type():
     forces = gel(Plain(), PLAIN, TOUCH).forces_n
     depth = depths_mm(PLAIN, forces)[0, 0]
     rng = np.random.default_rng(1)
-    quiet, _ = readout_of(PLAIN, quiet=True).read(forces, None, rng)
+    quiet = next(simulated_sensor(PLAIN, quiet=True).counts([forces], rng))
     assert (quiet == round(depth / 1e-3)).all()
-    noisy, _ = readout_of(PLAIN).read(forces, None, rng)
+    noisy = next(simulated_sensor(PLAIN).counts([forces], rng))
     assert noisy.std() == pytest.approx(GEL.noise, rel=0.1)
 
 
 def test_a_level_makes_a_gel_worse():
     rng = np.random.default_rng(2)
-    sound, _ = read_sensor(Washer(outer_mm=10.0), GEL, TOUCH, LEVELS["sound"], rng)
-    typical, _ = read_sensor(Washer(outer_mm=10.0), GEL, TOUCH, LEVELS["typical"], rng)
+    scene = bare_scene(Washer(outer_mm=10.0))
+    sound, typical = (
+        LevelSensor(GEL, LEVELS[name]).read(scene, TOUCH, rng).counts
+        for name in ("sound", "typical")
+    )
     assert sound.shape == typical.shape == (24, 32)
     beside = sound == 0
     assert beside.sum() > 200

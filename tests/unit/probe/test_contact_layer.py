@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from probe.contact.contract import Touch, WristStiffness
-from probe.contact.layer import layer, press_patch
-from probe.contact.layer_active_set import deep_mm, equilibrium, springs_mm
-from probe.contact.layer_descent import descend
+from probe.contact.contract import STEEPEST_RAD, Touch, WristStiffness
+from probe.contact.layer import DEEPEST, layer, press_patch
+from probe.contact.layer_equilibrium import deep_mm, descend, equilibrium, plate_of, springs_mm
 from probe.contact.layer_influence import influence
-from probe.contact.layer_levels import DepthWindow, levels_of
-from probe.contact.layer_patch import patch_under
-from probe.contact.layer_solve import plate_of
+from probe.contact.layer_patch import MOST_LEVELS, DepthWindow, levels_of, patch_under
 from probe.contact.plate import PlatePose
 from probe.contact.press import press
-from probe.contact.settings import CONTACT, LAYER, LAYER_LEVELS
 from probe.errors import ContactError
 from probe.surface.indenters import (
     Cross,
@@ -144,7 +140,7 @@ def test_an_independent_solver_finds_the_same(scene, poisson):
     for found in (begun, descend(begun, plate)):
         error = np.linalg.norm(found.pressures - pressures) / np.linalg.norm(pressures)
         assert error <= 3e-4
-    assert count <= LAYER_LEVELS.count + 1
+    assert count <= MOST_LEVELS + 1
     images = [grid.base_forces_n(levels.image(p)) for p in (begun.pressures, pressures)]
     assert np.linalg.norm(images[0] - images[1]) <= 1e-5 * np.linalg.norm(images[1])
 
@@ -173,7 +169,7 @@ def test_scenes_at_random_are_finite_and_balanced(seed):
     assert found.forces_n.sum() == pytest.approx(force, rel=1e-9)
     assert np.isfinite([found.z_mm, found.tilt_x_rad, found.tilt_y_rad]).all()
     # The wrist's moment is that of the pressure on the pad; the tactels' is about the same.
-    assert max(abs(found.tilt_x_rad), abs(found.tilt_y_rad)) <= CONTACT.steepest_rad
+    assert max(abs(found.tilt_x_rad), abs(found.tilt_y_rad)) <= STEEPEST_RAD
 
 
 @pytest.mark.parametrize("height", [0.05, 0.3, 2.0, 20.0])
@@ -182,7 +178,7 @@ def test_pads_of_every_height(height, poisson):
     sensor = pad(height_mm=height, poisson=poisson)
     found = layer(Washer(), sensor, Touch(0.3, 0.1, 0.2, 1.0), cells_per_tactel=2)
     assert found.forces_n.sum() == pytest.approx(1.0, rel=1e-9)
-    assert -LAYER.deepest * height <= found.z_mm < 0
+    assert -DEEPEST * height <= found.z_mm < 0
     if height == 0.05:  # thin: the image is the footprint
         assert found.forces_n[8, 8] <= 1e-3 * found.forces_n.max()
 

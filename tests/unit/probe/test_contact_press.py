@@ -7,8 +7,7 @@ import pytest
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch
-from probe.contact.press import LEVELS, accuracy_of, level_for, press, table
-from probe.contact.settings import CONTACT
+from probe.contact.press import AUTO_ERROR, LEVELS, accuracy_of, level_for, press, table
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
@@ -20,12 +19,12 @@ TAB, PAD = (SensorType(overlay=Overlay(kind=kind)) for kind in ("tab", "pad"))
 @pytest.mark.parametrize("sensor", [TAB, PAD])
 def test_pick_is_the_cheapest_that_holds_the_error(sensor):
     known = table()[sensor.overlay.kind]
-    for error in [*(line.error for line in known), CONTACT.auto_error, 0.1, 0.9]:
+    for error in [*(line.error for line in known), AUTO_ERROR, 0.1, 0.9]:
         level = level_for(sensor, error)
         picked = next(line for line in known if line.level == level)
         assert picked.error <= error
         assert all(line.ms >= picked.ms for line in known if line.error <= error)
-    assert level_for(sensor) == level_for(sensor, CONTACT.auto_error)
+    assert level_for(sensor) == level_for(sensor, AUTO_ERROR)
 
 
 @pytest.mark.parametrize("sensor", [TAB, PAD])
@@ -80,4 +79,4 @@ def test_accuracy_is_read_from_text():
     for text in ("0", "-1", "inf", "nan"):
         with pytest.raises(ContactError, match="error of"):
             accuracy_of(text)
-    assert math.isfinite(CONTACT.auto_error)
+    assert math.isfinite(AUTO_ERROR)

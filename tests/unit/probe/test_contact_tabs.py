@@ -9,11 +9,8 @@ import pytest
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact import tabs as tabs_module
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.plate import PlatePose, load_of, rest
-from probe.contact.plate_newton import Columns
-from probe.contact.settings import TABS
-from probe.contact.tab_law import tip_laws
-from probe.contact.tabs import heights_under, tabs, tabs_at_rest
+from probe.contact.plate import Columns, PlatePose, load_of, rest
+from probe.contact.tabs import SKIN, heights_under, tabs, tabs_at_rest, tip_laws
 from probe.contact.tips import NUMBERS, Tips, rings, square, tip_points
 from probe.errors import ContactError
 from probe.surface.indenters import (
@@ -76,13 +73,13 @@ def test_a_tip_covered_in_part_bears_more_than_its_share(points, edge_mm):
     part = tabs(HalfPlane(), ONE_TAB, touch, tips)
     whole = tabs(FlatPlate(), ONE_TAB, touch, tips)
     ratio = whole.z_mm / part.z_mm
-    assert ratio == pytest.approx(share * (1 + TABS.skin) / (1 + TABS.skin * share), rel=1e-4)
+    assert ratio == pytest.approx(share * (1 + SKIN) / (1 + SKIN * share), rel=1e-4)
     assert abs(ratio - share * (1 + 0.59 * (1 - share))) < 0.022
 
 
 def test_the_measured_cover_law_is_met_within_three_per_cent():
     for share, measured in ((0.25, 0.34), (0.5, 0.65), (1.0, 1.0)):
-        assert abs(share * (1 + TABS.skin) / (1 + TABS.skin * share) - measured) < 0.03
+        assert abs(share * (1 + SKIN) / (1 + SKIN * share) - measured) < 0.03
 
 
 def test_no_point_of_a_tip_pulls_and_the_force_rises_with_depth():

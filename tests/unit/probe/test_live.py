@@ -14,7 +14,7 @@ from probe.command.live_state import LiveState
 from probe.command.live_view import KEYS, SHADES, heat_map, line_of, render_frame
 from probe.frame import frame_from
 from probe.protocol import IdentPacket
-from probe.recording.names import next_free
+from probe.recording.files import next_free
 from probe.recording.read import Recording, read_frames
 
 COUNTS = ClientStatistics(frames=120, rate=99.9, lost=3, failed=1, reopenings=1)

@@ -12,11 +12,11 @@ import pytest
 
 from probe.errors import RecordingError
 from probe.frame import frame_from
-from probe.recording.lock import is_locked
+from probe.recording.files import is_locked
+from probe.recording.guard import superblock_of
 from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 from probe.recording.repair import repair
-from probe.recording.superblock import superblock_of
 from probe.recording.table import export_csv
 
 COUNTS = np.random.default_rng(3).integers(0, 1024, (600, 16, 16)).astype(np.uint16)

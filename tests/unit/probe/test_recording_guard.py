@@ -9,11 +9,11 @@ from hostile_recordings import HOSTILE, IMAGES, SECRET, write_hostile
 
 from probe.command import run
 from probe.errors import RecordingError
+from probe.recording.hdf5 import write_hdf5
 from probe.recording.imported import import_array
 from probe.recording.layout import FrameBlock, RecordingOrigin
 from probe.recording.read import Recording, read_frames
 from probe.recording.repair import repair
-from probe.recording.write import FileWriter
 
 TEN_MINUTES = 126_600  #: frames, at 211 a second
 
@@ -87,8 +87,7 @@ def test_ten_minutes_of_nothing_are_a_recording(tmp_path, live):
     path, number = tmp_path / "a.h5", np.zeros(TEN_MINUTES, np.int64)
     images = np.zeros((TEN_MINUTES, 16, 16), np.uint16)
     wrist = np.zeros((TEN_MINUTES, 4), np.uint16)
-    with FileWriter(path, RecordingOrigin()) as writer:
-        writer.write(FrameBlock(images, number, number, wrist, None))
+    write_hdf5(path, RecordingOrigin(), [FrameBlock(images, number, number, wrist, None)], path)
     recording = Recording(path, live=live)
     assert len(recording) == TEN_MINUTES
     assert sum(len(block) for block in recording.blocks(100_000)) == TEN_MINUTES - 100_000

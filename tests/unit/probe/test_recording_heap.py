@@ -8,7 +8,7 @@ import pytest
 
 from probe.errors import RecordingError
 from probe.frame import frame_from
-from probe.recording.heap import strings_end
+from probe.recording.guard import strings_end
 from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 from probe.recording.repair import repair

@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 from probe.command import run
 from probe.errors import RecordingError
 from probe.frame import frame_from
-from probe.recording.mcap_reader import import_mcap
-from probe.recording.mcap_writer import export_mcap
+from probe.recording.mcap import export_mcap, import_mcap
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.recording.ros import DEFINITIONS, IMAGE, POSE, TOUCH_FRAME, covariance_message

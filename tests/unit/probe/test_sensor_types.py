@@ -28,7 +28,7 @@ from probe.command import run
 from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
-from probe.simulate.simulated_probe import SimulatedProbe, TouchOptions
+from probe.simulate.simulation import SimulatedProbe, TouchOptions
 from probe.simulate.source import options_of
 
 LEAST = "name: mine\nrows: 4\ncolumns: 6\npitch: 2 mm\n"

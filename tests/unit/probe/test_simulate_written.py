@@ -63,10 +63,10 @@ def test_files_that_are_too_large_are_refused(tmp_path, monkeypatch):
     file = tmp_path / "part.stl"
     file.write_bytes(binary([np.eye(3)] * 3))
     few = replace(MODEL, most_part_triangles=2)
-    monkeypatch.setattr("generator.database.part_triangles.MODEL", few)
+    monkeypatch.setattr("generator.database.part_file.MODEL", few)
     with pytest.raises(SurfaceError, match="3 triangles; 2 are allowed"):
         written_triangles(file)
-    monkeypatch.setattr("generator.database.part_triangles.LARGEST_BYTES", 100)
+    monkeypatch.setattr("generator.database.part_file.LARGEST_BYTES", 100)
     with pytest.raises(SurfaceError, match="MB are allowed"):
         written_triangles(file)
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from probe.errors import SurfaceError
-from probe.surface.body import manifold_from
-from probe.surface.height_mesh import close_below, mesh_heights
+from probe.surface.body import close_below, manifold_from, mesh_heights
 from probe.surface.mesh import mesh
 
 STEP, BOTTOM = 0.1, -9.0

@@ -3,17 +3,14 @@
 import numpy as np
 import pytest
 import shapely
-from c_library import compile_kernels
+from reference.mesh_heights import heights_by_numpy, heights_over
 
-from encoded_objects.base.compiled import CHOICE
 from probe.errors import SurfaceError
-from probe.surface import heights
+from probe.surface.body import triangulate
 from probe.surface.face import FaceSurface
 from probe.surface.indenters import FlatPlate, TiltedPlane
-from probe.surface.mesh import mesh
+from probe.surface.mesh import mesh, sort_numbers
 from probe.surface.polygon import polygon
-from probe.surface.solids import triangulate
-from probe.surface.triangle_mesh import sort_numbers
 
 SQUARE = np.array([[0.0, 0], [10, 0], [10, 10], [0, 10]])
 HOLE = np.array([[4.0, 4], [4, 6], [6, 6], [6, 4]])
@@ -170,8 +167,7 @@ def test_level_ground_is_answered_by_its_bins_as_by_its_triangles():
     assert np.array_equal(heights, apart.heights_mm(points))
     inside = ((points >= 0) & (points <= 10)).all(axis=1)
     assert (np.isfinite(heights) == inside).all()
-    cell, _ = closed._bins.of(points)
-    assert 0.4 < closed._bins.level[cell].mean() < 0.95
+    assert 0.4 < closed.bins.level.mean() < 0.95
 
 
 @pytest.mark.parametrize("width", [3.0, 0.05, 1e-7, 1e-12])
@@ -188,7 +184,7 @@ def test_bins_hold_every_triangle_that_points_lie_under(width):
     points = np.einsum("npk,nkj->npj", weights, part.corners[:, :, :2]).reshape(-1, 2)
     x, y = points.T
     number = np.arange(len(part.corners))
-    over = [part._over(number, np.full(len(number), u), np.full(len(number), v)).max()
+    over = [heights_over(part, number, np.full(len(number), u), np.full(len(number), v)).max()
             for u, v in zip(x, y, strict=True)]  # fmt: skip
     assert np.isfinite(over).mean() > 0.4
     assert np.array_equal(part.heights_mm(points), np.minimum(over, part.top_mm))
@@ -200,14 +196,6 @@ def test_numbers_are_sorted_as_numpy_sorts_them(most):
     numbers = np.concatenate([numbers, numbers[::3]])
     assert np.array_equal(sort_numbers(numbers), np.argsort(numbers, kind="stable"))
     assert len(sort_numbers(numbers[:0])) == 0
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    """Return the compiled look-up as this machine's compiler makes it: also of a mere checkout."""
-    made = tmp_path_factory.mktemp("kernels") / "kernels.so"
-    compile_kernels(heights.SOURCES, made)
-    return made
 
 
 def scattered(rng):
@@ -227,8 +215,7 @@ def scattered(rng):
     ],
     ids=["scattered", "bodies", "square with a hole"],
 )
-def test_compiled_heights_are_those_of_numpy(triangles, library, monkeypatch):
-    monkeypatch.setattr(heights, "FILE", library)
+def test_compiled_heights_are_those_of_numpy(triangles):
     part = mesh(triangles)
     rng = np.random.default_rng(9)
     corners = part.corners[:, :, :2].reshape(-1, 2)
@@ -236,21 +223,7 @@ def test_compiled_heights_are_those_of_numpy(triangles, library, monkeypatch):
     anywhere = rng.uniform(corners.min(axis=0) - 1, corners.max(axis=0) + 1, (4000, 2))
     beside = np.array([[np.nan, 0.0], [np.inf, 0.0], [0.0, -np.inf], [1e300, 1e300]])
     points = np.concatenate([corners, middles, anywhere, beside])
-    found = {}
-    for kind in ("numpy", "compiled"):
-        monkeypatch.setenv(CHOICE, kind)
-        assert (heights.compiled_kernels() is None) == (kind == "numpy")
-        found[kind] = [
-            part.heights_mm(some) for some in (points, points[::-1], points[:0], points[::3])
-        ]
-    for one, other in zip(*found.values(), strict=True):
-        assert (one == other).all()  # to the bit, but for the sign of 0
-    assert np.isfinite(found["numpy"][0][: len(corners)]).all()
-
-
-def test_a_look_up_of_another_text_is_left_out(tmp_path):
-    changed = tmp_path / "heights.c"
-    changed.write_text(heights.SOURCES[-1].read_text() + "\n")
-    compile_kernels((changed,), tmp_path / "kernels.so")
-    assert heights.load_kernels(tmp_path / "kernels.so") is None
-    assert heights.load_kernels(tmp_path / "none.so") is None
+    for some in (points, points[::-1], points[:0], points[::3]):
+        expected = heights_by_numpy(part, some)
+        assert (part.heights_mm(some) == expected).all()  # to the bit, but for the sign of 0
+    assert np.isfinite(part.heights_mm(corners)).all()

@@ -8,12 +8,16 @@ import shapely
 from shapely.geometry import MultiPoint
 
 from probe.errors import SurfaceError
-from probe.surface.face import endless_face
-from probe.surface.lattice import LatticeSurface, call_lookup, list_lookup, tile_lookup
-from probe.surface.outline import outline
-from probe.surface.solids import symbol_triangles
-from probe.surface.symbols import Relief, emboss
-from probe.surface.template import template
+from probe.surface.body import symbol_triangles
+from probe.surface.face import (
+    LatticeSurface,
+    call_lookup,
+    endless_face,
+    list_lookup,
+    template,
+    tile_lookup,
+)
+from probe.surface.symbols import Relief, emboss, outline
 
 # An L, a glyph with a closed loop, one with a shallow diagonal, and strokes that only touch.
 L = (((-1, 1), (-1, -1)), ((-1, -1), (1, -1)))

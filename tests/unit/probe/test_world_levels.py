@@ -13,12 +13,18 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import CircuitError
-from probe.simulate.world.distorted import DistortedSurface
+from probe.simulate.scene import Scene, bare_scene
 from probe.simulate.world.levels import LEVELS, SOUND, TYPICAL
-from probe.simulate.world.mounting import MOUNTINGS, mount
-from probe.simulate.world.reading import READOUT, read_sensor
-from probe.simulate.world.sensor_copy import draw_copy
+from probe.simulate.world.sensor import (
+    COUNTS_PER_N,
+    MOUNTINGS,
+    LevelSensor,
+    mount,
+    sample_sensor,
+)
+from probe.simulate.world.surfaces import DistortedSurface
 from probe.surface.indenters import FlatPlate, RaisedStrip
+from probe.surface.polygon import polygon
 
 SENSOR = SensorType()
 HERE = Touch(x_mm=0.3, y_mm=0.2, theta_rad=0.4, force_n=60.0)
@@ -27,10 +33,8 @@ GAIN_S, BREAK_N, LEAK_S = 1e-4, 0.01, 5e-8  # of the film, as the datasheet of t
 
 
 def counts_of(level, surface=None, touch=HERE, seed=3):
-    counts, _ = read_sensor(
-        surface or FlatPlate(), SENSOR, touch, level, np.random.default_rng(seed)
-    )
-    return counts
+    scene = bare_scene(surface or FlatPlate())
+    return LevelSensor(SENSOR, level).read(scene, touch, np.random.default_rng(seed)).counts
 
 
 def film_s(forces_n):
@@ -154,7 +158,7 @@ def test_exponent_is_that_of_the_level():
 def test_noise_is_that_of_the_level():
     level = replace(SOUND, noise_n=0.02)
     noise = counts_of(level).astype(float) - counts_of(SOUND)
-    assert noise.std() == pytest.approx(0.02 * READOUT.counts_per_n, rel=0.15)
+    assert noise.std() == pytest.approx(0.02 * COUNTS_PER_N, rel=0.15)
 
 
 def test_rows_bleed_into_the_rows_beside_them():
@@ -169,8 +173,9 @@ def test_rows_bleed_into_the_rows_beside_them():
 def test_floating_rows_carry_the_ghosts_of_the_network(name, rows):
     level = replace(SOUND, floating=LEVELS[name].floating, load_ohm=220.0)
     sensor = SensorType(rows=16, columns=6)
-    counts, contact = read_sensor(STRIP, sensor, HERE, level, np.random.default_rng(3))
-    floating = draw_copy(sensor, np.random.default_rng(3)).floating_rows(level)
+    reading = LevelSensor(sensor, level).read(bare_scene(STRIP), HERE, np.random.default_rng(3))
+    counts, contact = reading.counts, reading.contact
+    floating = sample_sensor(sensor, np.random.default_rng(3)).floating_rows(level)
     assert floating.sum() == rows
     share = brute_force(film_s(contact.forces_n), floating, 220.0)
     expected = np.clip(8 + 1023 * 150 / (1023 * 220 * GAIN_S) * share, 0, 1023)
@@ -197,7 +202,7 @@ def test_slide_is_the_mean_of_the_forces_on_its_way(name, places):
     level = replace(SOUND, slide_mm=LEVELS[name].slide_mm)
     counts = counts_of(level, STRIP)
     rng = np.random.default_rng(3)
-    draw_copy(SENSOR, rng)
+    sample_sensor(SENSOR, rng)
     towards = rng.uniform(-np.pi, np.pi)
     ways = np.linspace(-level.slide_mm / 2, level.slide_mm / 2, places)
     forces = np.mean(
@@ -238,7 +243,9 @@ def test_mounting_that_would_change_the_shape_is_refused():
 def test_domed_tips_press_less_at_their_rims():
     stiff = replace(HERE, wrist=WristStiffness(1e9, 1e9))
     drawn, domed = (
-        read_sensor(STRIP, SENSOR, stiff, replace(SOUND, dome_mm=dome), np.random.default_rng(1))[1]
+        LevelSensor(SENSOR, replace(SOUND, dome_mm=dome))
+        .read(bare_scene(STRIP), stiff, np.random.default_rng(1))
+        .contact
         for dome in (0.0, 0.3)
     )
     own = tabs(STRIP, SENSOR, stiff, Tips(dome_mm=0.3))
@@ -256,20 +263,24 @@ def test_print_is_scaled_from_its_datum():
 def test_scale_costs_nothing_at_the_datum_and_its_share_away_from_it():
     level = replace(SOUND, scale=0.01)
     far = replace(HERE, x_mm=0.0, y_mm=0.0, theta_rad=0.0)
+    square = np.array([(-9, -9), (9, -9), (9, 9), (-9, 9)])
     drawn, same, moved = (
-        read_sensor(STRIP, SENSOR, replace(far, x_mm=x), lv, np.random.default_rng(1),
-                    datum_mm=datum)[0]
+        LevelSensor(SENSOR, lv)
+        .read(Scene(STRIP, polygon([square + datum]), ""), replace(far, x_mm=x),
+              np.random.default_rng(1)).counts
         for lv, datum, x in ((SOUND, (0, 0), 0.0), (level, (0, 0), 0.0), (level, (-30, 0), 0.3))
     )  # fmt: skip
     assert np.abs(same.astype(int) - drawn).max() < 0.05 * drawn.max()
     np.testing.assert_allclose(moved.astype(int), same, atol=0.05 * drawn.max())
 
 
-def test_copy_of_a_sensor_is_the_same_at_every_touch():
-    copy = draw_copy(SENSOR, np.random.default_rng(5))
+def test_instance_of_a_sensor_is_the_same_at_every_touch():
+    instance = sample_sensor(SENSOR, np.random.default_rng(5))
     level = replace(TYPICAL, noise_n=0.0)
     first, second = (
-        read_sensor(FlatPlate(), SENSOR, HERE, level, np.random.default_rng(seed), copy=copy)[0]
+        LevelSensor(SENSOR, level, instance=instance)
+        .read(bare_scene(FlatPlate()), HERE, np.random.default_rng(seed))
+        .counts
         for seed in (1, 2)
     )
     np.testing.assert_array_equal(first, second)

@@ -7,7 +7,14 @@ import pytest
 
 from probe.contact.contract import Touch
 from probe.errors import SurfaceError
-from probe.simulate.world.side_by_side import BESIDE, FramePlace, SideBySide, lay_beside
+from probe.simulate.world.surfaces import (
+    GAP_MM,
+    REACH_MM,
+    STEP_MM,
+    AdjacentParts,
+    FramePlace,
+    place_adjacent,
+)
 from probe.surface.face import FaceSurface
 from probe.surface.mesh import mesh
 from probe.surface.polygon import polygon
@@ -19,8 +26,8 @@ TRIANGLE = polygon([np.array([(0, 0), (50, 0), (25, 45)])])
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize(("first", "second"), [(SQUARE, TRIANGLE), (TRIANGLE, SQUARE)])
 def test_faces_lie_beside_each_other_and_the_sensor_near_both(first, second, seed):
-    place, at = lay_beside(first, second, np.random.default_rng(seed))
-    both = SideBySide(FaceSurface(None, first), FaceSurface(None, second), place)
+    place, at = place_adjacent(first, second, np.random.default_rng(seed))
+    both = AdjacentParts(FaceSurface(None, first), FaceSurface(None, second), place)
     x, y = np.meshgrid(np.arange(-99.8, 140, 0.5), np.arange(-99.8, 140, 0.5))
     points = np.column_stack([x.ravel(), y.ravel()])
     on_first, on_second = first.contains(points), second.contains(place.into(points))
@@ -32,10 +39,10 @@ def test_faces_lie_beside_each_other_and_the_sensor_near_both(first, second, see
     assert (heights[on_second] == place.z_mm).all()
     assert (heights[~on_first & ~on_second] == -np.inf).all()
     assert first.contains(at[None])[0]
-    assert first.distance_mm(at[None])[0] <= BESIDE.reach_mm
+    assert first.distance_mm(at[None])[0] <= REACH_MM
     beside = second.distance_mm(place.into(at[None]))[0]
-    assert beside <= BESIDE.reach_mm + BESIDE.gap_mm
-    assert abs(place.z_mm) <= BESIDE.step_mm
+    assert beside <= REACH_MM + GAP_MM
+    assert abs(place.z_mm) <= STEP_MM
 
 
 def test_a_touch_is_the_same_in_both_frames():
@@ -57,7 +64,7 @@ def test_two_bodies_are_one():
         [[corners[f[i]] for i in three] for f in faces for three in ((0, 1, 2), (0, 2, 3))]
     )
     place = FramePlace(22.0, 0.0, -0.5, math.pi / 2)  # from x = 12 to 22
-    both = SideBySide(mesh(cube), mesh(cube), place)
+    both = AdjacentParts(mesh(cube), mesh(cube), place)
     solid = both.solid_mm
     volume = np.einsum("ni,ni->n", solid[:, 0], np.cross(solid[:, 1], solid[:, 2])).sum() / 6
     assert volume == pytest.approx(2000, rel=1e-5)
@@ -71,4 +78,4 @@ def test_a_face_without_an_outer_edge_is_refused():
     radius = np.where(np.arange(20) % 2, 10.0, 4.0)
     star = polygon([np.column_stack([radius * np.cos(ring), radius * np.sin(ring)])])
     with pytest.raises(SurfaceError, match="no edge beside which"):
-        lay_beside(star, SQUARE, np.random.default_rng(1))
+        place_adjacent(star, SQUARE, np.random.default_rng(1))

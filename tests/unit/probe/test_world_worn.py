@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from probe.simulate.world.worn import wear_part
+from probe.simulate.scene import bare_scene
+from probe.simulate.world.surfaces import worn_scene
 
 TURN = 0.4  # of the face's x axis into the array's
 CENTRES = (
@@ -30,18 +31,23 @@ class Dots:
         return self.base_mm + np.where(away < 2.0, 1.0, 0.0)
 
 
+def worn_surface(surface, share, seed=1):
+    rng = np.random.default_rng(seed)
+    return worn_scene(bare_scene(surface), CENTRES, TURN, 7.0, share, rng).surface
+
+
 @pytest.mark.parametrize("base", [0.0, 0.25, -0.25])
 def test_a_worn_symbol_lies_level_with_the_face_around_it(base: float) -> None:
     surface = Dots(base)
     points = np.random.default_rng(1).uniform(-3.0, 14.0, (4000, 2))
-    worn = wear_part(surface, CENTRES, TURN, 7.0, 1.0, np.random.default_rng(1))
+    worn = worn_surface(surface, 1.0)
     assert worn.heights_mm(points) == pytest.approx(np.full(4000, base))
-    whole = wear_part(surface, CENTRES, TURN, 7.0, 0.0, np.random.default_rng(1))
+    whole = worn_surface(surface, 0.0)
     assert (whole.heights_mm(points) == surface.heights_mm(points)).all()
 
 
 def test_only_what_is_drawn_is_worn() -> None:
-    some = wear_part(Dots(0.25), CENTRES, TURN, 7.0, 0.5, np.random.default_rng(2))
+    some = worn_surface(Dots(0.25), 0.5, seed=2)
     assert 0 < len(some.centres_mm) < len(CENTRES)
     left = some.heights_mm(CENTRES)
     gone = (np.abs(CENTRES[:, None] - some.centres_mm).max(axis=2) < 1e-9).any(axis=1)

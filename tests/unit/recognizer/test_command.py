@@ -326,7 +326,7 @@ def test_pictures(asked, lab, images):
 
 
 def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
-    from recognizer.command.plot.winning import winning_lattice
+    from recognizer.command.picture import winning_lattice
     from recognizer.touch.lab import open_lab
     from recognizer.touch.reader import Reader
     from recognizer.touch.recognise import recognise
@@ -335,7 +335,8 @@ def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
     reader = Reader(open_lab(str(lab / "lab.db")), SensorType())
     signal = signal_of(images[0].astype(np.float64))
     won, found = winning_lattice(reader, signal), recognise(reader, signal)
-    assert won.face.face == found.face
+    face = won.encoding.face(won.place.face)
+    assert face.face == found.face
     points = np.array([[0.0, 0.0], [3.0, -4.0]])
     assert won.on_sensor(won.on_lattice(points)) == pytest.approx(points)
     # a symbol's centre, from the lattice and from the face, seen by the sensor
@@ -347,7 +348,7 @@ def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
     T_probe_face = np.linalg.inv(found.T_face_probe)
     near = 0
     for row, column, label, centre in zip(
-        won.face.rows, won.face.columns, won.face.labels, won.face.centres_mm, strict=True
+        face.rows, face.columns, face.labels, face.centres_mm, strict=True
     ):
         if (row, column) in seen:
             at, expected = seen[(row, column)]
@@ -356,7 +357,7 @@ def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
             assert label == expected
             near += 1
     assert near >= 9
-    assert won.felt[won.registered >= 0].mean() > 0.8
+    assert won.matched[won.registered >= 0].mean() > 0.8
     assert winning_lattice(reader, signal_of(np.zeros((16, 16)))) is None
 
 

@@ -16,8 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from encoded_objects.base.errors import EncodedObjectsError
 from probe.frame import frame_from
-from probe.recording.cdr import cdr_bytes
-from probe.recording.ros import DEFINITIONS, IMAGE, POSE_WITH_COVARIANCE, image_message
+from probe.recording.ros import DEFINITIONS, IMAGE, POSE_WITH_COVARIANCE, cdr_bytes, image_message
 from recognizer.command.answers import Answer
 from recognizer.command.publish import PublishSink, endpoint_of
 from recognizer.command.ros import object_message

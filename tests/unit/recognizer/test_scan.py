@@ -12,12 +12,14 @@ from probe.arm.carried import SensorPose
 from probe.contact.contract import Touch
 from probe.scan.places import surface_to_sensor
 from probe.simulate.registered import registered_surface
+from probe.simulate.scene import Scene
 from probe.simulate.world.levels import MISMATCH, TYPICAL
-from probe.simulate.world.reading import read_sensor
-from recognizer.scan.grow import begin_scan, extend_scan, read_scan
+from probe.simulate.world.sensor import LevelSensor
+from probe.surface.polygon import polygon
+from recognizer.scan.belief import begin_scan, extend_scan, read_scan
 from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces
-from recognizer.scan.settings import ScanSettings
+from recognizer.scan.views import ScanSettings
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
@@ -48,18 +50,20 @@ def reader(lab):
     return Reader(lab, SENSOR)
 
 
-MIDDLE = (40.0, 40.0)  #: of a face of the cube: where a print's scale moves nothing
+#: a face of the cube: its middle is where a print's scale moves nothing
+REGION = polygon([np.array([(0, 0), (80, 0), (80, 80), (0, 80)])])
 
 
 def scanned(surface, places, theta, level, seed):
     """Touches with believed places in another frame, and the true poses."""
+    scene = Scene(surface, REGION, "")
     rng = np.random.default_rng(seed)
     c, s = math.cos(0.6), math.sin(0.6)
     touches, true = [], []
     for k, (x, y) in enumerate(places):
         touch = Touch(x, y, theta, float(rng.uniform(40, 110)), *rng.normal(0, 0.008, 2))
         one_sensor = np.random.default_rng(seed)
-        counts, _ = read_sensor(surface, SENSOR, touch, level, one_sensor, datum_mm=MIDDLE)
+        counts = LevelSensor(SENSOR, level).read(scene, touch, one_sensor).counts
         error = rng.normal(0, 1, 3) * SPREAD
         pose = np.array([c * x - s * y + 200, s * x + c * y - 70, theta + 0.6]) + error
         signal = signal_of(counts.astype(float))
@@ -104,7 +108,7 @@ def test_a_touch_in_the_air_says_so_and_changes_nothing(lab, reader):
     lifted = extend_scan(scan, air)
     assert lifted.recognition.reason == NO_CONTACT
     assert len(lifted.touches) == 3
-    assert lifted.leading is scan.leading
+    assert lifted.best is scan.best
 
 
 def test_touches_of_another_thing_do_not_make_an_answer(lab, reader):
@@ -120,7 +124,7 @@ def test_touches_of_another_thing_do_not_make_an_answer(lab, reader):
         scan = extend_scan(scan, touch)
         assert scan.recognition.object in (None, "Cube")
     assert scan.recognition.face == "F3"
-    chosen = scan.leading.composite.agreement.chosen
+    chosen = scan.best.evidence.agreement.chosen
     assert chosen[3] < 0
     assert chosen[6] < 0
 
@@ -252,7 +256,7 @@ def one_touch(tmp_path_factory):
     def felt(name, face, x, y, T_base_object=None):
         scene = registered_surface(url, name, face)
         touch = Touch(x, y, 0.4, 80.0)
-        counts, _ = read_sensor(scene.surface, SENSOR, touch, TYPICAL, np.random.default_rng(1))
+        counts = LevelSensor(SENSOR, TYPICAL).read(scene, touch, np.random.default_rng(1)).counts
         if T_base_object is None:
             return counts, None
         return counts, T_base_object @ scene.T_object_surface @ surface_to_sensor(x, y, 0.4)

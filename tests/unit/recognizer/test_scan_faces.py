@@ -5,14 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from recognizer.scan.answer import LocatedComposite
-from recognizer.scan.faces import TouchedFace, contradict, hypotheses_of, join_faces
-from recognizer.scan.settings import ScanSettings
+from recognizer.scan.answer import ScanHypothesis
+from recognizer.scan.session import _Face, _hypotheses_of, contradict, join_faces
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, refusal
 from recognizer.touch.settings import ReaderSettings
-
-LIMITS = ScanSettings()
 
 
 @pytest.fixture
@@ -40,16 +37,16 @@ def touched(small, lab):
         for face, score, x in places:
             fit = small.fit_of([(0, 0)], [[0.0] * 5], x_mm=x, y_mm=20.0)
             place = Hypothesis(0, 6, 2, face, score)
-            found.append(LocatedComposite(lab, None, place, fit, score))
+            found.append(ScanHypothesis(lab, None, place, fit, score))
         belief = SimpleNamespace(
-            settings=LIMITS, reader=SimpleNamespace(settings=ReaderSettings()),
+            reader=SimpleNamespace(settings=ReaderSettings()),
             places=tuple(found), recognition=refusal(4, reason),
         )  # fmt: skip
         pose = None
         if at is not None:
             pose = np.eye(4)
             pose[:3, 3] = at
-        return TouchedFace(belief, pose)
+        return _Face(belief, None, pose)
 
     return one
 
@@ -92,8 +89,8 @@ def test_where_the_motion_is_known_the_object_must_lie_in_one_place(touched):
 
 
 def test_what_a_face_says_of_the_object(touched):
-    found = hypotheses_of(touched((0, -40.0, 20.0), (1, -42.0, 20.0), at=(100.0, 0.0, 0.0)))
+    found = _hypotheses_of(touched((0, -40.0, 20.0), (1, -42.0, 20.0), at=(100.0, 0.0, 0.0)))
     assert [(one.object, one.score) for one in found] == [("A", 0.0), ("B", -2.0)]
     height = 30.0 + 1.2  # the sensor stands on the tops of the symbols
     assert found[0].T_base_object[:3, 3] == pytest.approx([80.0, -20.0, -height])
-    assert not contradict(touched((0, -1.0, 20.0)), touched((1, -1.0, 20.0)), LIMITS)
+    assert not contradict(touched((0, -1.0, 20.0)), touched((1, -1.0, 20.0)))

@@ -6,15 +6,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from recognizer.scan.composite import composite, expected_fit
-from recognizer.scan.lattice import expected_at, refine_agreement, same_lattice, seed_lattice
+from recognizer.scan.lattice import (
+    AGREEMENT_NATS,
+    CELL_NATS,
+    CORRELATION,
+    LEFT_OUT_NATS,
+    WORSE_NATS,
+    accumulate,
+    predict_pose,
+    predicted_fit,
+    refine_agreement,
+    same_lattice,
+    seed_lattice,
+)
 from recognizer.scan.mosaic.planar import compose_poses, inverse
-from recognizer.scan.settings import ScanSettings
-from recognizer.scan.views import LatticeView, TouchPoses, views_of
+from recognizer.scan.views import LatticeView, TouchPoses, stack_views
 from recognizer.touch.symbols.fit import Fit
 
 PITCH = 12.0
-LIMITS = ScanSettings()
 T_PLANE_LATTICE = np.array([40.0, -25.0, 0.7])
 
 
@@ -62,15 +71,15 @@ def a_scan(number=6, sigma_mm=0.3, seed=1):
 
 
 def views_from(fits):
-    return views_of([tuple(LatticeView(f, led=False) for f in each) for each in fits])
+    return stack_views([tuple(LatticeView(f, predicted=False) for f in each) for each in fits])
 
 
 def test_touches_on_one_lattice_agree_and_their_cells_meet():
     true, touch_poses, fits = a_scan()
     views = views_from([(f,) for f in fits])
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
     assert (found.chosen == np.arange(6)).all()
-    both = composite(views, touch_poses, found, PITCH, LIMITS)
+    both = accumulate(views, touch_poses, found, PITCH)
     assert both is not None
     # counted from the origin of the first touch, every cell has its own symbol, once
     origin = np.round((true[0, :2] - [fits[0].x_mm, fits[0].y_mm]) / PITCH).astype(int)
@@ -88,9 +97,11 @@ def test_touches_on_one_lattice_agree_and_their_cells_meet():
 def test_the_lattice_is_found_better_than_the_arm_stands():
     _true, touch_poses, fits = a_scan(number=25, sigma_mm=0.4)
     views = views_from([(f,) for f in fits])
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 3), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 3), PITCH)
     middle = compose_poses(T_PLANE_LATTICE, np.array([80.0, 5.0, 0.3]))
-    at, covariance = expected_at(found.lattice, middle, np.zeros((3, 3)))
+    at, covariance = predict_pose(
+        found.lattice, TouchPoses(middle[None], np.zeros((1, 3, 3)), None)
+    )
     away = at[:2] - compose_poses(inverse(T_PLANE_LATTICE), middle)[:2]
     away -= np.rint(away / PITCH) * PITCH
     assert np.hypot(*away) < 0.25
@@ -106,23 +117,23 @@ def test_a_wrong_lattice_of_one_touch_is_passed_over(worse):
     each = [(f,) for f in fits]
     each[2] = (wrong, replace(fits[2], value=fits[2].value - worse))
     views = views_from(each)
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
     assert found.chosen.tolist() == [0, 1, 3, 4, 5, 6]
-    other = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 2), PITCH, LIMITS)
+    other = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 2), PITCH)
     assert (other.chosen >= 0).sum() == 1
     assert other.score < found.score - 40
     assert not same_lattice(found.lattice, other.lattice, touch_poses.poses[2], PITCH)
     # however much better it explains its image, it costs what leaving it out costs
-    assert found.score > 5 * LIMITS.agreement - LIMITS.left_out - 10
+    assert found.score > 5 * AGREEMENT_NATS - LEFT_OUT_NATS - 10
 
 
 def test_a_touch_that_plainly_shows_another_lattice_is_left_out():
     _true, touch_poses, fits = a_scan()
     wrong = replace(fits[2], x_mm=fits[2].x_mm + 4.0, theta_rad=fits[2].theta_rad + 1.2)
     each = [(f,) for f in fits]
-    each[2] = (wrong, replace(fits[2], value=fits[2].value - 2 * LIMITS.plainly))
+    each[2] = (wrong, replace(fits[2], value=fits[2].value - 2 * WORSE_NATS))
     views = views_from(each)
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
     assert found.chosen.tolist() == [0, 1, -1, 4, 5, 6]
 
 
@@ -136,10 +147,9 @@ def test_a_touch_whose_whole_pitches_are_not_told_is_left_out():
         TouchPoses(touch_poses.poses, wide, None),
         seed_lattice(views, touch_poses, 0),
         PITCH,
-        LIMITS,
     )
     assert found.chosen.tolist() == [0, 1, 2, 3, -1, 5]
-    both = composite(views, touch_poses, found, PITCH, LIMITS)
+    both = accumulate(views, touch_poses, found, PITCH)
     assert both is not None
     assert (both.fit.scores.max(axis=1) == 0).all()
 
@@ -149,21 +159,20 @@ def test_looks_at_a_cell_are_no_independent_witnesses():
     still = true[:1].repeat(30, axis=0)
     touch_poses = TouchPoses(compose_poses(T_PLANE_LATTICE, still), touch_poses.covariances, None)
     views = views_from([(fit_at(pose, (0, 0), sure=2.0),) for pose in still])
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
-    both = composite(views, touch_poses, found, PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
+    both = accumulate(views, touch_poses, found, PITCH)
     assert both is not None
-    assert both.looks == pytest.approx(30)
-    assert -both.fit.scores.min() == pytest.approx(2.0 * 30 / (1 + 29 * LIMITS.alike))
-    assert -both.fit.scores.min() < 2.0 / LIMITS.alike
+    assert -both.fit.scores.min() == pytest.approx(2.0 * 30 / (1 + 29 * CORRELATION))
+    assert -both.fit.scores.min() < 2.0 / CORRELATION
 
 
 def test_one_touch_says_a_bounded_amount_of_a_cell():
     true, touch_poses, _fits = a_scan(number=1)
     views = views_from([(fit_at(true[0], (0, 0), sure=500.0),)])
-    only = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
-    both = composite(views, touch_poses, only, PITCH, LIMITS)
+    only = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
+    both = accumulate(views, touch_poses, only, PITCH)
     assert both is not None
-    assert both.fit.scores.min() == -LIMITS.look
+    assert both.fit.scores.min() == -CELL_NATS
 
 
 def test_a_touch_that_contradicts_all_others_is_left_out():
@@ -173,15 +182,15 @@ def test_a_touch_that_contradicts_all_others_is_left_out():
     each = [(fit_at(pose, (0, 0), flipped=range(9) if k == 7 else ()),)
             for k, pose in enumerate(still)]  # fmt: skip
     views = views_from(each)
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
     assert found.chosen[7] == 7  # by its pose it agrees
-    both = composite(views, touch_poses, found, PITCH, LIMITS)
+    both = accumulate(views, touch_poses, found, PITCH)
     assert both is not None
     assert both.agreement.chosen.tolist() == [0, 1, 2, 3, 4, 5, 6, -1]
     assert both.agreement.score == pytest.approx(both.agreement.scores.sum())
     assert (both.fit.scores.argmax(axis=1) == label(both.fit.cells)).all()
     # it stands where the others and the arm say
-    there = expected_fit(both, touch_poses)
+    there = predicted_fit(both, touch_poses)
     assert math.hypot(there.x_mm - both.fit.x_mm, there.y_mm - both.fit.y_mm) < 1e-9
 
 
@@ -193,5 +202,5 @@ def test_fits_that_know_nothing_of_their_place_are_no_views():
     views = views_from([(fits[0],), (lost, vague, none)])
     assert views.touch.tolist() == [0]
     assert np.isfinite(views.values).all()
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
     assert found.chosen.tolist() == [0, -1]

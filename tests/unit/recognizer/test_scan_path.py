@@ -7,11 +7,17 @@ import pytest
 
 from generator.pipeline import encode
 from generator.spec import read_specs
+from recognizer.scan.lattice import CELL_NATS
 from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
-from recognizer.scan.path import follow_path, path_touch_poses
-from recognizer.scan.settings import PATHS, ScanSettings
-from recognizer.scan.steps import log_freedom, step_between, steps_of
-from recognizer.scan.views import LatticeView
+from recognizer.scan.path import (
+    PLACED_SD,
+    SHIFTS,
+    follow_path,
+    known_steps,
+    path_ambiguity,
+    step_between,
+)
+from recognizer.scan.views import LatticeView, ScanSettings
 from recognizer.touch.lab import open_lab
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import signal_of
@@ -42,7 +48,7 @@ def view(labels, origin=(0, 0), at=(0.0, 0.0), order=2, value=0.0):
         nuisance=np.zeros(4), gain=np.zeros(4), cells=cells, scores=scores,
         seen=np.full(len(cells), 30.0), noise=0.1, value=value, covariance=1e-4 * np.eye(3),
     )  # fmt: skip
-    return LatticeView(fit, led=False)
+    return LatticeView(fit, predicted=False)
 
 
 def block(encoding, row, column, rows=2, columns=3):
@@ -62,7 +68,7 @@ def corner(encoding, face):
 
 def followed(encoding, views, steps=None):
     steps = steps or [UNKNOWN] * len(views)
-    return follow_path(encoding, views, steps, DEFAULTS.hypotheses, LIMITS)
+    return follow_path(encoding, views, steps, DEFAULTS.hypotheses)
 
 
 def test_places_that_one_touch_leaves_open_are_told_by_a_path(encoding):
@@ -78,11 +84,11 @@ def test_places_that_one_touch_leaves_open_are_told_by_a_path(encoding):
     assert steps == pytest.approx(np.diff(true, axis=0), abs=1e-9)
     assert path.poses[0] == pytest.approx([12 * column + 14, 9 - 12 * row, 0.3])
     assert path.margin > 10
-    assert path.log_freedom < 3
+    assert path.ambiguity < 3
     few = [view(block(encoding, row, column)[0])]
     assert followed(encoding, [few]).margin < 1  # six symbols of two kinds stand in many places
-    poses = path_touch_poses(path, [UNKNOWN] * len(views))
-    assert np.sqrt(np.diag(poses.covariances[3])) == pytest.approx(PATHS.sure)
+    poses = path.touch_poses(UNKNOWN.covariance)
+    assert np.sqrt(np.diag(poses.covariances[3])) == pytest.approx(PLACED_SD)
 
 
 def test_a_path_that_may_end_in_two_places_says_so(encoding):
@@ -91,7 +97,7 @@ def test_a_path_that_may_end_in_two_places_says_so(encoding):
     path = followed(encoding, views)
     assert path.placed.all()
     assert path.margin < 1
-    assert path.log_freedom > 1
+    assert path.ambiguity > 1
 
 
 def test_a_touch_that_fits_nowhere_is_left_out(encoding):
@@ -102,7 +108,7 @@ def test_a_touch_that_fits_nowhere_is_left_out(encoding):
     assert path.placed.tolist() == [True, True, False, True]
     assert (path.poses[3] - path.poses[1])[:2] == pytest.approx([24.0, 0.0])
     assert path.poses[2] == pytest.approx(path.poses[1])
-    wide = path_touch_poses(path, [UNKNOWN] * 4).covariances[2]
+    wide = path.touch_poses(UNKNOWN.covariance).covariances[2]
     assert np.sqrt(wide[0, 0]) == pytest.approx(LIMITS.by_hand[0])
     assert not followed(encoding, [[], []]).placed.any()
 
@@ -126,7 +132,7 @@ def test_steps_are_what_somebody_measured():
         PlacedTouch(signal, stepped=planar_belief([5.0, 0.0, 0.0], (0.1, 0.1, 0.01))),
         PlacedTouch(signal, believed=planar_belief([9.0, 2.0, 0.1], (0.4, 0.4, 0.01))),
     ]
-    steps = steps_of(touches, LIMITS)
+    steps = known_steps(touches, LIMITS)
     assert steps[1].pose == pytest.approx([3.0, 0.0, 0.1])
     assert steps[1].covariance[0, 0] == pytest.approx(0.25)
     assert steps[2].pose == pytest.approx([5.0, 0.0, 0.0])
@@ -136,21 +142,21 @@ def test_steps_are_what_somebody_measured():
     assert both.covariance[0, 0] == pytest.approx(0.26, rel=1e-3)
 
 
-def freedom(second, at=(12.0, 0.0), step=UNKNOWN):
+def ambiguity(second, at=(12.0, 0.0), step=UNKNOWN):
     first = view([[0, 1], [1, 1]], at=(12.0, 12.0))
     fits = {0: first.fit, 1: second.fit}
     poses = np.array([[12.0, 12.0, 0.0], [12.0 + at[0], 12.0 + at[1], 0.0]])
-    return log_freedom(fits, poses, [UNKNOWN, step], 12.0, 2, LIMITS)
+    return path_ambiguity(fits, poses, [UNKNOWN, step], 12.0, 2)
 
 
-def test_the_freedom_of_a_path_is_how_many_others_touches_allow():
+def test_the_ambiguity_of_a_path_counts_the_others_that_touches_allow():
     # one column is seen twice and agrees; by hand: all shifts by their lengths and what they agree
     first, second = np.array([[0, 1], [1, 1]]), np.array([[1, 0], [1, 0]])
     total = own = 0.0
-    tiny = math.exp(-LIMITS.look)
+    tiny = math.exp(-CELL_NATS)
     same, other = 1 / (1 + 2 * tiny), tiny / (1 + 2 * tiny)
-    for i in range(-PATHS.shifts, PATHS.shifts + 1):
-        for j in range(-PATHS.shifts, PATHS.shifts + 1):
+    for i in range(-SHIFTS, SHIFTS + 1):
+        for j in range(-SHIFTS, SHIFTS + 1):
             away = np.array([12.0 + 12 * i, 12.0 * j])
             weight = math.exp(-0.5 * (away @ away) / LIMITS.by_hand[0] ** 2)
             for x in (0, 1):
@@ -164,9 +170,9 @@ def test_the_freedom_of_a_path_is_how_many_others_touches_allow():
                         weight *= 2 * float(p @ q)
             total += weight
             own = weight if i == j == 0 else own
-    found = freedom(view(second, at=(12.0, 12.0)))
+    found = ambiguity(view(second, at=(12.0, 12.0)))
     assert found == pytest.approx(math.log(total / own), abs=1e-6)
     # a step that is known leaves nothing open; one that nothing agrees with is worth nothing
     known = planar_belief([12.0, 0.0, 0.0], (0.5, 0.5, 0.01))
-    assert freedom(view(second, at=(12.0, 12.0)), step=known) == pytest.approx(0.0, abs=1e-9)
-    assert freedom(view([[0, 0], [0, 0]], at=(12.0, 12.0))) > 15
+    assert ambiguity(view(second, at=(12.0, 12.0)), step=known) == pytest.approx(0.0, abs=1e-9)
+    assert ambiguity(view([[0, 0], [0, 0]], at=(12.0, 12.0))) > 15

@@ -11,8 +11,7 @@ from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.circuit.network import effective_resistances
 from probe.contact.contract import Touch
-from probe.contact.engines.own import ENGINE
-from probe.contact.press import press
+from probe.contact.press import ENGINE, press
 from probe.contact.tips import Tips
 from probe.frame import frame_from
 from probe.recording.record import Recorder

@@ -64,5 +64,8 @@ def test_a_worn_face_has_lost_the_same_symbols_elsewhere(url, reader):
     first = draw_touch(plan, 1, reader)
     again = draw_again(plan, first, first.touch, reader, np.random.default_rng(0))
     points = np.random.default_rng(1).uniform(0, 60, (400, 2))
-    assert np.array_equal(again.surface.heights_mm(points), first.surface.heights_mm(points))
+    assert np.array_equal(
+        again.contact.scene.surface.heights_mm(points),
+        first.contact.scene.surface.heights_mm(points),
+    )
     assert (np.abs(again.counts.astype(int) - first.counts) < 40).all()  # the noise is another

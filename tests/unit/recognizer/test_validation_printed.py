@@ -18,12 +18,10 @@ from generator.errors import PrintError
 from generator.pipeline import encode
 from generator.printed import prints, slicer
 from generator.printed.prints import surface_keys, surface_path
-from generator.printed.surface import Coverage, PrintedSurface
-from generator.printed.surface_file import write_surface
+from generator.printed.surface import Coverage, PrintedSurface, write_surface
 from generator.spec import read_specs
 from probe.errors import SurfaceError
 from probe.simulate import printed
-from probe.simulate.part import part_surface
 from probe.simulate.printed import (
     PartToPrint,
     PrintOptions,
@@ -31,6 +29,7 @@ from probe.simulate.printed import (
     printed_scene,
     read_listing,
 )
+from probe.simulate.target import part_surface
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.validation.draw import draw_touch
@@ -180,8 +179,9 @@ def test_touches_of_prints_are_of_printed_faces_and_right(panels: str, listing: 
     assert [(t.object, t.face, t.verdict) for t in found] == [("Cube", "F3", RIGHT)] * 4
     assert math.sqrt(np.mean([t.error_mm**2 for t in found])) < 0.06
     edge = draw_touch(replace(plan, kind="edge"), 1, reader)
-    assert edge.scene is not None
-    assert edge.scene.region.distance_mm(np.array([[edge.touch.x_mm, edge.touch.y_mm]]))[0] < 9
+    assert (
+        edge.contact.scene.region.distance_mm(np.array([[edge.touch.x_mm, edge.touch.y_mm]]))[0] < 9
+    )
 
 
 def test_a_print_brings_its_own_faults(panels: str, listing: str) -> None:

@@ -1,0 +1,71 @@
+"""Whether the files that the database names are there, and still what was written."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import URL
+
+from generator.database.open import part_path
+from generator.database.registered import RegisteredPart
+from generator.errors import ShapeError
+from generator.polyhedron.read import file_content
+from generator.polyhedron.read.settings import MODEL
+from generator.polyhedron.read.stl import stl_triangles
+
+
+@dataclass(frozen=True, slots=True)
+class PartState:
+    """A part's file, as it is now."""
+
+    part: RegisteredPart
+    path: Path
+    state: str  #: ok, missing, changed, or unreadable
+
+
+def part_state(url: URL, part: RegisteredPart) -> PartState:
+    """Compare a part's file with the SHA-256 under which it is registered."""
+    path = part_path(url, part.file)
+    try:
+        with open(path, "rb") as file:
+            same = hashlib.file_digest(file, "sha256").hexdigest() == part.sha256
+        state = "ok" if same else "changed"
+    except (FileNotFoundError, NotADirectoryError):
+        state = "missing"
+    except OSError:
+        state = "unreadable"
+    return PartState(part, path, state)
+
+
+LARGEST_BYTES = 84 + 50 * MODEL.most_part_triangles
+
+
+def part_triangles(file: str | os.PathLike[str]) -> NDArray[np.float64]:
+    """Return the triangles of a written part.
+
+    Parameters
+    ----------
+    file
+        STL, binary or ASCII.
+
+    Returns
+    -------
+    (n, 3, 3) corners, mm, frame of the part; exactly the numbers of the file.
+
+    Raises
+    ------
+    ShapeError
+        The file cannot be read, is no STL, is not as long as it says, holds NaN, no triangle,
+        or too many.
+    """
+    place = str(file)
+    content = file_content(Path(file), place, LARGEST_BYTES)
+    corners = stl_triangles(content, place, most=MODEL.most_part_triangles, padded=False)
+    if not len(corners):
+        raise ShapeError("the file holds no triangle", fix="export the part again", place=place)
+    return corners

@@ -1,0 +1,192 @@
+"""Parts and their triangles -> STL and GLB.
+
+STL is binary, mm, part frame. Coordinates are 32-bit floats: near the local origin they resolve
+1e-5 mm at 100 mm. Vertices are shared by number, so that a vertex has the same bytes in all its
+triangles and the file is as closed as the mesh.
+
+GLB (glTF 2.0, binary container) has one node for each face of the object, and body and symbols as
+two materials. The faces' nodes ("F1", ...) are in the object frame, mm, z up; the root node scales
+to the metres and turns to the y-up axes of glTF. Normals are left out: viewers then shade flat.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.export.colours import BODY_RGB, RGB, SYMBOL_RGB
+from generator.export.faces import named_facets, object_faces, symbol_triangles
+from generator.export.formats import ExportedObject, Files
+from generator.solid.part import Part
+from generator.solid.triangulate import Mesh
+
+_HEADER = b"encoded-objects binary STL, mm".ljust(80, b" ")
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_BLOCK = 16_384  # triangles written at once: they stay in the cache
+#: Column-major: (x, y, z) mm -> (x, z, -y) / 1000 m.
+_ROOT = [0.001, 0, 0, 0, 0, 0, -0.001, 0, 0, 0.001, 0, 0, 0, 0, 0, 1]
+_FLOAT, _UNSIGNED = 5126, 5125  # component types
+_VERTICES, _INDICES = 34962, 34963  # buffer targets
+
+
+def write_stl(_part: Part, mesh: Mesh) -> Iterator[bytes | memoryview]:
+    """Return the STL file of a part."""
+    return stl_chunks(mesh)
+
+
+def write_glb(exported: ExportedObject) -> Files:
+    """Yield the GLB file of an object."""
+    yield f"{exported.name}.glb", glb_bytes(exported.name, exported.parts, exported.meshes)
+
+
+def stl_chunks(mesh: Mesh) -> Iterator[bytes | memoryview]:
+    """Yield the file of a mesh, piece by piece.
+
+    Normals are of unit length, or zero where the corners lie on a line.
+    """
+    yield _HEADER + struct.pack("<I", len(mesh.triangles))
+    for start in range(0, len(mesh.triangles), _BLOCK):
+        corners = mesh.vertices[mesh.triangles[start : start + _BLOCK]]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        facets = np.zeros(len(corners), _FACET)
+        facets["normal"] = np.divide(normals, lengths, out=normals, where=lengths > 0)
+        facets["corners"] = corners
+        yield facets.view(np.uint8).data
+
+
+def glb_bytes(name: str, parts: Sequence[Part], meshes: Sequence[Mesh]) -> bytes:
+    """Return the file of an object.
+
+    Parameters
+    ----------
+    name
+        Of the object; name of the root node.
+    parts, meshes
+        The parts and the mesh of each, part frame, mm.
+
+    Notes
+    -----
+    Of an object in one part every facet is a node; of an object in several parts every
+    part is, under the name of the face it carries.
+    """
+    buffer = _Buffer()
+    nodes: list[dict[str, Any]] = [{"name": name, "matrix": _ROOT, "children": []}]
+    shapes: list[dict[str, Any]] = []
+    for node_name, vertices, triangles, embossed in _faces(parts, meshes):
+        positions = buffer.positions(vertices)
+        primitives = [
+            {
+                "attributes": {"POSITION": positions},
+                "indices": buffer.indices(triangles[embossed == material]),
+                "material": material,
+            }
+            for material in (0, 1)
+            if (embossed == material).any()
+        ]
+        nodes[0]["children"].append(len(nodes))
+        nodes.append({"name": node_name, "mesh": len(shapes)})
+        shapes.append({"name": node_name, "primitives": primitives})
+    content = {
+        "asset": {"version": "2.0", "generator": "encoded-objects"},
+        "scene": 0,
+        "scenes": [{"name": name, "nodes": [0]}],
+        "nodes": nodes,
+        "meshes": shapes,
+        "materials": [_material("body", BODY_RGB), _material("symbols", SYMBOL_RGB)],
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+        "buffers": [{"byteLength": buffer.size}],
+    }
+    text = json.dumps(content, separators=(",", ":")).encode("ascii")
+    text += b" " * (-len(text) % 4)
+    data = b"".join(buffer.blocks)
+    return b"".join(
+        [
+            struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(data)),
+            struct.pack("<I4s", len(text), b"JSON"),
+            text,
+            struct.pack("<I4s", len(data), b"BIN\0"),
+            data,
+        ]
+    )
+
+
+def _faces(
+    parts: Sequence[Part], meshes: Sequence[Mesh]
+) -> Iterator[tuple[str, NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]]:
+    """Yield name, vertices in the object frame, triangles, and 1 for those of a symbol."""
+    for part, mesh in zip(parts, meshes, strict=True):
+        T = part.T_object_part
+        vertices = mesh.vertices @ T[:3, :3].T + T[:3, 3]
+        embossed = symbol_triangles(part, mesh).astype(np.int64)
+        if len(parts) > 1:
+            [(name, _)] = named_facets(part, alone=False)
+            groups = [(name, np.arange(len(mesh.triangles)))]
+        else:
+            faces = object_faces(part)[mesh.facets]
+            groups = [
+                (name, np.flatnonzero(faces == number))
+                for name, number in named_facets(part, alone=True)
+            ]
+        for name, chosen in groups:
+            used, numbers = np.unique(mesh.triangles[chosen], return_inverse=True)
+            yield name, vertices[used], numbers.reshape(-1, 3), embossed[chosen]
+
+
+class _Buffer:
+    """The binary part and the records that describe it."""
+
+    def __init__(self) -> None:
+        self.blocks: list[bytes] = []
+        self.size = 0
+        self.views: list[dict[str, int]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def positions(self, points: NDArray[np.float64]) -> int:
+        """Append (n, 3) points; return their accessor."""
+        values = points.astype("<f4")
+        bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        return self._append(values.tobytes(), _VERTICES, _FLOAT, len(values), "VEC3", bounds)
+
+    def indices(self, triangles: NDArray[np.int64]) -> int:
+        """Append (m, 3) vertex numbers; return their accessor."""
+        values = triangles.astype("<u4")
+        return self._append(values.tobytes(), _INDICES, _UNSIGNED, values.size, "SCALAR", {})
+
+    def _append(
+        self, block: bytes, target: int, component: int, count: int, kind: str, more: dict[str, Any]
+    ) -> int:
+        self.accessors.append(
+            {"bufferView": len(self.views), "componentType": component, "count": count}
+            | {"type": kind}
+            | more
+        )
+        self.views.append(
+            {"buffer": 0, "byteOffset": self.size, "byteLength": len(block), "target": target}
+        )
+        self.blocks.append(block)
+        self.size += len(block)
+        return len(self.accessors) - 1
+
+
+def _material(name: str, colour: RGB) -> dict[str, Any]:
+    linear = [round(_linear(value / 255), 6) for value in colour]
+    return {
+        "name": name,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*linear, 1],
+            "metallicFactor": 0,
+            "roughnessFactor": 0.8,
+        },
+    }
+
+
+def _linear(value: float) -> float:
+    """Return the linear light of an sRGB value (IEC 61966-2-1)."""
+    return value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)

@@ -1,0 +1,284 @@
+"""Recordings as HDF5 files: what such a file must hold to be read, and how one is written.
+
+Files come from anywhere: everything that is used is checked, values when they are read.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.errors import RecordingError
+from probe.recording.files import explain_errors
+from probe.recording.guard import MOST_TACTELS, open_hdf5
+from probe.recording.layout import (
+    CHUNK,
+    DATASETS,
+    FORMAT,
+    FORMAT_VERSION,
+    NOMINAL_HZ,
+    FrameBlock,
+    FrameFile,
+    RecordingOrigin,
+    are_rigid,
+)
+
+if TYPE_CHECKING:
+    import h5py
+
+_FILE_FORMAT: Final = ("v110", "v110")
+_CACHE: Final = 4 << 20  #: bytes of chunks that are held while a file is written
+_OURS: Final = ("format", "format_version", "tool_version", "piece")
+_IMPORT: Final = "import the array that holds the images (N, rows, columns)"
+#: by kind of numbers: the values of a dataset, and what to do with others
+_MEANT: Final = {
+    "u": ("counts 0 ... 65535", "import the array: it is scaled to counts"),
+    "i": ("whole numbers", f"delete /t_ns or /seq: frames then come at {NOMINAL_HZ:g} Hz"),
+    "f": ("rigid transforms", "delete /pose, or write NaN where it is not known"),
+}
+
+
+@contextmanager
+def open_hdf5_frames(
+    path: Path, *, live: bool = False, damaged: bool = False
+) -> Iterator[FrameFile]:
+    """Open an HDF5 file of frames; see `open_hdf5`.
+
+    Raises
+    ------
+    RecordingError
+        It is no recording, is of a newer format, damaged, or not closed (and not `live`).
+    """
+    with open_hdf5(path, live=live, damaged=damaged) as (file, head):
+        yield _checked(file, path, closed=head.whole)
+
+
+def write_hdf5(
+    draft: Path, origin: RecordingOrigin, blocks: Iterable[FrameBlock], place: Path, piece: int = 1
+) -> int:
+    """Write a recording as a file that will be called `place`; returns the number of its frames.
+
+    When something fails, the draft is removed. The HDF5 library crashes when it cannot write, so
+    it writes to a `_Draft`, which raises afterwards.
+
+    Raises
+    ------
+    RecordingError
+        The folder cannot be written, the disk is full.
+    """
+    import h5py
+
+    written = 0
+    with explain_errors(place, "make"):
+        stream = _Draft(draft)
+    try:
+        with explain_errors(place, "write"), stream:
+            with h5py.File(stream, "w", libver=_FILE_FORMAT, rdcc_nbytes=_CACHE) as file:
+                file.attrs.update(_attributes(origin, piece))
+                for block in blocks:
+                    _append_block(file, block, written)
+                    written += len(block)
+                    stream.check()
+                if not written:
+                    _append_block(file, FrameBlock.empty(), 0)
+            stream.check()
+            os.fsync(stream.fileno())
+    except BaseException:
+        draft.unlink(missing_ok=True)
+        raise
+    return written
+
+
+class _Draft(io.FileIO):
+    """A file that takes whatever is written; `check` raises the first error that occurred."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "w+")
+        self.failure: OSError | None = None
+
+    def check(self) -> None:
+        """Raise what went wrong."""
+        if self.failure is not None:
+            raise self.failure
+
+    def write(self, data: Any) -> int:
+        """Write all of `data`, or note why not."""
+        rest = memoryview(data)
+        try:
+            while rest and self.failure is None:
+                rest = rest[super().write(rest) :]
+        except OSError as error:
+            self.failure = error
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length, or note why not."""
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.failure = self.failure or error
+            return size or 0
+
+
+def _append_block(file: h5py.File, block: FrameBlock, first: int) -> None:
+    end = first + len(block)
+    for name, values in block.datasets().items():
+        if name not in file:
+            if values is None:
+                continue
+            shape = block.counts.shape[1:] if name == "frames" else DATASETS[name][0]
+            file.create_dataset(
+                name,
+                shape=(0, *shape),
+                maxshape=(None, *shape),
+                chunks=(CHUNK, *shape),
+                dtype=DATASETS[name][1],
+                shuffle=True,
+                compression="gzip",
+                compression_opts=1,
+                fillvalue=np.nan if name == "pose" else None,
+            )
+        file[name].resize(end, axis=0)
+        if values is not None:
+            file[name][first:end] = values
+
+
+def _attributes(origin: RecordingOrigin, piece: int) -> dict[str, Any]:
+    return {
+        **origin.more,
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "tool_version": version("encoded-objects"),
+        "sensor": origin.sensor,
+        "calibration": origin.calibration,
+        "units": origin.units,
+        "piece": piece,
+        **({"sensor_type": origin.sensor_type} if origin.sensor_type else {}),
+    }
+
+
+def _checked(file: h5py.File, path: Path, *, closed: bool) -> FrameFile:
+    """Check that an open file is a recording, without reading its frames."""
+    with explain_errors(path, "read"):
+        attributes = {name: _attribute_value(value) for name, value in file.attrs.items()}
+        names = [name for name in DATASETS if name in file]
+        others = ", ".join(sorted(file)) or "nothing"
+    own = attributes.get("format") == FORMAT
+    if own and attributes.get("format_version") != FORMAT_VERSION:
+        raise RecordingError(
+            f"its format is {attributes.get('format_version')}, this programme knows "
+            f"{FORMAT_VERSION}",
+            fix="install a newer version of encoded-objects",
+            place=str(path),
+        )
+    if "frames" not in names:
+        raise RecordingError(
+            f"it has no dataset /frames, but {others}", fix=_IMPORT, place=str(path)
+        )
+    shapes = {name: _shape_of(file, path, name) for name in names}
+    rows, columns = shapes["frames"][1:]
+    if rows * columns > MOST_TACTELS:
+        raise RecordingError(
+            f"its images are of {rows} x {columns}, at most {MOST_TACTELS:,} values are read",
+            fix="import a part of each image",
+            place=str(path),
+        )
+    lengths = [shape[0] for shape in shapes.values()]
+    ours = {name: attributes.pop(name, None) for name in _OURS} if own else {}
+    origin = RecordingOrigin(
+        str(attributes.pop("sensor", "")),
+        str(attributes.pop("calibration", "")),
+        str(attributes.pop("units", "counts")),
+        str(attributes.pop("sensor_type", "")),
+        MappingProxyType(attributes),
+    )
+    return FrameFile(
+        origin,
+        own,
+        closed,
+        tool_version=str(ours.get("tool_version", "")),
+        piece=int(ours.get("piece") or 1),
+        frames=min(lengths),
+        shape=(rows, columns),
+        even=len(set(lengths)) == 1,
+        poses="pose" in names,
+        read=lambda start, stop: _read_block(file, path, start, stop),
+    )
+
+
+def _read_block(file: h5py.File, path: Path, start: int, stop: int) -> FrameBlock:
+    """Read and check frames `start` ... `stop` - 1."""
+    values: dict[str, Any] = {}
+    with explain_errors(path, "read"):
+        for name in DATASETS:
+            if name in file:
+                values[name] = file[name][start:stop]
+    number = np.arange(start, stop)
+    values.setdefault("t_ns", np.rint(number * (1e9 / NOMINAL_HZ)))
+    values.setdefault("seq", number)
+    values.setdefault("wrist", np.zeros((len(number), 4)))
+    for name, array in values.items():
+        dtype = DATASETS[name][1]
+        if not _fits_exactly(array, dtype):
+            kind, fix = _MEANT[dtype.kind]
+            raise RecordingError(
+                f"/{name} holds other things than {kind} in frames {start} ... {stop - 1}",
+                fix=fix,
+                place=str(path),
+            )
+        values[name] = array.astype(dtype.newbyteorder("="))
+    return FrameBlock(
+        values["frames"], values["t_ns"], values["seq"], values["wrist"], values.get("pose")
+    ).frozen()
+
+
+def _shape_of(file: h5py.File, path: Path, name: str) -> tuple[int, ...]:
+    """Return the shape of a dataset; refuse entries of another one."""
+    import h5py
+
+    shape = DATASETS[name][0]
+    with explain_errors(path, "read"):
+        found = file[name]
+        is_array = isinstance(found, h5py.Dataset) and found.shape is not None
+        has = f"{found.dtype} {found.shape}" if is_array else "no array"
+        right = is_array and found.dtype.kind in "iuf" and found.ndim == 1 + len(shape)
+        if right and all(
+            n == wanted or (wanted < 0 < n)
+            for n, wanted in zip(found.shape[1:], shape, strict=True)
+        ):
+            return tuple(map(int, found.shape))
+    lengths = iter(("rows", "columns"))
+    wanted = ", ".join(["N", *(str(n) if n >= 0 else next(lengths) for n in shape)])
+    raise RecordingError(
+        f"/{name} must hold numbers ({wanted}), it is {has}", fix=_IMPORT, place=str(path)
+    )
+
+
+def _fits_exactly(values: NDArray[Any], dtype: np.dtype[Any]) -> bool:
+    """Tell whether the type that a frame has holds all values exactly."""
+    if dtype.kind == "f":
+        return are_rigid(values)
+    if np.can_cast(values.dtype, dtype):
+        return True
+    limits = np.iinfo(dtype)
+    if values.dtype.kind == "f" and not (values == np.floor(values)).all():
+        return False
+    return bool((values >= limits.min).all() and (values <= limits.max).all())
+
+
+def _attribute_value(value: Any) -> Any:
+    """Return an attribute as a text, a number, or an array."""
+    if isinstance(value, bytes):
+        return value.decode(errors="replace")
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.reshape(())[()]
+    return value.item() if isinstance(value, np.generic) else value

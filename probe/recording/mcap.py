@@ -1,0 +1,308 @@
+"""Recordings as MCAP files of ROS 2 messages, and back, without ROS and without loss.
+
+::
+
+    /touch/image   sensor_msgs/Image              counts as 32FC1
+    /touch/pose    geometry_msgs/PoseStamped      T_base_sensor, m, where it is known
+    /touch/frame   encoded_objects_msgs/TouchFrame  the rest, see `probe.recording.ros`
+    metadata "recording"                          the attributes of the recording, as JSON
+
+What was exported comes back as it was. Of a file by somebody else `sensor_msgs/Image` messages
+(32FC1, 16UC1 or mono8) are enough; their stamps are the times, and a `PoseStamped` belongs to the
+image of its stamp.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Collection, Iterator, Mapping
+from itertools import islice
+from pathlib import Path
+from types import MappingProxyType
+from typing import IO, Any, Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from encoded_objects.base.errors import require
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
+from probe.errors import FrameError, RecordingError
+from probe.frame import Frame, frame_from
+from probe.recording.files import check_name, draft_of, explain_errors, final_name
+from probe.recording.hdf5 import write_hdf5
+from probe.recording.layout import FrameBlock, RecordingOrigin, block_of
+from probe.recording.read import Recording
+from probe.recording.ros import (
+    BASE_FRAME,
+    DEFINITIONS,
+    IMAGE,
+    METADATA,
+    POSE,
+    TOUCH_FRAME,
+    frame_message,
+    image_message,
+    pose_message,
+)
+
+IMAGE_TOPIC: Final = "/touch/image"
+POSE_TOPIC: Final = "/touch/pose"
+FRAME_TOPIC: Final = "/touch/frame"
+_AT_ONCE: Final = 1024  #: frames read at a time
+_ENCODINGS: Final = {"32FC1": "f4", "16UC1": "u2", "mono16": "u2", "mono8": "u1", "8UC1": "u1"}
+
+
+class McapWriter:
+    """An MCAP file of ROS 2 messages that is being written.
+
+    Parameters
+    ----------
+    stream
+        Where it goes.
+    origin
+        Where the frames come from.
+
+    Raises
+    ------
+    MissingExtraError
+        The libraries of the extra `robot` are not installed.
+    """
+
+    def __init__(self, stream: IO[bytes], origin: RecordingOrigin) -> None:
+        require("mcap_ros2.writer", extra="robot", purpose="MCAP")
+        from mcap_ros2.writer import Writer
+
+        self._writer = Writer(stream)
+        self._schemas: dict[str, Any] = {}
+        said = {
+            "sensor": origin.sensor,
+            "calibration": origin.calibration,
+            "units": origin.units,
+            "sensor_type": origin.sensor_type,
+            "more": json.dumps({name: _plain(value) for name, value in origin.more.items()}),
+        }
+        self._writer.add_metadata(METADATA, said)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def frame(self, frame: Frame) -> None:
+        """Append a frame."""
+        self.message(IMAGE_TOPIC, IMAGE, image_message(frame), frame.t_ns, frame.seq)
+        self.message(FRAME_TOPIC, TOUCH_FRAME, frame_message(frame), frame.t_ns, frame.seq)
+        if frame.pose is not None:
+            pose = pose_message(frame.pose, frame.t_ns, BASE_FRAME)
+            self.message(POSE_TOPIC, POSE, pose, frame.t_ns, frame.seq)
+
+    def message(self, topic: str, kind: str, fields: Mapping[str, Any], t_ns: int, n: int) -> None:
+        """Append a message of one of the types of `DEFINITIONS`."""
+        if kind not in self._schemas:
+            self._schemas[kind] = self._writer.register_msgdef(kind, DEFINITIONS[kind])
+        self._writer.write_message(
+            topic, self._schemas[kind], fields, log_time=max(t_ns, 0), sequence=n & 0xFFFFFFFF
+        )
+
+    def close(self) -> None:
+        """Write what belongs at the end of the file; the stream stays open."""
+        self._writer.finish()
+
+
+def export_mcap(recording: Recording, out: Path) -> int:
+    """Write a recording as an MCAP file; returns the number of frames.
+
+    Raises
+    ------
+    RecordingError
+        The recording cannot be read, or the file not be written.
+    """
+    with (
+        explain_errors(out, "write"),
+        open(out, "wb") as stream,
+        McapWriter(stream, recording.origin) as writer,
+    ):
+        for frame in recording.frames():
+            writer.frame(frame)
+    return len(recording)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of an attribute as JSON holds it."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def import_mcap(
+    path: Path, out: Path, *, sensor_type: SensorType | str = "", replace: bool = False
+) -> Recording:
+    """Make a recording of an MCAP file.
+
+    Parameters
+    ----------
+    path, out
+        The file, and the recording to be made.
+    sensor_type
+        A type, its name or file: whose images they are, where the file does not tell.
+    replace
+        Let it take the place of an older recording of that name.
+
+    Raises
+    ------
+    RecordingError
+        No MCAP file, no images in it, or images that are none of a touch; a name that is taken.
+    """
+    check_name(out, replace=replace)
+    origin, frames = _read_mcap(path)
+    if sensor_type and not origin.sensor_type:
+        kind = choose_sensor_type(sensor_type, "", None, str(path))
+        origin = dataclasses.replace(origin, sensor_type=sensor_type_text(kind))
+    draft = draft_of(out)
+    write_hdf5(draft, origin, _blocks(frames, path), out)
+    final_name(draft, out, replace=replace)
+    return Recording(out)
+
+
+def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
+    """Return where the frames of an MCAP file come from, and these in order of their time."""
+    require("mcap_ros2.decoder", extra="robot", purpose="MCAP")
+    from mcap.exceptions import McapError
+    from mcap.reader import make_reader
+
+    try:
+        with explain_errors(path, "read"), open(path, "rb") as stream:
+            reader = make_reader(stream)
+            summary = reader.get_summary()
+            kinds = {} if summary is None else {s.id: s.name for s in summary.schemas.values()}
+            if summary is not None and IMAGE not in kinds.values():
+                there = ", ".join(sorted(set(kinds.values()))) or "nothing"
+                raise RecordingError(
+                    f"no {IMAGE} in it, but {there}", fix="record the tactile image too",
+                    place=str(path),
+                )  # fmt: skip
+            said = {one.name: one.metadata for one in reader.iter_metadata()}.get(METADATA, {})
+    except McapError as error:
+        raise RecordingError(
+            f"this is no MCAP file ({type(error).__name__})", fix="give a file of ROS 2 messages",
+            place=str(path),
+        ) from error  # fmt: skip
+    try:
+        more = json.loads(said.get("more", "{}"))
+    except ValueError:
+        more = {}
+    origin = RecordingOrigin(
+        said.get("sensor", ""), said.get("calibration", ""), said.get("units", "counts"),
+        said.get("sensor_type", ""), MappingProxyType(dict(more)),
+    )  # fmt: skip
+    return origin, _frames(path)
+
+
+def _blocks(frames: Iterator[Frame], path: Path) -> Iterator[FrameBlock]:
+    while some := list(islice(frames, _AT_ONCE)):
+        odd = [frame for frame in some if frame.counts.shape != some[0].counts.shape]
+        if odd:
+            raise RecordingError(
+                f"images of {some[0].counts.shape} and of {odd[0].counts.shape} readings",
+                fix="keep the images of one sensor in a file", place=str(path),
+            )  # fmt: skip
+        yield block_of(some)
+
+
+def _frames(path: Path) -> Iterator[Frame]:
+    """Yield the frames of an MCAP file: ours in the order of the file, others' in that of time."""
+    number = 0
+    poses = {_stamp(message): _pose(message.pose) for _, message in _messages(path, {POSE})}
+    image: Any = None
+    rest: Any = None
+    for kind, message in _messages(path, {IMAGE, TOUCH_FRAME}):
+        if kind == IMAGE:
+            if image is not None:
+                yield _frame(image, rest, poses, number, path)
+                number += 1
+            image, rest = message, None
+        elif image is not None:
+            rest = message
+    if image is not None:
+        yield _frame(image, rest, poses, number, path)
+
+
+def _messages(path: Path, kinds: Collection[str]) -> Iterator[tuple[str, Any]]:
+    """Yield type and content of the messages of some types.
+
+    Of a file with `TouchFrame` messages poses are left out, for these hold them, and the rest comes
+    as it was written: times of a probe may begin anew.
+    """
+    from mcap.exceptions import McapError
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    with explain_errors(path, "read"), open(path, "rb") as stream:
+        try:
+            reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+            summary = reader.get_summary()
+            names = {} if summary is None else {s.id: s.name for s in summary.schemas.values()}
+            channels = {} if summary is None else summary.channels
+            topics = [c.topic for c in channels.values() if names.get(c.schema_id) in kinds]
+            ours = TOUCH_FRAME in names.values()
+            if not topics or (ours and IMAGE not in kinds):
+                return
+            read = reader.iter_decoded_messages(topics=topics, log_time_order=not ours)
+            for schema, _, _, message in read:
+                yield ("" if schema is None else schema.name), message
+        except McapError as error:
+            raise RecordingError(
+                f"it is damaged ({type(error).__name__}: {error})",
+                fix="mend it with `mcap recover`", place=str(path),
+            ) from error  # fmt: skip
+
+
+def _frame(
+    image: Any, rest: Any, poses: Mapping[int, NDArray[np.float64]], number: int, path: Path
+) -> Frame:
+    """Return the frame of an image and what else is known of it."""
+    t_ns, seq, wrist = _stamp(image), number, None
+    T = poses.get(t_ns)
+    if rest is not None:
+        t_ns, seq, wrist = rest.t_ns, rest.seq, np.array(rest.wrist, np.uint16)
+        T = np.array(rest.pose).reshape(4, 4) if rest.has_pose else None
+    try:
+        return frame_from(_counts(image, number, path), t_ns=t_ns, seq=seq, wrist=wrist, pose=T)
+    except FrameError as error:
+        raise RecordingError(
+            f"image {number}: {error.cause}", fix=error.fix, place=str(path)
+        ) from error
+
+
+def _stamp(message: Any) -> int:
+    stamp = message.header.stamp
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def _counts(image: Any, number: int, path: Path) -> NDArray[Any]:
+    kind = _ENCODINGS.get(image.encoding)
+    if kind is None:
+        raise RecordingError(
+            f"image {number} is encoded as {image.encoding}",
+            fix=f"take {', '.join(_ENCODINGS)}", place=str(path),
+        )  # fmt: skip
+    order = ">" if image.is_bigendian else "<"
+    rows = np.frombuffer(bytes(image.data), np.uint8)
+    if rows.size != image.height * image.step or image.step < image.width * int(kind[1]):
+        raise RecordingError(
+            f"image {number} has {rows.size} bytes, not {image.height} rows of {image.step}",
+            fix="write its step and height as they are", place=str(path),
+        )  # fmt: skip
+    plain = rows.reshape(image.height, image.step)[:, : image.width * int(kind[1])]
+    return np.ascontiguousarray(plain).view(order + kind)
+
+
+def _pose(pose: Any) -> NDArray[np.float64]:
+    from scipy.spatial.transform import Rotation
+
+    turn, at = pose.orientation, pose.position
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
+    T[:3, 3] = 1e3 * np.array([at.x, at.y, at.z])
+    return T
