@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from recognizer.touch.settings import DEFAULTS, ReaderSettings
+from recognizer.touch.options import ReaderOptions
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +41,7 @@ class VerdictSettings:
     stroke_mm: float = 0.1  #: by which strokes may be wider or narrower without a word
 
 
-def settings_for_prints() -> ReaderSettings:
-    """Return a reader's settings under which prints are read that are further off than usual."""
-    from dataclasses import replace
-
-    refine = DEFAULTS.refine
-    prior = (*refine.prior[:6], 0.04)
-    return replace(DEFAULTS, refine=replace(refine, prior=prior, limits=(*refine.limits[:3], 0.12)))
-
+#: Of a reader of prints that are further off than usual.
+PRINTS = ReaderOptions(scale_sd=0.04, scale_most=0.12)
 
 ESTIMATE, VERDICT = EstimateSettings(), VerdictSettings()

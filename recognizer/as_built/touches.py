@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from probe.calibration import Calibration
 from recognizer.as_built.estimate import FeltPrint
 from recognizer.errors import AsBuiltError
-from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
-from recognizer.touch.contacts import TouchImage
+from recognizer.touch.evidence import VerifiedHypothesis
 from recognizer.touch.lab import EncodedFace
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise_with_hypothesis
+from recognizer.touch.recognise import read_touch
+from recognizer.touch.source import TouchImage
 from recognizer.touch.symbols.stretch import fit_stretch
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ def feel_prints(
     Parameters
     ----------
     reader
-        With settings of `settings_for_prints`, so that a print far off is read too.
+        With the options `PRINTS`, so that a print far off is read too.
     place
         Of the touches, for messages.
 
@@ -49,7 +49,8 @@ def feel_prints(
     reasons: Counter[str] = Counter()
     for touch in touches:
         signal = reader.signal(touch.counts, calibration=calibration)
-        answer, verified = recognise_with_hypothesis(reader, signal, touch.seq)
+        reading = read_touch(reader, signal, touch.seq)
+        answer, verified = reading.answer, reading.best
         if not answer or verified is None:
             reasons[answer.reason] += 1
             continue
@@ -83,13 +84,8 @@ def feel_prints(
 def _fit_print(
     verified: VerifiedHypothesis, face: EncodedFace, T_part_face: Array, seq: int
 ) -> FeltPrint:
-    fit, embossed, place = verified.fit, verified.embossed, verified.hypothesis
-    worn = fit.cells[weigh_cells(embossed, fit, place, verified.image.settings.belief).worn]
-
-    def shown(cells: Ints) -> Ints:
-        return unworn_labels_at(embossed, place, worn, cells)
-
-    lattice = fit_stretch(verified.image, verified.template, fit.pose, fit.gain, shown)
+    fit = verified.fit
+    lattice = fit_stretch(verified.image, fit.pose, fit.gain, verified.labels_at)
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
     # the lattice's axes are the face's, turned by `rotation_rad`
     by = np.eye(4)
@@ -105,6 +101,6 @@ def _fit_print(
         part=face.part,
         axes=T_part_face[:2, :2],
         strain=by[:3, :3] @ lattice.strain,
-        stroke_mm=embossed.style.stroke_mm + lattice.wider_mm,
+        stroke_mm=verified.embossed.style.stroke_mm + lattice.wider_mm,
         covariance=by @ lattice.covariance @ by.T,
     )

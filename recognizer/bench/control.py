@@ -20,7 +20,7 @@ from recognizer.bench.files import find_file
 from recognizer.bench.images import FILTERS
 from recognizer.bench.session import Session
 from recognizer.bench.uploads import Uploads
-from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.options import DEFAULTS
 
 Ports = tuple[tuple[str, str], ...]
 
@@ -118,7 +118,7 @@ def control_routes(session: Session, ports: Ports) -> APIRouter:
                 "overlay_mm": sensor.overlay.height_mm,
                 "force_n": usual_force_n(sensor),
             },
-            "margin": (reader.settings if reader else DEFAULTS).belief.margin,
+            "margin": (reader.options if reader else DEFAULTS).margin,
         }
 
     @routes.post("/port")

@@ -1,9 +1,9 @@
 """Accumulated evidence -> places of the database -> Recognition. Thesis 6.3.
 
-Evidence is located like the fit of one touch (`recognizer.touch.locate`): its strongest cells list
-places, all cells compare them. The pose of the last touch is fitted once more with the symbols of
-the database. Acceptance follows `recognizer.touch.belief` on all cells together; the number of
-contradictions that are allowed grows with them.
+Evidence is located like the fit of one touch (`recognizer.touch.hypothesis`): its strongest cells
+list places, all cells compare them. The pose of the last touch is fitted once more with the symbols
+of the database. `recognizer.touch.verdict` judges all cells together; the number of contradictions
+that are allowed grows with them.
 """
 
 from __future__ import annotations
@@ -17,33 +17,28 @@ from numpy.typing import NDArray
 
 from recognizer.scan.lattice import Evidence
 from recognizer.scan.path import RegisteredPath
-from recognizer.touch.belief import null_log_likelihood, unworn_labels_at, weigh_cells
 from recognizer.touch.chance import expected_matches
-from recognizer.touch.hypothesis import Hypothesis, coincide, log_likelihood, under_centre
+from recognizer.touch.evidence import null_log_likelihood, unworn_labels_at, weigh_cells
+from recognizer.touch.hypothesis import (
+    Hypothesis,
+    coincide,
+    find_hypotheses,
+    find_rivals,
+    log_likelihood,
+    under_centre,
+)
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import find_hypotheses, find_rivals
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at
-from recognizer.touch.recognition import (
-    AMBIGUOUS,
-    BY_CHANCE,
-    NOT_ENCODED,
-    TOO_FEW,
-    Recognition,
-    RunnerUp,
-    refusal,
-)
-from recognizer.touch.round import bend_at
-from recognizer.touch.settings import HypothesisSettings
-from recognizer.touch.symbols.explained import explained_share
-from recognizer.touch.symbols.fit import Fit, score_cells
-from recognizer.touch.symbols.gain import Image, bend_image
-from recognizer.touch.symbols.posterior import refit_pose
-from recognizer.touch.symbols.refine import refine_lattices
-from recognizer.touch.symbols.template import ResponseTemplate
+from recognizer.touch.recognition import TOO_FEW, Recognition, RunnerUp, refusal
+from recognizer.touch.symbols.fit import Fit, refine_lattices, score_cells
+from recognizer.touch.symbols.image import Image, bend_image
+from recognizer.touch.symbols.posterior import explained_share, refit_pose
+from recognizer.touch.verdict import CONTRADICTION, RATIO, reject_chance, reject_reason
+from recognizer.touch.verdict import Evidence as PlaceEvidence
+from recognizer.touch.verify import SHARES, bend_at
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LOCATED = 3  #: lattices that are looked up
 STRONGEST = 16  #: cells by which places are listed
@@ -53,7 +48,7 @@ WRONG = 0.05  #: share of the cells that may clearly contradict the place
 #: expected matches by chance; a lab of a profile for scans has fewer symbols than one touch of
 #: another profile can distinguish
 DOUBT = 2e-2
-SURPRISE_BY_HAND = 8.0  #: nats over symbols of no registered place, without measured steps
+RATIO_BY_HAND = 8.0  #: nats over symbols of no registered place, without measured steps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,10 +85,8 @@ def locate_evidence(
     embossed: EmbossedArray,
     found: Sequence[Evidence],
     path: RegisteredPath | None,
-    settings: HypothesisSettings,
 ) -> list[ScanHypothesis]:
     """Return the likeliest places of the evidence of one array, best evidence first."""
-    settings = replace(settings, kept=PLACES)
     places: list[ScanHypothesis] = []
     for evidence in found[:LOCATED]:
         fit = evidence.fit
@@ -102,12 +95,12 @@ def locate_evidence(
         listed = replace(
             fit, cells=fit.cells[strongest], scores=fit.scores[strongest], seen=fit.seen[strongest]
         )
-        ones = find_hypotheses(embossed, (listed,), settings)
+        ones = find_hypotheses(embossed, (listed,), PLACES)
         if ones:  # all cells may point to places that the strongest do not
-            best = max(ones, key=lambda one: log_likelihood(embossed, fit, one, settings))
-            ones += find_rivals(embossed, fit, best, 0, settings)
+            best = max(ones, key=lambda one: log_likelihood(embossed, fit, one))
+            ones += find_rivals(embossed, fit, best, 0, PLACES)
         for one in ones:
-            score = log_likelihood(embossed, fit, one, settings)
+            score = log_likelihood(embossed, fit, one)
             hypothesis = replace(one, score=score)
             places.append(ScanHypothesis(embossed, evidence, hypothesis, fit, score, path=path))
     return places
@@ -122,31 +115,26 @@ def distinct_places(found: Sequence[ScanHypothesis]) -> list[ScanHypothesis]:
     return [item for n, item in enumerate(ranked) if n == 0 or not ranked[0].same(item)]
 
 
-def refine_last_pose(
-    reader: Reader, image: Image, template: ResponseTemplate, found: ScanHypothesis
-) -> ScanHypothesis:
+def refine_last_pose(reader: Reader, image: Image, found: ScanHypothesis) -> ScanHypothesis:
     """Return a place with its last touch fitted to the symbols of the database."""
     embossed, hypothesis, fit = found.embossed, found.hypothesis, found.fit
-    worn = fit.cells[weigh_cells(embossed, fit, hypothesis, reader.settings.belief).worn]
-
-    def labels(cells: Ints) -> Ints:
-        return unworn_labels_at(embossed, hypothesis, worn, cells)
-
+    worn = fit.cells[weigh_cells(embossed, fit, hypothesis).worn]
+    labels = unworn_labels_at(embossed, hypothesis, worn)
     bend = bend_at(embossed, hypothesis, fit)
-    shares = (1.0,) if bend is None else reader.settings.round.shares
+    shares = (1.0,) if bend is None else SHARES
     if bend is not None:
         image = bend_image(image, reader.sensor, bend, shares)
     pose, gain = (np.tile(each, (len(shares), 1)) for each in (fit.pose, fit.gain))
-    lattices = refine_lattices(image, template, pose, gain, steps=STEPS, shown=labels)
+    lattices = refine_lattices(image, pose, gain, steps=STEPS, labels_at=labels)
     best = int(np.argmax(lattices.value))
-    again = score_cells(image, template, lattices)[best]
+    again = score_cells(image, lattices)[best]
     if bend is not None:
         image = bend_image(image, reader.sensor, bend, shares[best : best + 1])
     finer = replace(
         again, cells=fit.cells, scores=fit.scores, seen=fit.seen, value=fit.value, with_scale=None
     )
-    share = explained_share(image, template, finer.pose, finer.gain, labels)
-    return replace(found, fit=refit_pose(image, template, finer, labels), explained=share)
+    share = explained_share(image, finer.pose, finer.gain, labels)
+    return replace(found, fit=refit_pose(image, finer, labels), explained=share)
 
 
 def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Recognition:
@@ -165,37 +153,33 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
     if path is not None:
         margin = min(margin, path.margin)
     answer = answer_at(
-        best.embossed, best.fit, best.hypothesis, reader.settings, seq,
+        best.embossed, best.fit, best.hypothesis, reader.options, seq,
         reason=_reject_reason(reader, best, margin), margin=margin, runner_up=runner_up,
     )  # fmt: skip
     if not answer:
         return answer
-    arrays, settings = reader.lab.arrays, reader.settings
-    doubt = expected_matches(arrays, best.embossed, best.fit, best.hypothesis, settings)
+    doubt = expected_matches(reader.lab.arrays, best.embossed, best.fit, best.hypothesis)
     if path is not None:
         doubt *= math.exp(path.ambiguity)
-    if doubt > DOUBT:
-        return refusal(seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt)
+    reason = reject_chance(doubt, DOUBT)
+    if reason:
+        return refusal(seq, reason, margin=margin, runner_up=runner_up, doubt=doubt)
     return replace(answer, doubt=doubt)
 
 
 def _reject_reason(reader: Reader, best: ScanHypothesis, margin: float) -> str:
     """Return why the best place is not accepted, or ""."""
-    embossed, fit, hypothesis = best.embossed, best.fit, best.hypothesis
-    belief, by_hand = reader.settings.belief, best.path is not None
-    cells = weigh_cells(embossed, fit, hypothesis, belief)
-    inliers = int(cells.agree.sum())
+    embossed, fit, agreement = best.embossed, best.fit, best.evidence.agreement
+    by_hand = best.path is not None
+    cells = weigh_cells(embossed, fit, best.hypothesis)
     chance = null_log_likelihood(embossed, fit)
-    agreeing = best.evidence.agreement.touches
-    surprise = SURPRISE_BY_HAND if by_hand and agreeing > 1 else belief.surprise
-    if fit.value - chance < surprise:
-        return TOO_FEW  # even full agreement would be no surprise
-    if best.score - chance < belief.surprise:
-        return NOT_ENCODED
-    if (cells.against > belief.clearly).sum() > max(belief.contradicted, WRONG * inliers):
-        return NOT_ENCODED
-    if by_hand and 2 * agreeing <= len(best.evidence.agreement.chosen):
-        return TOO_FEW  # any touches may agree in a minority, by chance
-    if best.score - chance < surprise or inliers < belief.least_inliers:
-        return TOO_FEW
-    return AMBIGUOUS if margin < belief.margin else ""
+    evidence = PlaceEvidence(
+        log_likelihood_ratio=best.score - chance,
+        inliers=int(cells.agree.sum()),
+        contradictions=int((cells.against > CONTRADICTION).sum()),
+        best_ratio=fit.value - chance,
+        touches=len(agreement.chosen) if by_hand else 1,
+        agreeing=agreement.touches,
+    )
+    least = RATIO_BY_HAND if by_hand and agreement.touches > 1 else RATIO
+    return reject_reason(evidence, margin, reader.options, least_ratio=least, wrong_share=WRONG)

@@ -18,7 +18,7 @@ from recognizer.sensor.answering import answering_of
 from recognizer.sensor.settings import LEARNING, LearningSettings
 from recognizer.sensor.tactels import TactelEvidence, evidence_of, with_tactels
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise_with_hypothesis
+from recognizer.touch.recognise import read_touch
 from recognizer.touch.sensor_state import SensorState, invert_floating, unknown_state
 
 Array = NDArray[np.float64]
@@ -63,9 +63,10 @@ def learn_sensor(
         under = replace(reader, state=state)
         for number, image in enumerate(inverted):
             signal = under.signal(image, calibration=calibration)
-            answer, verified = recognise_with_hypothesis(under, signal, number)
-            if answer and verified is not None and (answer.margin or 0.0) > settings.margin:
-                told.append(evidence_of(verified))
+            reading = read_touch(under, signal, number)
+            answer, best = reading.answer, reading.best
+            if answer and best is not None and (answer.margin or 0.0) > settings.margin:
+                told.append(evidence_of(best))
             if done is not None:
                 done((turn + (number + 1) / len(inverted)) / rounds)
         state = with_tactels(state, told, before)

@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
+from recognizer.touch.evidence import VerifiedHypothesis
 from recognizer.touch.sensor_state import PRIOR, SensorState
-from recognizer.touch.symbols.refine import linearize_image
+from recognizer.touch.symbols.kernels import FIRST_NOISE
+from recognizer.touch.symbols.linearize import linearize_image
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -32,16 +33,10 @@ class TactelEvidence:
 
 def evidence_of(verified: VerifiedHypothesis) -> TactelEvidence:
     """Return what one recognised touch says of the tactels, under the state it was read with."""
-    fit, image, place = verified.fit, verified.image, verified.hypothesis
-    embossed = verified.embossed
-    worn = fit.cells[weigh_cells(embossed, fit, place, image.settings.belief).worn]
-
-    def shown(cells: Ints) -> Ints:
-        return unworn_labels_at(embossed, place, worn, cells)
-
-    at = linearize_image(image, verified.template, fit.pose[None], fit.gain[None], shown)
+    fit, image = verified.fit, verified.image
+    at = linearize_image(image, fit.pose[None], fit.gain[None], verified.labels_at)
     own, left = at.jacobian[0], at.left[0]
-    sure = at.sure[0] * (image.settings.noise.first / fit.noise) ** 2
+    sure = at.sure[0] * (FIRST_NOISE / fit.noise) ** 2
     c, s = np.cos(fit.theta_rad), np.sin(fit.theta_rad)
     by_tactel = np.stack(
         [image.forces - left, c * own[:, 0] + s * own[:, 1], c * own[:, 1] - s * own[:, 0]], axis=1
