@@ -2,7 +2,7 @@
 
 Cells, a small glyph in every cell that the object uses, the outline of each face in its
 colour with its name, and the cells of other objects in grey. Faces that cross the border of
-the torus appear on both sides. An array of more than `ARRAY_SVG.full` cells a side is cropped to
+the torus appear on both sides. An array of more than `_FULL` cells a side is cropped to
 the neighbourhood of the faces.
 
 Drawing frame: one unit is one cell, x along columns, y along rows downwards, origin at the
@@ -21,9 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
-from generator.export.settings import ARRAY_SVG
 from generator.layout.placement import FaceLayout
 
+_FULL = 300  # cells a side up to which the whole array is drawn
+_AROUND = 3  # cells around the faces in a cropped picture
+_NAMED = 1.5  # cells: a narrower strip of a face bears no name
+_CELL_PX, _WIDE_PX = 14, 1600  # a wider picture gets smaller cells
 _FONT = 'font-family="Helvetica, Arial, sans-serif"'
 
 #: Colours of the faces, one after another; dark enough for text on white.
@@ -77,7 +80,7 @@ def array_svg(
     """
     placed = [_unwrap(face, pitch_mm) for face in faces]
     view = _view(rows, columns, [box for _, box in placed])
-    cell = min(ARRAY_SVG.cell, max(4.0, ARRAY_SVG.wide / view.columns))
+    cell = min(_CELL_PX, max(4.0, _WIDE_PX / view.columns))
     left = max(60, 24 + 7 * len(str(rows)))
     width, height = left + view.columns * cell + 30, view.rows * cell + 130
     frame = f'<rect width="{view.columns}" height="{view.rows}"'
@@ -129,7 +132,7 @@ def _unwrap(face: FaceOnArray, pitch_mm: float) -> tuple[list[NDArray[np.float64
 
 
 def _view(rows: int, columns: int, boxes: list[Box]) -> _View:
-    if not boxes or max(rows, columns) <= ARRAY_SVG.full:
+    if not boxes or max(rows, columns) <= _FULL:
         return _View(0, 0, columns, rows)
     left, width = _shortest_arc(columns, [(box[0], box[2]) for box in boxes])
     top, height = _shortest_arc(rows, [(box[1], box[3]) for box in boxes])
@@ -138,8 +141,8 @@ def _view(rows: int, columns: int, boxes: list[Box]) -> _View:
 
 def _shortest_arc(period: int, intervals: list[tuple[int, int]]) -> tuple[int, int]:
     """Return start and length of the shortest arc of a circle that holds all intervals."""
-    cells = [(a - ARRAY_SVG.margin, b + ARRAY_SVG.margin) for a, b in intervals]
-    if period <= ARRAY_SVG.full:
+    cells = [(a - _AROUND, b + _AROUND) for a, b in intervals]
+    if period <= _FULL:
         return 0, period
     best = (0, period)
     for start, _ in cells:
@@ -203,7 +206,7 @@ def _name(name: str, colour: str, loop: NDArray[np.float64], view: _View) -> str
     """Return the name in the middle of a face, or of the part of it that is in the view."""
     edge = np.array([view.columns, view.rows])
     low, high = loop.min(axis=0).clip(0, edge), loop.max(axis=0).clip(0, edge)
-    if min(high - low) < ARRAY_SVG.named:
+    if min(high - low) < _NAMED:
         return ""
     whole = bool((loop >= 0).all() and (loop <= edge).all())
     x, y = (_centroid(loop) if whole else (low + high) / 2).tolist()

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from generator.export.atomic import StagedFile, Staging
     from generator.export.bed import Size
     from generator.export.robot.model import RobotModel
-    from generator.export.slicer_settings import SlicerSettings
-    from generator.export.threemf import PrintFile
+    from generator.export.threemf import PrintFile, SlicerSettings
     from generator.polyhedron import Polyhedron
     from generator.solid import Mesh, Part
 

@@ -17,14 +17,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.export.settings import RASTER
-
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _DEPTH_STEPS = float(1 << 28)
 _NUMBER_BITS = 26  # up to 67 million triangles
-# Fresh memory is what costs most, so pixels are treated in blocks that stay in the cache.
+# Fresh memory is what costs most: work is done in blocks that stay in the cache.
+_SPANS = 4096  # at a time
+_ROWS = 32  # of the picture at a time
+_TRIANGLES = 16_384  # drawn at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +38,10 @@ class DepthBuffer:
 
     def paint(self, picture: NDArray[np.uint32], colours: NDArray[np.uint32]) -> None:
         """Write the colour of the triangle seen into each pixel of `picture`, (height, width)."""
-        for row in range(0, len(picture), RASTER.rows):
-            keys = self.keys[row : row + RASTER.rows]
+        for row in range(0, len(picture), _ROWS):
+            keys = self.keys[row : row + _ROWS]
             chosen = colours[keys & ((1 << _NUMBER_BITS) - 1) & -(keys >= 0).astype(np.int64)]
-            np.copyto(picture[row : row + RASTER.rows], chosen, where=keys >= 0)
+            np.copyto(picture[row : row + _ROWS], chosen, where=keys >= 0)
 
     def coarse(self, values: Index, step: int) -> Index:
         """Return the value of the triangle seen in the middle of each `step` by `step` pixels.
@@ -54,8 +55,8 @@ class DepthBuffer:
     def triangles_seen(self, count: int) -> Index:
         """Return the triangles seen anywhere, of `count`, in rising order."""
         seen = np.zeros(count, np.bool_)
-        for row in range(0, len(self.keys), RASTER.rows):
-            keys = self.keys[row : row + RASTER.rows]
+        for row in range(0, len(self.keys), _ROWS):
+            keys = self.keys[row : row + _ROWS]
             seen[keys[keys >= 0] & ((1 << _NUMBER_BITS) - 1)] = True
         return np.flatnonzero(seen)
 
@@ -82,13 +83,13 @@ def rasterise(points: Floats, triangles: Index, screen: Index) -> DepthBuffer:
     buffer[:] = -1
     low = float(points[2].min(initial=0.0))
     step = max(float(points[2].max(initial=0.0)) - low, 1e-300) / _DEPTH_STEPS
-    for start in range(0, len(triangles), RASTER.triangles):
+    for start in range(0, len(triangles), _TRIANGLES):
         _draw(
             buffer,
             height,
             width,
             points,
-            triangles[start : start + RASTER.triangles],
+            triangles[start : start + _TRIANGLES],
             start,
             low,
             step,
@@ -164,8 +165,8 @@ def _spans(x: Floats, y: Floats, rows: Index, count: Index, width: int) -> tuple
 
 def _fill(buffer: Index, start: Index, length: Index, first: Index, step: Index) -> None:
     """Raise `buffer` along each span to first, first + step, first + 2 step, ..."""
-    for block in range(0, len(start), RASTER.spans):
-        some = slice(block, block + RASTER.spans)
+    for block in range(0, len(start), _SPANS):
+        some = slice(block, block + _SPANS)
         count = length[some]
         before = np.cumsum(count) - count
         pixels = np.repeat(start[some] - before, count)

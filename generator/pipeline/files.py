@@ -18,7 +18,7 @@ from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.atomic import Staging
 from generator.export.formats import EXPORTERS, ExportedObject, stage_formats
 from generator.export.preview import preview_png
-from generator.export.slicer_settings import SlicerSettings, slicer_settings
+from generator.export.threemf import SlicerSettings, slicer_settings
 from generator.layout.placement import Layout, object_code
 from generator.pipeline.blame import errors_at
 from generator.pipeline.faces import FaceReport, face_reports

@@ -15,10 +15,8 @@ from typing import TYPE_CHECKING
 
 from generator.export.atomic import Staging
 from generator.export.bed import Plate, arrange_plates
-from generator.export.overview import can_draw, overview_pdf
-from generator.export.packing import PackedPart, packing_csv
-from generator.export.slicer_settings import SlicerSettings
-from generator.export.threemf import PrintFile, print_file
+from generator.export.set_files import PackedPart, can_draw, overview_pdf, packing_csv
+from generator.export.threemf import PrintFile, SlicerSettings, print_file
 from generator.layout.placement import Layout
 from generator.pipeline.files import parts_of, settings_of
 from generator.pipeline.parallel import Task, Workers

@@ -15,7 +15,7 @@ from generator.export.bed import Plate
 from generator.export.sheet.drawing import draw_boxes
 from generator.export.sheet.page import sheet_html
 from generator.export.sheet.values import BuildSheet, Rows
-from generator.export.slicer_settings import SlicerSettings
+from generator.export.threemf import SlicerSettings
 from generator.layout.placement import Layout, object_code
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.sheet import layers_text, lies_text, material_text

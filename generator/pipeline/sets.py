@@ -21,7 +21,7 @@ from generator.database.read import find_object, natural_key, read_layout, read_
 from generator.database.register import require_in_use
 from generator.database.transaction import read_transaction
 from generator.export.formats import EXPORTERS
-from generator.export.overview import can_draw
+from generator.export.set_files import can_draw
 from generator.pipeline.made import MadeObject, describe_object
 from generator.pipeline.make import Order, Product, make_at
 from generator.pipeline.parallel import Engines, Task, Workers

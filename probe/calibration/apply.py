@@ -1,24 +1,33 @@
-"""Counts -> newtons by a calibration, and back.
+"""Counts -> newtons by a calibration, and back; whether a calibration still holds.
 
 Without a calibration counts are read as they are: any monotone, roughly proportional
-response.
+response. Frames at rest show a shift of the bias, a known load shows a change of the gain; changes
+beyond the thresholds stand in `Drift.warning`, for the operator.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from probe.calibration.law import law_s
-from probe.calibration.settings import FELT
-from probe.calibration.value import Calibration, Condition, Image
+from probe.calibration.condition import tactel_words
+from probe.calibration.file import Calibration, Condition, Image
+from probe.calibration.fit import law_s
+from probe.calibration.load import CalibrationLoad, average_frames
 from probe.circuit import ConductanceEstimate, invert_readings
-from probe.circuit.readout import scan_shares, shares
+from probe.circuit.reading import scan_shares, shares
 from probe.errors import CalibrationError
 from probe.frame import Frame
+
+SIGMAS = 3.0  # of a conductance from which it is a force
+LEAK_S = 1e-9  # joins the network of a board with floating rows
+DRIFT_COUNTS = 2.0  # shift of the bias that warns
+DRIFT_GAIN = 0.10  # change of the gain that warns, share of 1
+DRIFT_SIGMAS = 5.0  # of the bias: a shift is one from so many standard deviations
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,16 +84,14 @@ def calibrate_image(
     found = _conductances(counts, c)
     g, noise = found.conductance_s, found.sigma_s
     bad = c.bad | np.isnan(g) | (counts >= c.full)
-    felt = ~bad & (g > FELT.sigmas * noise)
-    safe = np.where(
-        felt, g, np.where(c.bad, 1.0, np.maximum(FELT.sigmas * noise, np.nan_to_num(g)))
-    )
+    felt = ~bad & (g > SIGMAS * noise)
+    safe = np.where(felt, g, np.where(c.bad, 1.0, np.maximum(SIGMAS * noise, np.nan_to_num(g))))
     with np.errstate(invalid="ignore", over="ignore"):
         over = (safe / c.gain_s) ** (1.0 / c.exponent)
         variance = (over * noise / (c.exponent * safe)) ** 2
         variance += _of_the_law(over, c) + (c.repeat * over) ** 2
         force = np.where(felt, np.maximum(c.break_n + over, 0.0), 0.0)
-        silent = np.maximum(c.break_n, 0.0) + over / FELT.sigmas
+        silent = np.maximum(c.break_n, 0.0) + over / SIGMAS
         sigma = np.where(bad, np.inf, np.where(felt, np.sqrt(variance), silent))
     return CalibratedImage(force, sigma, bad, "N")
 
@@ -115,7 +122,7 @@ def expected_counts(forces_n: ArrayLike, calibration: Calibration) -> Image:
         read = g + c.bias_counts
     else:
         if c.board.readout == "floating":
-            g = g + FELT.leak_s
+            g = g + LEAK_S
         read = scan_shares(shares(g, c.board), c.board) * c.full + c.bias_counts
     return np.clip(read, 0.0, float(c.full))
 
@@ -140,3 +147,59 @@ def _of_the_law(over: Image, c: Calibration) -> Image:
         + 2.0 * (by_gain * by_exponent * v[1] + by_gain * v[2] + by_exponent * v[4])
     )  # fmt: skip
     return np.maximum(variance, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drift:
+    """What changed since the calibration."""
+
+    bias_counts: Image  #: (rows, columns) reading at rest now, less then
+    gain: float  #: median of measured over known force, less 1; nan without a load
+    warning: str  #: empty while the calibration holds
+
+
+def drift_of(
+    calibration: Calibration, rest_counts: ArrayLike, loads: Sequence[CalibrationLoad] = ()
+) -> Drift:
+    """Compare a sensor with its calibration.
+
+    Parameters
+    ----------
+    calibration
+        Of this sensor.
+    rest_counts
+        (N, rows, columns) counts, frames with nothing on the sensor, now.
+    loads
+        Known loads, now.
+
+    Raises
+    ------
+    CalibrationError
+        If the frames are of another shape, or too few.
+    """
+    rest = average_frames(rest_counts, "rest")
+    if rest.mean.shape != calibration.shape:
+        raise CalibrationError(
+            f"frames of {rest.mean.shape}, the calibration is for {calibration.shape}",
+            fix="use the calibration of the sensor that read them",
+        )
+    shift = rest.mean - calibration.rest_counts
+    moved = ~calibration.bad & (np.abs(shift) > np.maximum(DRIFT_COUNTS, DRIFT_SIGMAS * rest.sigma))
+    said = []
+    if moved.any():
+        worst = float(np.abs(shift[moved]).max())
+        said.append(f"the bias of {tactel_words(moved)} moved by up to {worst:.3g} counts")
+    ratios = [_ratios(calibration, load) for load in loads]
+    felt = np.concatenate(ratios) if ratios else np.zeros(0)
+    gain = float(np.median(felt)) - 1.0 if felt.size else float("nan")
+    if felt.size and abs(gain) > DRIFT_GAIN:
+        said.append(f"the gain changed by {100 * gain:+.0f} %")
+    return Drift(shift, gain, "; ".join([*said, "calibrate again"]) if said else "")
+
+
+def _ratios(calibration: Calibration, load: CalibrationLoad) -> Image:
+    """Return measured over known force, of the tactels that tell it well."""
+    read = calibrate_image(load.read.mean, calibration)
+    well = ~read.bad & (load.forces_n > 0) & (read.values > 5.0 * read.sigma)
+    ratios: Image = read.values[well] / load.forces_n[well]
+    return ratios

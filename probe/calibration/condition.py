@@ -13,28 +13,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.calibration.average import Average
-from probe.calibration.value import Condition
+from probe.calibration.file import Condition
+from probe.calibration.load import Average
 from probe.errors import CalibrationError
 
 Array = NDArray[np.float64]
 SHOWN = 6  # tactels that a message lists
 
 
-@dataclass(frozen=True, slots=True)
-class ConditionThresholds:
-    """When a tactel is unsound, and what a law needs."""
-
-    felt_n: float = 0.2  #: N, from here every sound tactel responds
-    sigmas: float = 5.0  #: a change is one from so many standard deviations
-    told: float = 3.0  #: a conductance counts as felt from so many standard deviations
-    weak: float = 0.02  #: dead below this share of the median response to the same load
-    raised_counts: float = 5.0  #: counts above the common bias: preloaded or stuck
-    still: float = 0.1  #: stuck if no load changes its conductance by this share
-    levels: int = 3  #: loads of different force that a law needs
-    ratio: float = 3.0  #: of the largest of them to the smallest
-    law: float = 0.02  #: share of a conductance by which loads may miss the law (1 sigma)
-    repeat: float = 0.05  #: share of a force that hysteresis and creep leave open (1 sigma)
+LOADED_N = 0.2  # from here every sound tactel responds
+SIGMAS = 5.0  # a change is one from so many standard deviations
+CLEAR = 3.0  #: a conductance counts as read from so many standard deviations
+WEAK = 0.02  # dead below this share of the median response to the same load
+RAISED_COUNTS = 5.0  # above the common bias: preloaded or stuck
+STILL = 0.1  # stuck if no load changes its conductance by this share
+LEVELS = 3  #: loads of different force that a law needs
+RATIO = 3.0  #: of the largest of them to the smallest
+LAW = 0.02  #: share of a conductance by which loads may miss the law (1 sigma)
+REPEAT = 0.05  #: share of a force that hysteresis and creep leave open (1 sigma)
 
 
 def common_bias(rest: Average) -> float:
@@ -42,9 +38,9 @@ def common_bias(rest: Average) -> float:
     return float(np.median(rest.mean))
 
 
-def raised_tactels(rest: Average, full: int, thresholds: ConditionThresholds) -> NDArray[np.bool_]:
+def raised_tactels(rest: Average, full: int) -> NDArray[np.bool_]:
     """Say which tactels read more than the common bias at rest."""
-    least = np.maximum(thresholds.raised_counts, thresholds.sigmas * rest.sigma)
+    least = np.maximum(RAISED_COUNTS, SIGMAS * rest.sigma)
     high: NDArray[np.bool_] = (rest.mean - common_bias(rest) > least) | (rest.highest >= full)
     return high
 
@@ -55,7 +51,6 @@ def judge_tactels(
     sigma_s: Array,
     high: NDArray[np.bool_],
     saturated: NDArray[np.bool_],
-    thresholds: ConditionThresholds,
 ) -> NDArray[np.uint8]:
     """Judge every tactel.
 
@@ -71,24 +66,23 @@ def judge_tactels(
     CalibrationError
         If tactels were not loaded enough to be judged, or none responds.
     """
-    t = thresholds
-    unloaded = force_n.max(axis=0) < t.felt_n
+    unloaded = force_n.max(axis=0) < LOADED_N
     if unloaded.any():
         raise CalibrationError(
-            f"{tactel_words(unloaded)} carried less than {t.felt_n:g} N in every load, so that "
+            f"{tactel_words(unloaded)} carried less than {LOADED_N:g} N in every load, so that "
             "nothing tells a dead one from one that was not pressed",
-            fix=f"add a load of {t.felt_n:g} N or more on each of them",
+            fix=f"add a load of {LOADED_N:g} N or more on each of them",
         )
     rise = read_s[1:] - read_s[0]
     doubt = np.hypot(sigma_s[1:], sigma_s[0])
-    clear = (rise > t.sigmas * doubt) | saturated[1:]
-    pressed = force_n[1:] >= t.felt_n
+    clear = (rise > SIGMAS * doubt) | saturated[1:]
+    pressed = force_n[1:] >= LOADED_N
     moved = np.where(clear & pressed & ~saturated[1:], rise, np.nan)
     with np.errstate(invalid="ignore"):
         usual = np.array([np.median(m[np.isfinite(m)]) if np.isfinite(m).any() else 0.0
                           for m in moved])  # fmt: skip
-        feels = pressed & clear & ((rise > t.weak * usual[:, None, None]) | saturated[1:])
-        change = np.abs(rise) > t.still * np.abs(read_s[0])
+        feels = pressed & clear & ((rise > WEAK * usual[:, None, None]) | saturated[1:])
+        change = np.abs(rise) > STILL * np.abs(read_s[0])
     still = high & (saturated[0] | ~(change & clear & ~saturated[1:]).any(axis=0))
     dead = ~high & ~feels.any(axis=0)
     if (dead | still).all():
@@ -104,27 +98,29 @@ def judge_tactels(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UnloadedCheck:
-    """What loads a tactel felt clearly."""
+class ClearLoads:
+    """Loads that each tactel read clearly."""
 
     levels: NDArray[np.int64]  #: (rows, columns) different forces
     lowest_n: Array  #: (rows, columns) inf if none
     highest_n: Array  #: (rows, columns) 0 if none
 
-    def few(self, thresholds: ConditionThresholds) -> NDArray[np.bool_]:
+    @property
+    def few(self) -> NDArray[np.bool_]:
         """Say where they are too few for a law."""
-        return self.levels < thresholds.levels
+        return self.levels < LEVELS
 
-    def near(self, thresholds: ConditionThresholds) -> NDArray[np.bool_]:
+    @property
+    def near(self) -> NDArray[np.bool_]:
         """Say where they lie too near each other."""
-        return ~(self.highest_n >= thresholds.ratio * self.lowest_n)
+        return ~(self.highest_n >= RATIO * self.lowest_n)
 
 
-def check_loads(force_n: Array, firm: NDArray[np.bool_]) -> UnloadedCheck:
+def check_loads(force_n: Array, firm: NDArray[np.bool_]) -> ClearLoads:
     """Sum up the loads (L, rows, columns) that are `firm`."""
     ordered = np.sort(np.where(firm, force_n, np.nan), axis=0)  # nan last
     steps = ordered[1:] > 1.05 * ordered[:-1]
-    return UnloadedCheck(
+    return ClearLoads(
         steps.sum(axis=0) + firm.any(axis=0),
         np.where(firm, force_n, np.inf).min(axis=0),
         np.where(firm, force_n, 0.0).max(axis=0),
@@ -132,11 +128,10 @@ def check_loads(force_n: Array, firm: NDArray[np.bool_]) -> UnloadedCheck:
 
 
 def demand_loads(
-    known: UnloadedCheck,
+    known: ClearLoads,
     force_n: Array,
     saturated: NDArray[np.bool_],
     live: NDArray[np.bool_],
-    thresholds: ConditionThresholds,
 ) -> None:
     """See that the loads that every live tactel feels determine its law.
 
@@ -145,31 +140,31 @@ def demand_loads(
     CalibrationError
         Which tactels, what they have, and which load is missing.
     """
-    t, levels, lowest, highest = thresholds, known.levels, known.lowest_n, known.highest_n
-    full = live & saturated.any(axis=0) & (known.few(t) | known.near(t))
+    levels, lowest, highest = known.levels, known.lowest_n, known.highest_n
+    full = live & saturated.any(axis=0) & (known.few | known.near)
     if full.any():
         least = np.where(saturated & (force_n > 0), force_n, np.inf)[:, full].min()
         raise CalibrationError(
             f"{tactel_words(full)} saturated, and too few loads are left",
-            fix=f"add {max(1, t.levels - int(levels[full].min()))} below {least:.3g} N on each of "
+            fix=f"add {max(1, LEVELS - int(levels[full].min()))} below {least:.3g} N on each of "
             "them, or lower the load or feedback resistance of the board",
         )
-    few = live & known.few(t)
+    few = live & known.few
     if few.any():
         most = int(levels[few].min())
         raise CalibrationError(
             f"{tactel_words(few)} felt {most} different load{'s' * (most != 1)} clearly, "
-            f"a law needs {t.levels}",
-            fix=f"add {t.levels - most} on them, {t.felt_n:g} N or more, over a ratio of "
-            f"{t.ratio:g}, or record more frames of each",
+            f"a law needs {LEVELS}",
+            fix=f"add {LEVELS - most} on them, {LOADED_N:g} N or more, over a ratio of "
+            f"{RATIO:g}, or record more frames of each",
         )
-    near = live & known.near(t)
+    near = live & known.near
     if near.any():
         low, high = lowest[near].min(), highest[near].max()
         raise CalibrationError(
             f"{tactel_words(near)} felt loads of {low:.3g} ... {high:.3g} N only; they do not span "
-            f"the law, the largest must be {t.ratio:g} times the smallest",
-            fix=f"add a load of {t.ratio * low:.3g} N or more on each of them",
+            f"the law, the largest must be {RATIO:g} times the smallest",
+            fix=f"add a load of {RATIO * low:.3g} N or more on each of them",
         )
 
 

@@ -2,7 +2,7 @@
 
     grounded, virtual   closed form, g = y / (1 - column_ohm sum of y) down the column; with
                         a row resistance, Newton on the network
-    floating            the convex problem of `floating`
+    floating            the convex problem of `network.solve_floating`
 
 Noise goes through the derivative of the same equations. A tactel whose conductance comes out
 below its own standard deviation is `lost`: the reading bounds it (by a few sigma) and tells
@@ -17,12 +17,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.circuit.electronics import Electronics
-from probe.circuit.floating import FloatingSolution, solve_floating
 from probe.circuit.fsr import Image
-from probe.circuit.network import transconductances, transfers
-from probe.circuit.readout import unscan_shares
-from probe.circuit.settings import INVERSE
+from probe.circuit.network import FloatingSolution, solve_floating, transconductances, transfers
+from probe.circuit.reading import unscan_shares
 from probe.errors import CircuitError
+
+MOST_STEPS = 30  # of Newton's method with a row resistance
+TOLERANCE = 1e-12  # relative, of a resistance
+FINEST = 1e-6  # least relative error of a resistance
+EDGE = 1e-9  # of 1: a column whose currents add up to all that the supply can give
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,8 +115,8 @@ def _invert_driven(share: Image, spread: Image, e: Electronics) -> ConductanceEs
     column = e.load_ohm if e.readout == "grounded" else e.column_ohm
     current, noise = share / scale, spread / scale
     room = 1.0 - column * current.sum(axis=-2, keepdims=True)
-    possible = np.broadcast_to(room > INVERSE.edge, current.shape)
-    room = np.where(room > INVERSE.edge, room, np.nan)
+    possible = np.broadcast_to(room > EDGE, current.shape)
+    room = np.where(room > EDGE, room, np.nan)
     g = current / room
     variance = (noise / room) ** 2 * np.maximum(1.0 + 2.0 * column * g, 1.0) + (
         column * np.maximum(g, 0.0) / room
@@ -149,9 +152,9 @@ def _newton(
     start: Image, current: Image, noise: Image, row: float, column: float
 ) -> tuple[Image, Image]:
     g = np.maximum(start, 0.0)
-    floor = INVERSE.tolerance * float(np.abs(current).max()) + np.finfo(float).tiny
+    floor = TOLERANCE * float(np.abs(current).max()) + np.finfo(float).tiny
     error = current - transconductances(g, row, column)
-    for _ in range(INVERSE.steps):
+    for _ in range(MOST_STEPS):
         slopes = transfers(g, row, column)
         if np.abs(error).max() <= floor:
             break
@@ -201,7 +204,7 @@ def _deviation_and_rank(
     whose variance is 1/12) together; the bounds keep a tactel that its neighbours hide from
     blurring those that are seen.
     """
-    weighted = found.hessian / np.maximum(relative, INVERSE.finest)[:, None]
+    weighted = found.hessian / np.maximum(relative, FINEST)[:, None]
     information = weighted.T @ weighted
     own = found.own.ravel()
     seen = np.linalg.eigvalsh(information * np.outer(own, own)) >= 1.0

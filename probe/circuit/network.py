@@ -1,10 +1,33 @@
-"""The resistive network of the matrix: what a pair of terminals sees of all its tactels.
+"""The resistive network of the matrix: resistances between its terminals, and back. Thesis 4.2.
 
-Thesis 4.2, figure 4.5. Conductances (..., rows, columns) in S -> resistances in ohm, or
-transconductances in S. Columns are eliminated first (they have no tactel in common), then
+Conductances (..., rows, columns) in S -> resistances in ohm, or transconductances in S (figure
+4.5). Columns are eliminated first (they have no tactel in common), then
 the rows one after another with sums of positive terms alone (Grassmann, Taksar, Heyman), so
 that the relative error stays at rounding whatever the contrast: 31 pivots instead of one
 31x31 inverse, which loses a digit for every decade of contrast.
+
+`loaded_columns` is a matrix read through two multiplexers, some of whose rows float: the row that
+is read is at the supply; the other rows are at ground, or float where nothing holds them. The
+column that is read is loaded to ground, the others are open. With no row floating this is the
+divider of a loaded column, v = g / (sum of the column + 1 / load), with all of them figure 4.5 of
+the thesis; between the two the unselected rows that float carry ghosts. For every row the nodes
+that nothing holds (all columns, the floating rows) are eliminated once: the unloaded voltage of a
+column and the resistance behind it (Thevenin) give its loaded voltage.
+
+`solve_floating` inverts floating rows. All resistances R of a network determine all its
+conductances g: they minimise the strictly convex
+
+    -logdet L(g) + <R, g>,  g >= 0,
+
+because R is the gradient of logdet L. In y = g R the Hessian has a unit diagonal at the
+solution (by g alone its rows differ by the square of the contrast, and steps stall); Foster:
+the sum of y is rows + columns - 1, each y at most 1. Each step minimises the quadratic model
+over y >= 0 (block pivoting), and goes along it until the function falls. Where y = gR falls to the
+relative noise of R the reading is that of the neighbours' paths, and says nothing of the tactel.
+
+References
+----------
+J. J. Judice and F. M. Pires, block principal pivoting for quadratic programmes with bounds.
 """
 
 from __future__ import annotations
@@ -16,6 +39,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from probe.circuit.fsr import Image
 from probe.errors import CircuitError
+
+Vector = NDArray[np.float64]
+
+MOST_STEPS = 60
+MOST_PIVOTS = 200  # of one step
+BLOCK_PIVOTS = 6  # without progress before single ones
+NEAR = 1e-3  # squared Newton decrement; -logdet is self-concordant: full steps converge
+DECREASE = 1e-4  # share of the predicted decrease that a step must keep
+HALVINGS = 40  # of one step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,3 +207,174 @@ def _disconnected_error() -> CircuitError:
         "the network falls into parts that no conductance joins",
         fix="give every tactel at least its leak, say 1e-8 S",
     )
+
+
+def loaded_columns(conductance_s: ArrayLike, floating: NDArray[np.bool_], load_ohm: float) -> Image:
+    """Return the voltage over the load, as a share of the supply, for every row and column.
+
+    Parameters
+    ----------
+    conductance_s
+        (rows, columns) S; above 0 where a column would hang in the air otherwise.
+    floating
+        (rows,) whether a row floats while another one is read.
+    load_ohm
+        From the column that is read to ground.
+
+    Raises
+    ------
+    CircuitError
+        A shape is wrong, the load is not above 0, or a node is joined to nothing.
+    """
+    g = checked_conductances(conductance_s)
+    if g.ndim != 2 or np.shape(floating) != g.shape[:1] or not load_ohm > 0:
+        raise CircuitError(
+            f"conductances {g.shape}, floating rows {np.shape(floating)}, load {load_ohm:g} ohm",
+            fix="give (rows, columns), one truth for each row, and a load above 0",
+        )
+    if not np.any(floating):
+        divider: Image = g / (g.sum(axis=0) + 1.0 / load_ohm)
+        return divider
+    share = np.empty(g.shape)
+    for row in range(len(g)):
+        open_rows = np.flatnonzero(floating & (np.arange(len(g)) != row))
+        between = g[open_rows]  # conductances among the nodes that nothing holds
+        system = np.diag(np.r_[g.sum(axis=0), between.sum(axis=1)])
+        columns = g.shape[1]
+        system[:columns, columns:] = -between.T
+        system[columns:, :columns] = -between
+        try:
+            inverse = np.linalg.inv(system)
+        except np.linalg.LinAlgError as error:
+            raise CircuitError(
+                "a column or a floating row is joined to nothing",
+                fix="give every tactel at least its leak, say 1e-8 S",
+            ) from error
+        driven = np.r_[g[row], np.zeros(len(open_rows))]
+        unloaded, behind = (inverse @ driven)[:columns], np.diagonal(inverse)[:columns]
+        share[row] = unloaded * load_ohm / (load_ohm + behind)
+    return share
+
+
+EPSILON = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FloatingSolution:
+    """A network found from its resistances."""
+
+    conductance_s: Image  #: (rows, columns) S, 0 or more
+    own: Image  #: (rows, columns) y = gR, how much of a reading is the tactel's own
+    hessian: NDArray[np.float64]  #: (tactels, tactels) -d ln R / d y
+    steps: int
+
+
+def solve_floating(resistance_ohm: Image, tolerance: float = 1e-9) -> FloatingSolution:
+    """Find the conductances of a network from all its resistances.
+
+    Parameters
+    ----------
+    resistance_ohm
+        (rows, columns) ohm between every row and column with all others open; > 0.
+    tolerance
+        Largest relative change of a conductance in the last step.
+
+    Raises
+    ------
+    CircuitError
+        If a resistance is not above 0, or the steps do not end.
+    """
+    if not (np.isfinite(resistance_ohm).all() and (resistance_ohm > 0).all()):
+        raise CircuitError(
+            "a resistance between terminals is not above 0, or no number",
+            fix="read within the ADC's range: lower the load, or press less",
+        )
+    shape = resistance_ohm.shape
+    scale = float(np.exp(np.log(resistance_ohm).mean()))
+    measured = resistance_ohm / scale
+    y = np.full(measured.size, (sum(shape) - 1) / measured.size)
+    network = eliminate(y.reshape(shape) / measured)
+    free = np.ones(y.size, dtype=np.bool_)
+    for steps in range(1, MOST_STEPS + 1):
+        gradient = 1.0 - (network.resistances_ohm / measured).ravel()
+        hessian = _hessian(network, measured)
+        wanted, free = _minimise_bounded(hessian, gradient - hessian @ y, free)
+        move = wanted - y
+        misfit = float(np.abs(gradient[free]).max(initial=0.0))
+        if (np.abs(move) <= tolerance * y).all() or misfit <= 64 * EPSILON:
+            conductance = y.reshape(shape) / measured / scale
+            return FloatingSolution(conductance, y.reshape(shape), hessian, steps)
+        y, network = _search_line(y, move, gradient, network, measured)
+    raise CircuitError(
+        f"the network did not settle in {MOST_STEPS} steps; misfit {misfit:.1e}",
+        fix="the readings contradict each other: average more frames",
+    )
+
+
+def _hessian(network: Network, measured: Image) -> NDArray[np.float64]:
+    root = np.sqrt(measured.ravel())
+    transfer = network.transfer_ohm()
+    transfer /= root[:, None]
+    transfer /= root
+    return np.square(transfer, out=transfer)
+
+
+def _minimise_bounded(
+    hessian: NDArray[np.float64], linear: Vector, free: NDArray[np.bool_]
+) -> tuple[Vector, NDArray[np.bool_]]:
+    """Minimise z' hessian z / 2 + linear' z over z >= 0; start from a guess of what is free."""
+    blocks, fewest = BLOCK_PIVOTS, linear.size + 1
+    for _ in range(MOST_PIVOTS):
+        z = _minimise_free(hessian, linear, free)
+        slope = hessian @ z + linear
+        wrong = (free & (z < 0)) | (~free & (slope < -64 * EPSILON))
+        number = int(wrong.sum())
+        if number == 0:
+            return z, free
+        if number < fewest:
+            blocks, fewest = BLOCK_PIVOTS, number
+        elif blocks > 0:
+            blocks -= 1
+        else:
+            last = int(np.flatnonzero(wrong)[-1])
+            wrong = np.zeros_like(free)
+            wrong[last] = True
+        free = free ^ wrong
+    return np.maximum(z, 0.0), free
+
+
+def _minimise_free(hessian: NDArray[np.float64], linear: Vector, free: NDArray[np.bool_]) -> Vector:
+    """Minimise with the variables that are not free held at 0."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    index = np.flatnonzero(free)
+    part = hessian[index[:, None], index]
+    weight = 1.0 / np.sqrt(np.diagonal(part))
+    part *= weight[:, None]
+    part *= weight
+    part[np.diag_indices_from(part)] += 4 * EPSILON
+    factor = cho_factor(part, lower=True, overwrite_a=True, check_finite=False)
+    z = np.zeros_like(linear)
+    z[index] = -weight * cho_solve(factor, weight * linear[index], check_finite=False)
+    return z
+
+
+def _search_line(
+    y: Vector, move: Vector, gradient: Vector, network: Network, measured: Image
+) -> tuple[Vector, Network]:
+    """Go along the step until the function falls; stay if it does not."""
+    value = float(y.sum() - network.logdet)
+    slope = float(gradient @ move)
+    length = 1.0
+    for _ in range(HALVINGS):
+        there = np.maximum(y + length * move, 0.0)
+        try:
+            ahead = eliminate(there.reshape(measured.shape) / measured)
+        except CircuitError:
+            length /= 2
+            continue
+        allowed = value + DECREASE * length * slope
+        if -slope < NEAR or there.sum() - ahead.logdet <= allowed:
+            return there, ahead
+        length /= 2
+    return y, network

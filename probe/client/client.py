@@ -23,7 +23,7 @@ from probe.client.statistics import ClientStatistics
 from probe.closing import Closing
 from probe.errors import PortError, ProbeError
 from probe.frame import Frame
-from probe.port.contract import Port
+from probe.port.address import Port
 from probe.port.url import open_port
 from probe.protocol import (
     Command,

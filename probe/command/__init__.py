@@ -1,18 +1,14 @@
 """`probe-sensor`: list, info, types, calibrate, record, replay, export, simulate, live.
 
-::
-
-    app            which command: the modules below register themselves there
-    options        options that several commands share
-    devices        list, info           described    what info says
-    types          types
-    record         record               recorded     the work
-    replay         replay
-    files          export, import, repair   exported   tables, arrays, pictures
-    calibrate      calibrate            calibrated   the work, guided   step by step,
-                                        loads, listen   what goes in, laws   what comes out
-    simulate       simulate             simulated    the work
-    live           live                 live_loop, live_state, live_view, keys
+    app            the commands and their options
+    listed         list, types
+    described      info
+    recorded       record, replay
+    exported       export, import
+    calibrated     calibrate bias | loads;  loads: which are given, laws: the result in words
+    guided         calibrate port
+    simulated      simulate
+    live           live;  live_state, live_view
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 ran but failed,
 2 bad input, 3 device, 4 database, 130 interrupted. Nothing heavy is imported before it is

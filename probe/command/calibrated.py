@@ -1,17 +1,19 @@
-"""Calibrate from recordings, and say what came out: laws, unsound tactels, uncertainty."""
+"""`probe-sensor calibrate bias | loads`: recordings of loads -> the laws of a sensor."""
 
 from __future__ import annotations
 
 import datetime
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from encoded_objects.base.console import FAILED
+from encoded_objects.base.console import FAILED, interruption
 from encoded_objects.base.files import refuse_taken
-from encoded_objects.base.output import pairs, warning, write, write_json
+from encoded_objects.base.output import message, pairs, warning, write, write_json
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.calibration import (
     calibration_from,
     calibration_hash,
@@ -20,14 +22,30 @@ from probe.calibration import (
     read_calibration,
     write_calibration,
 )
-from probe.calibration.average import average_frames
-from probe.calibration.condition import ConditionThresholds, common_bias, raised_tactels
+from probe.calibration.condition import common_bias, raised_tactels
+from probe.calibration.load import average_frames
 from probe.circuit import Electronics
+from probe.client.stream import Stream, name_of
 from probe.command.laws import condition_map, describe_laws, places
-from probe.command.listen import Counts, frames_of
 from probe.command.loads import LoadRecording
-from probe.errors import CalibrationError, CircuitError
+from probe.errors import CalibrationError, CircuitError, PortError
+from probe.port.url import means_port, typed_port
+from probe.recording.layout import FrameBlock
 from probe.recording.read import Recording
+
+Counts = NDArray[np.uint16]
+
+
+@dataclass(frozen=True, slots=True)
+class LawOptions:
+    """How laws are fitted, and where they go."""
+
+    output: Path
+    board: Electronics | None
+    sensor_type: str = ""
+    made: str = ""  #: ISO 8601; empty: now
+    replace: bool = False
+    as_json: bool = False
 
 
 def report_bias(
@@ -35,14 +53,22 @@ def report_bias(
     sensor: int | None,
     seconds: float,
     calibration: Path | None,
+    sensor_type: str,
     *,
-    sensor_type: str = "",
     as_json: bool,
 ) -> int:
-    """Say what an unloaded sensor reads; returns the exit code."""
-    counts, name, kind = frames_of(source, sensor, seconds, sensor_type)
+    """Print the readings of an unloaded sensor; returns the exit code.
+
+    Raises
+    ------
+    PortError, RecordingError
+        The source is not there, or gives no frame.
+    SensorTypeError
+        No such type, or one of another shape.
+    """
+    counts, name, kind = _frames_of(source, sensor, seconds, sensor_type)
     rest = average_frames(counts, source)
-    high = raised_tactels(rest, kind.full, ConditionThresholds())
+    high = raised_tactels(rest, kind.full)
     values: dict[str, Any] = {
         "source": source,
         "sensor": name,
@@ -75,34 +101,25 @@ def report_bias(
     return FAILED if trouble else 0
 
 
-def calibrate_loads(
-    given: list[LoadRecording],
-    output: Path,
-    board: Electronics | None,
-    *,
-    sensor: str = "",
-    sensor_type: str = "",
-    made: str = "",
-    replace: bool = False,
-    as_json: bool = False,
-) -> int:
+def calibrate_loads(given: list[LoadRecording], options: LawOptions, sensor: str = "") -> int:
     """Calibrate from recordings and write the file; returns the exit code.
 
     Raises
     ------
     CalibrationError
-        When loads are missing or of different sensors; the message names the load to add.
+        Loads are missing or of different sensors; the message names the load to add.
     RecordingError
-        When a recording cannot be read.
+        A recording cannot be read.
     """
-    refuse_taken(output, ".json", replace=replace)
+    output, board, made = options.output, options.board, options.made
+    refuse_taken(output, ".json", replace=options.replace)
     rest = [load for load in given if load.newtons == 0]
     if not rest:
         raise CalibrationError("none of the recordings is of the unloaded sensor",
                                fix="add one with 0 N: rest.h5=0")  # fmt: skip
     name = sensor or _one_sensor(given)
     counts = np.concatenate([_counts(load) for load in rest])
-    kind = Recording(rest[0].recording).sensor_type(sensor_type)
+    kind = Recording(rest[0].recording).sensor_type(options.sensor_type)
     even = kind.present().astype(np.float64) if kind.missing else None
     loads = [
         even_load(
@@ -118,7 +135,7 @@ def calibrate_loads(
     found = calibration_from(counts, loads, sensor=name, made=when, board=board, full=kind.full)
     digest = write_calibration(found, output)
     values, lines = describe_laws(found, digest, str(output))
-    if as_json:
+    if options.as_json:
         write_json(values)
     else:
         pairs(lines)
@@ -168,3 +185,38 @@ def _one_sensor(given: list[LoadRecording]) -> str:
 
 def _counts(load: LoadRecording) -> Counts:
     return Recording(load.recording).block().counts
+
+
+def _frames_of(
+    source: str, sensor: int | None, seconds: float, sensor_type: str
+) -> tuple[Counts, str, SensorType]:
+    """Return counts (N, rows, columns) of a port or a recording, and its sensor: name and type."""
+    if not means_port(source):
+        recording = Recording(source)
+        return recording.block().counts, recording.origin.sensor, recording.sensor_type(sensor_type)
+
+    port, kind = typed_port(source, sensor_type)
+    with interruption() as interrupted, Stream(port, sensor=sensor) as stream:
+        counts = _listen(stream, seconds)
+        if interrupted.is_set():
+            raise KeyboardInterrupt
+        if not len(counts):
+            raise PortError("no frame came", fix="see probe-sensor info", place=source)
+        kind = choose_sensor_type(kind, "", counts.shape[1:], source)
+        return counts, name_of(stream.ident(), source), kind
+
+
+def _listen(stream: Stream, seconds: float) -> Counts:
+    """Return the counts of the next seconds of a probe (device time), (N, rows, columns)."""
+    images: list[Counts] = []
+    began_ns: int | None = None
+    while not stream.ended:
+        frames = stream.take(1.0)
+        for notice in stream.client.notices():
+            message(notice)
+        for frame in frames:
+            began_ns = frame.t_ns if began_ns is None else began_ns
+            if frame.t_ns - began_ns > seconds * 1e9:
+                return np.stack(images)
+            images.append(frame.counts)
+    return np.stack(images) if images else FrameBlock.empty().counts

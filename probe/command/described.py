@@ -1,4 +1,4 @@
-"""What a probe, a recording, and a calibration say of themselves: values, and lines to read."""
+"""`probe-sensor info`: a probe, a recording, or a calibration, as values and as lines to read."""
 
 from __future__ import annotations
 
@@ -9,27 +9,48 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.output import count_of
+from encoded_objects.base.output import count_of, pairs, write_json
 from encoded_objects.base.sensor_type import SensorType
+from probe.calibration import calibration_hash, read_calibration
 from probe.client.stream import Stream, name_of
-from probe.command.settings import COMMAND
-from probe.port.typed import typed_port
+from probe.command.laws import describe_laws
+from probe.port.url import means_port, typed_port
 from probe.recording.read import Recording
 
+_ANSWER_S = 0.5  #: a probe answers with its statistics within that
+
 Described = tuple[dict[str, Any], dict[str, str]]
-"""What `--json` prints, and what people read."""
+"""Values for `--json`, and lines for people."""
 
 
-def describe_probe(
-    url: str, sensor: int | None, seconds: float, sensor_type: str = ""
-) -> Described:
-    """Listen to a probe for a while.
+def describe(
+    what: str, sensor: int | None, seconds: float, sensor_type: str, *, as_json: bool
+) -> int:
+    """Print a description of a port, a recording or a calibration; returns the exit code.
 
     Raises
     ------
     PortError
-        When it is not there, or no probe.
+        The probe is not there, or it is no probe.
+    RecordingError, CalibrationError
+        The file is none of these, damaged, changed, or not closed.
     """
+    if means_port(what):
+        values, lines = _describe_probe(what, sensor, seconds, sensor_type)
+    elif what.endswith(".json"):
+        found = read_calibration(what)
+        values, lines = describe_laws(found, calibration_hash(found), what)
+    else:
+        values, lines = _describe_recording(what, sensor_type)
+    if as_json:
+        write_json(values)
+    else:
+        pairs(lines)
+    return 0
+
+
+def _describe_probe(url: str, sensor: int | None, seconds: float, sensor_type: str) -> Described:
+    """Listen to a probe for a while."""
     peak, heard = 0, False
     shape: tuple[int, ...] = ()
     port, kind = typed_port(url, sensor_type)
@@ -43,8 +64,8 @@ def describe_probe(
                 shape = frame.counts.shape
             if heard and time.monotonic() > until_s:
                 stream.client.ask_device()
-                stream.take(COMMAND.answer_s)
-                until_s = time.monotonic() + COMMAND.answer_s
+                stream.take(_ANSWER_S)
+                until_s = time.monotonic() + _ANSWER_S
                 while stream.client.device is None and time.monotonic() < until_s:
                     time.sleep(0.02)
                 break
@@ -88,14 +109,8 @@ def describe_probe(
     return values, lines | ({"notice": notices[-1]} if notices else {})
 
 
-def describe_recording(name: str, sensor_type: str = "") -> Described:
-    """Read a recording through.
-
-    Raises
-    ------
-    RecordingError
-        When it is none, damaged, or not closed.
-    """
+def _describe_recording(name: str, sensor_type: str) -> Described:
+    """Read a recording through."""
     held = Recording(name)
     kind = _type_of(held, sensor_type)
     seq: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
@@ -141,21 +156,6 @@ def describe_recording(name: str, sensor_type: str = "") -> Described:
     }
     more = {str(key): _shorten(value) for key, value in origin.more.items()}
     return values, lines | more
-
-
-def describe_calibration(name: str) -> Described:
-    """Read a calibration.
-
-    Raises
-    ------
-    CalibrationError
-        When it is none, or was changed.
-    """
-    from probe.calibration import calibration_hash, read_calibration
-    from probe.command.laws import describe_laws
-
-    held = read_calibration(name)
-    return describe_laws(held, calibration_hash(held), name)
 
 
 def _type_of(held: Recording, asked: str) -> str:

@@ -1,9 +1,8 @@
-"""A recording -> table, array, picture, messages; each file whole or not there."""
+"""`probe-sensor export | import`: table, array, picture, messages; each whole or not there."""
 
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,90 +13,79 @@ from encoded_objects.base.files import refuse_taken, staged_file
 from encoded_objects.base.output import count_of, write, write_json
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.calibration import Calibration, calibrate_image, read_calibration
+from probe.command.app import ExportOptions
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import median_filter
 from probe.recording.read import Recording
 
 
-@dataclass(frozen=True, slots=True)
-class PictureView:
-    """Which image a picture shows, and how."""
-
-    frame: int = 0
-    median: bool = False
-    azimuth_deg: float = -60.0
-    elevation_deg: float = 40.0
-
-
-@dataclass(frozen=True, slots=True)
-class Outputs:
-    """The files that are asked for."""
-
-    csv: Path | None = None
-    npy: Path | None = None
-    png: Path | None = None
-    mcap: Path | None = None
-
-
-def export_files(
-    path: Path,
-    wanted: Outputs,
-    view: PictureView,
-    *,
-    sensor_type: str,
-    calibration: Path | None,
-    pad_mm: float | None,
-    live: bool,
-    replace: bool,
-    as_json: bool,
-) -> int:
+def export_files(options: ExportOptions) -> int:
     """Write the files that were asked for; returns the exit code.
 
     Raises
     ------
     RecordingError
-        When the recording cannot be read, or has no such frame.
+        The recording cannot be read, or has no such frame.
     CalibrationError
-        When the calibration is none, or of another sensor.
+        The calibration is none, or of another sensor.
     ContactError
-        When the blur of a pad so high cannot be taken back.
+        The blur of a pad so high cannot be taken back.
     EncodedObjectsError
-        When a file is there already.
+        A file is there already.
     """
+    csv, npy, png, mcap = options.csv, options.npy, options.png, options.mcap
     outputs = []
-    csv, npy, png, mcap = wanted.csv, wanted.npy, wanted.png, wanted.mcap
     for out, suffix in ((csv, ".csv"), (npy, ".npy"), (png, ".png"), (mcap, ".mcap")):
         if out is not None:
-            refuse_taken(out, suffix, replace=replace)
+            refuse_taken(out, suffix, replace=options.replace)
             outputs.append(out)
     if png is not None:
         require("matplotlib", extra="report", purpose="--png")
-    recording = Recording(path, live=live)
+    recording = Recording(options.recording, live=options.live)
     sensor = None
-    if png is not None or pad_mm is not None:  # tables and arrays are as they are
-        sensor = recording.sensor_type(sensor_type)
-    known = None if calibration is None else calibration_for(calibration, recording)
-    pad = None if pad_mm is None or sensor is None else _pad(sensor, pad_mm)
+    if png is not None or options.deblur is not None:  # tables and arrays are as they are
+        sensor = recording.sensor_type(options.sensor_type)
+    known = None
+    if options.calibration is not None:
+        known = calibration_for(options.calibration, recording)
+    pad = None
+    if options.deblur is not None and sensor is not None:
+        overlay = Overlay(kind="pad", height_mm=options.deblur)
+        pad = dataclasses.replace(sensor, overlay=overlay)
     if png is not None:
-        _picture(recording, png, view, known, pad, sensor)
+        _picture(recording, png, options, known, pad, sensor)
     if npy is not None:
         _array(recording, npy, known, pad)
     if csv is not None:
         from probe.recording.table import export_csv
 
-        export_csv(path, csv, live=live)
+        export_csv(options.recording, csv, live=options.live)
     if mcap is not None:
         from probe.recording.mcap import export_mcap
 
         with staged_file(mcap) as draft:
             export_mcap(recording, draft)
-    if as_json:
+    if options.as_json:
         names = [str(out) for out in outputs]
-        write_json({"file": str(path), "frames": len(recording), "written": names})
+        write_json({"file": str(options.recording), "frames": len(recording), "written": names})
     else:
         for out in outputs:
             what = "picture" if out is png else count_of(len(recording), "frame")
             write(f"{out}: {what}")
+    return 0
+
+
+def report_import(made: Recording, source: Path, *, as_json: bool) -> int:
+    """Print what was imported; returns the exit code."""
+    more = dict(made.origin.more)
+    if as_json:
+        values = {"file": str(made.path), "frames": len(made), "units": made.origin.units}
+        write_json(values | more)
+        return 0
+    scaled = ""
+    if "scale" in more:
+        scaled = f"; value = {more['scale_offset']:g} + {more['scale']:g} * count"
+    write(f"{made.path}: {count_of(len(made), 'frame')} of {source}{scaled}")
     return 0
 
 
@@ -125,37 +113,32 @@ def calibration_for(path: Path, recording: Recording) -> Calibration:
 def _picture(
     recording: Recording,
     out: Path,
-    view: PictureView,
+    options: ExportOptions,
     known: Calibration | None,
     pad: SensorType | None,
     sensor: SensorType | None,
 ) -> None:
     from probe.plot.frame import frame_picture
 
-    if view.frame >= len(recording):
+    if options.frame >= len(recording):
         raise RecordingError(
-            f"frame {view.frame} was asked for, it holds {len(recording)}",
+            f"frame {options.frame} was asked for, it holds {len(recording)}",
             fix=f"take 0 ... {len(recording) - 1}" if len(recording) else "record some frames",
             place=str(recording.files[0].path),
         )
-    block = recording.block(view.frame, view.frame + 1)
+    block = recording.block(options.frame, options.frame + 1)
     first = recording.block(0, 1)
     image, unit = block.counts[0].astype(np.float64), recording.origin.units
     if known is not None:
         image, unit = _newtons(block.counts, known, pad)[0], "N"
-    if view.median:
+    if options.median:
         image = median_filter(image)
-    title = f"frame {view.frame}, {(block.t_ns[0] - first.t_ns[0]) * 1e-9:.3f} s"
-    if view.median:
+    title = f"frame {options.frame}, {(block.t_ns[0] - first.t_ns[0]) * 1e-9:.3f} s"
+    if options.median:
         title += ", median of 3x3"
     with staged_file(out) as draft:
         frame_picture(image, draft, unit=unit, title=title, sensor=sensor,
-                      azimuth_deg=view.azimuth_deg, elevation_deg=view.elevation_deg)  # fmt: skip
-
-
-def _pad(sensor: SensorType, height_mm: float) -> SensorType:
-    """Return a sensor under a pad of a thickness."""
-    return dataclasses.replace(sensor, overlay=Overlay(kind="pad", height_mm=height_mm))
+                      azimuth_deg=options.azimuth, elevation_deg=options.elevation)  # fmt: skip
 
 
 def _newtons(

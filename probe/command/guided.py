@@ -1,4 +1,4 @@
-"""Calibrate a probe step by step: every load is recorded, then all are fitted.
+"""`probe-sensor calibrate port`: the guide at a terminal. Every load is recorded, then all fitted.
 
 The recordings and their table stay, so that the fit can be repeated, or loads added, by
 `probe-sensor calibrate loads DIR/loads.csv`.
@@ -10,123 +10,93 @@ import math
 import sys
 import time
 from contextlib import suppress
-from dataclasses import dataclass
-from pathlib import Path
-
-import numpy as np
+from typing import Final
 
 from encoded_objects.base.files import refuse_taken
 from encoded_objects.base.output import message
-from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
-from probe.calibration.load_words import describe_load
-from probe.circuit import Electronics
+from encoded_objects.base.sensor_type import choose_sensor_type
+from probe.calibration.guide import CalibrationGuide
 from probe.client.stream import Stream, name_of
-from probe.command.calibrated import calibrate_loads
-from probe.command.listen import Counts
+from probe.command.app import GuideOptions
+from probe.command.calibrated import LawOptions, board_from, calibrate_loads
 from probe.command.loads import LoadRecording, write_list
 from probe.errors import CalibrationError, PortError
-from probe.frame import Frame
-from probe.port.typed import typed_port
+from probe.port.url import typed_port
 from probe.recording.record import Recorder
 
-LIST = "loads.csv"
+LIST: Final = "loads.csv"
+_SILENT_S: Final = 5.0  #: without a frame for so long, a load is not read any further
 
 
-@dataclass(frozen=True, slots=True)
-class CalibrationBench:
-    """What the steps share."""
-
-    url: str
-    stream: Stream
-    folder: Path
-    seconds: float
-    sensor: str
-    sensor_type: SensorType | None
-
-
-def guide(
-    url: str,
-    output: Path,
-    forces_n: list[float],
-    folder: Path,
-    seconds: float,
-    sensor: int | None,
-    board: Electronics | None,
-    *,
-    sensor_type: str,
-    made: str,
-    replace: bool,
-    as_json: bool,
-) -> int:
+def guide_loads(options: GuideOptions) -> int:
     """Lead through a calibration; returns the exit code.
 
     Raises
     ------
     PortError
-        When the probe is not there, or goes away.
+        The probe is not there, or goes away.
     CalibrationError
-        When the loads do not determine the laws, and no more are given.
+        The loads do not determine the laws, and no more are given.
     """
-    refuse_taken(output, ".json", replace=replace)
+    output, folder = options.output, options.folder or options.output.with_suffix("")
+    laws = LawOptions(
+        output, board_from(options.board), options.sensor_type, options.made, options.replace,
+        options.as_json,
+    )  # fmt: skip
+    refuse_taken(output, ".json", replace=options.replace)
     folder.mkdir(parents=True, exist_ok=True)
-    refuse_taken(folder / LIST, ".csv", replace=replace)
-    port, kind = typed_port(url, sensor_type)
-    with Stream(port, sensor=sensor) as stream:
-        bench = CalibrationBench(url, stream, folder, seconds, name_of(stream.ident(), url), kind)
-        message(f"{bench.sensor or url}; recordings go to {folder}")
+    refuse_taken(folder / LIST, ".csv", replace=options.replace)
+    port, kind = typed_port(options.url, options.sensor_type)
+    guide = CalibrationGuide(options.forces_n, options.seconds)
+    with Stream(port, sensor=options.sensor) as stream:
+        sensor = name_of(stream.ident(), options.url)
+        message(f"{sensor or options.url}; recordings go to {folder}")
         given: list[LoadRecording] = []
-        rest: Counts | None = None
-        for force in [0.0, *forces_n]:
-            load, counts = _step(bench, force, rest, len(given), 1 + len(forces_n))
-            rest = counts if rest is None else rest
-            given.append(load)
         while True:
+            while not guide.done:
+                path = folder / f"load-{guide.step}-{guide.newtons:g}N.h5"
+                given.append(LoadRecording(path, guide.newtons))
+                _lead_through_step(guide, stream, options.url)
+                kind = choose_sensor_type(kind, "", guide.taken[-1].shape[1:], options.url)
+                with Recorder(path, sensor=sensor, sensor_type=kind, replace=True) as recorder:
+                    for frame in guide.frames:
+                        recorder.append(frame)
             write_list(folder / LIST, given)
             try:
-                return calibrate_loads(given, output, board, sensor=bench.sensor,
-                                       sensor_type=sensor_type, made=made,
-                                       replace=replace, as_json=as_json)  # fmt: skip
+                return calibrate_loads(given, laws, sensor)
             except CalibrationError as error:
                 message(f"not yet: {error.cause}\n  {error.fix}")
                 more_n = _another_load()
                 if more_n is None:
                     raise
-                load, _ = _step(bench, more_n, rest, len(given), len(given) + 1)
-                given.append(load)
+                guide.forces_n.append(more_n)
 
 
-def _step(
-    bench: CalibrationBench, force: float, rest: Counts | None, done: int, steps: int
-) -> tuple[LoadRecording, Counts]:
-    """Have one load put on, record it, and say how it was felt; again if the operator wants."""
+def _lead_through_step(guide: CalibrationGuide, stream: Stream, url: str) -> None:
+    """Have one load put on, read it, and say how it was felt; again if the operator wants."""
+    force, number = guide.newtons, f"{guide.step + 1}/{guide.steps}"
     what = f"put {force:g} N on the whole sensor, evenly" if force else "unload the sensor"
-    path = bench.folder / f"load-{done}-{force:g}N.h5"
     while True:
-        _ask(f"{done + 1}/{steps}  {what}, then press Enter: ")
-        counts = _record_load(bench, path)
-        message(f"     {describe_load(counts, rest)}")
+        _ask(f"{number}  {what}, then press Enter: ")
+        while stream.take(0.0):
+            pass  # what came while the load was put on
+        guide.read()
+        heard_s = time.monotonic()
+        while guide.reading:
+            frames = stream.take(0.1)
+            guide.take(frames)
+            now_s = time.monotonic()
+            heard_s = now_s if frames else heard_s
+            for notice in stream.client.notices():
+                message(f"     {notice}")
+            if guide.reading and (stream.ended or now_s - heard_s > _SILENT_S):
+                if not guide.frames:
+                    raise PortError("no frame came", fix="see probe-sensor info", place=url)
+                guide.end_step()
+        message(f"     {guide.felt[-1]}")
         if _ask("     Enter goes on, r reads it again: ") != "r":
-            return LoadRecording(path, force), counts
-
-
-def _record_load(bench: CalibrationBench, path: Path) -> Counts:
-    """Record what is on the sensor now."""
-    stream, frames = bench.stream, list[Frame]()
-    while stream.take(0.0):
-        pass  # what came while the load was put on
-    until_s = time.monotonic() + bench.seconds
-    while time.monotonic() < until_s and not stream.ended:
-        frames += stream.take(0.1)
-        for notice in stream.client.notices():
-            message(f"     {notice}")
-    if not frames:
-        raise PortError("no frame came", fix="see probe-sensor info", place=bench.url)
-    rows, columns = frames[0].counts.shape
-    kind = choose_sensor_type(bench.sensor_type, "", (rows, columns), bench.url)
-    with Recorder(path, sensor=bench.sensor, sensor_type=kind, replace=True) as recorder:
-        for frame in frames:
-            recorder.append(frame)
-    return np.stack([frame.counts for frame in frames])
+            return
+        guide.again()
 
 
 def _ask(prompt: str) -> str:

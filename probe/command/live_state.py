@@ -1,4 +1,4 @@
-"""What the live view shows, and what the keys change.
+"""The state of the live view, which the keys change.
 
 Frame after frame goes in; the newest is shown, less the bias and through the median if so
 chosen, in newtons if there is a calibration. Images and recordings get the next free name.
@@ -17,14 +17,14 @@ from encoded_objects.base.errors import MissingExtraError, require
 from encoded_objects.base.files import staged_file
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.calibration import Calibration, calibrate_image, calibration_hash, drift_of
-from probe.calibration.settings import AVERAGE
-from probe.command.settings import COMMAND
+from probe.calibration.load import BIAS_FRAMES
 from probe.frame import Frame, median_filter
 from probe.recording.files import next_free
 from probe.recording.record import Recorder
 
 Image = NDArray[np.float64]
 
+_HOLD = 0.98  #: share of the scale that is left after each frame shown
 _LEAST = {"counts": 32.0, "N": 0.2}  # scale of a sensor at rest
 
 
@@ -73,7 +73,7 @@ class LiveState:
                 self.recorder.append(frame)
             if self._resting is not None:
                 self._resting.append(frame.counts)
-                if len(self._resting) == AVERAGE.bias_frames:
+                if len(self._resting) == BIAS_FRAMES:
                     self._settle_bias()
         if frames and not self.paused:
             self.frame = frames[-1]
@@ -91,7 +91,7 @@ class LiveState:
         if self.median:
             image = median_filter(image)
         if not self.paused:
-            self.scale = max(float(image.max()), self.scale * COMMAND.hold, _LEAST[self.unit])
+            self.scale = max(float(image.max()), self.scale * _HOLD, _LEAST[self.unit])
         return image
 
     def toggle_bias(self) -> None:
@@ -167,7 +167,7 @@ class LiveState:
     def _settle_bias(self) -> None:
         frames, self._resting = np.stack(self._resting or []), None
         self.bias = frames.mean(axis=0)
-        self.notice = f"bias of {AVERAGE.bias_frames} frames is off the image"
+        self.notice = f"bias of {BIAS_FRAMES} frames is off the image"
         if self.calibration is not None:
             self.bias = None  # a calibration has its own
             drift = drift_of(self.calibration, frames)

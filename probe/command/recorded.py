@@ -1,9 +1,11 @@
-"""Record a probe: frames to the file, counts to the bar, what happens to stderr."""
+"""`probe-sensor record | replay`: a port to a file, and frames into a pipe."""
 
 from __future__ import annotations
 
+import json
+import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -21,61 +23,42 @@ from encoded_objects.base.output import (
 from encoded_objects.base.sensor_type import choose_sensor_type
 from probe.calibration import Calibration, calibration_hash, read_calibration
 from probe.client.stream import Stream, name_of
-from probe.command.settings import COMMAND
+from probe.command.app import RecordOptions
 from probe.errors import PortError, RecordingError
 from probe.frame import Frame
-from probe.port.typed import typed_port
+from probe.port.url import typed_port
 from probe.recording.files import check_name
 from probe.recording.record import Recorder
+from probe.recording.table import table_header
+
+_SLICE_S = 0.1  #: longest wait for frames between two looks at what else happened
+_SILENT_S = 5.0  #: without a frame for so long, the host's clock ends a recording too
 
 
-@dataclass(frozen=True, slots=True)
-class RecordingLimits:
-    """When a recording ends by itself."""
-
-    seconds: float | None = None  #: s, device time
-    frames: int | None = None
-
-    @property
-    def total(self) -> float | None:
-        """What the bar runs to: frames, or else seconds."""
-        return self.frames if self.frames is not None else self.seconds
-
-    def left(self, frames: int) -> int | None:
-        """Return how many frames may still come; None: any number."""
-        return None if self.frames is None else self.frames - frames
-
-
-def record_port(
-    url: str,
-    output: Path,
-    limits: RecordingLimits,
-    *,
-    sensor: int | None,
-    bits: int | None,
-    sensor_type: str,
-    calibration: Path | None,
-    replace: bool,
-    as_json: bool,
-) -> int:
+def record_port(options: RecordOptions) -> int:
     """Record a port; returns the exit code.
 
     Raises
     ------
     PortError
-        When the probe is not there, or went away for good; then the file holds what came.
+        The probe is not there, or went away for good; then the file holds the frames that came.
     RecordingError
-        When the file cannot be written.
+        The file cannot be written.
     CalibrationError
-        When the calibration is none, or another sensor's.
+        The calibration is none, or another sensor's.
     SensorTypeError
         No such type, or frames of another shape.
     """
-    check_output(output, replace=replace)
+    url, calibration = options.url, options.calibration
+    check_output(options.output, replace=options.replace)
     known = None if calibration is None else read_calibration(calibration)
-    port, kind = typed_port(url, sensor_type)
-    with interruption() as interrupted, Stream(port, sensor=sensor, bits=bits) as stream:
-        first = _first(stream, interrupted)
+    total = options.seconds if options.frames is None else options.frames
+    port, kind = typed_port(url, options.sensor_type)
+    stream = Stream(port, sensor=options.sensor, bits=options.bits)
+    with interruption() as interrupted, stream:
+        first: list[Frame] = []
+        while not (first or stream.ended or interrupted.is_set()):
+            first = stream.take(_SLICE_S)
         if not first:
             if interrupted.is_set():
                 message("\nprobe-sensor: interrupted; nothing was recorded")
@@ -86,22 +69,21 @@ def record_port(
         kind = choose_sensor_type(kind, "", (rows, columns), url)
         name = _sensor(stream, url, known, calibration)
         recorder = Recorder(
-            output, sensor=name, sensor_type=kind,
+            options.output, sensor=name, sensor_type=kind,
             calibration=calibration_hash(known) if known else "",
-            attributes={"url": url}, replace=replace,
+            attributes={"url": url}, replace=options.replace,
         )  # fmt: skip
         try:
-            with recorder, progress_bar("recording", limits.total) as told:
-                ended, seconds = _run(stream, recorder, first, limits, interrupted, told)
+            with recorder, progress_bar("recording", total) as bar:
+                ended, seconds = _run(stream, recorder, first, options, interrupted, bar)
         except EncodedObjectsError:
             files = ", ".join(map(str, recorder.files))
             kept = count_of(recorder.frames, "frame")
             message(f"{files} is complete and holds {kept}")
             raise
         result = _result(stream, recorder, name, ended, seconds)
-    _say(result, as_json)
-    limited = limits.total is not None
-    return INTERRUPTED if ended == "interrupted" and limited else 0
+    _say(result, options.as_json)
+    return INTERRUPTED if ended == "interrupted" and total is not None else 0
 
 
 def check_output(output: Path, *, replace: bool) -> None:
@@ -121,13 +103,6 @@ def check_output(output: Path, *, replace: bool) -> None:
         raise
 
 
-def _first(stream: Stream, interrupted: Event) -> list[Frame]:
-    frames: list[Frame] = []
-    while not frames and not stream.ended and not interrupted.is_set():
-        frames = stream.take(COMMAND.slice_s)
-    return frames
-
-
 def _sensor(stream: Stream, url: str, known: Calibration | None, calibration: Path | None) -> str:
     """Return the sensor's name; refuse a calibration of another one."""
     name = name_of(stream.ident(), url)
@@ -140,48 +115,49 @@ def _run(
     stream: Stream,
     recorder: Recorder,
     frames: list[Frame],
-    limits: RecordingLimits,
+    options: RecordOptions,
     interrupted: Event,
-    told: ProgressBar,
+    bar: ProgressBar,
 ) -> tuple[str, float]:
     """Record until something ends it; returns what did, and the seconds recorded."""
+    limit_s, limit = options.seconds, options.frames
     began_s = heard_s = time.monotonic()
     began_ns = last_ns = frames[0].t_ns
     ended = ""
     while not ended:
-        for frame in frames[: limits.left(recorder.frames)]:
-            if limits.seconds is not None and frame.t_ns - began_ns >= limits.seconds * 1e9:
+        for frame in frames[: None if limit is None else limit - recorder.frames]:
+            if limit_s is not None and frame.t_ns - began_ns >= limit_s * 1e9:
                 ended = "seconds"
                 break
             recorder.append(frame)
             last_ns = frame.t_ns
         seconds = (last_ns - began_ns) * 1e-9
-        _tell(stream, told, recorder.frames, seconds if limits.frames is None else None)
+        _show_progress(stream, bar, recorder.frames, seconds if limit is None else None)
         now_s = time.monotonic()
         heard_s = now_s if frames else heard_s
-        silent = limits.seconds is not None and now_s - heard_s > COMMAND.silent_s
-        if limits.left(recorder.frames) == 0:
+        silent = limit_s is not None and now_s - heard_s > _SILENT_S
+        if recorder.frames == limit:
             ended = "frames"
         elif interrupted.is_set():
             ended = "interrupted"
         elif stream.ended:
             ended = "end"
-        elif silent and now_s - began_s > (limits.seconds or 0.0):
+        elif silent and now_s - began_s > (limit_s or 0.0):
             ended = "silence"
         elif not ended:
             if not frames:
                 recorder.flush()
-            frames = stream.take(COMMAND.slice_s)
+            frames = stream.take(_SLICE_S)
     return ended, seconds
 
 
-def _tell(stream: Stream, told: ProgressBar, frames: int, seconds: float | None) -> None:
+def _show_progress(stream: Stream, bar: ProgressBar, frames: int, seconds: float | None) -> None:
     """Show counts and notices; the bar runs by seconds, or by frames if None."""
     for notice in stream.client.notices():
-        told.say(notice)
+        bar.say(notice)
     counts = stream.client.statistics()
     text = f"{frames:,} frames  {counts.rate:5.1f}/s  lost {counts.lost}  failed {counts.failed}"
-    told.show(frames if seconds is None else seconds, text)
+    bar.show(frames if seconds is None else seconds, text)
 
 
 def _result(
@@ -215,3 +191,31 @@ def _say(result: dict[str, Any], as_json: bool) -> None:
         f"({result['rate']:.1f} a second), lost {result['lost']}"
         + (f", {trouble}" if trouble else "")
     )
+
+
+def pipe_frames(url: str, *, as_json: bool) -> int:
+    """Write the frames of a port to stdout, a line each; returns the exit code."""
+    with interruption() as interrupted, Stream(url) as stream:
+        first = True
+        while not stream.ended and not interrupted.is_set():
+            frames = stream.take(0.1)
+            if frames and first and not as_json:
+                rows, columns = frames[0].counts.shape
+                sys.stdout.write(",".join(table_header((rows, columns))) + "\n")
+            first = first and not frames
+            sys.stdout.write("".join(_line(frame, as_json=as_json) for frame in frames))
+            sys.stdout.flush()
+        return INTERRUPTED if interrupted.is_set() else 0
+
+
+def _line(frame: Frame, *, as_json: bool) -> str:
+    if as_json:
+        values = {
+            "seq": frame.seq,
+            "t_ns": frame.t_ns,
+            "counts": frame.counts.tolist(),
+            "wrist": frame.wrist.tolist(),
+        }
+        return json.dumps(values, separators=(",", ":")) + "\n"
+    numbers = [frame.seq, frame.t_ns, *frame.counts.ravel().tolist(), *frame.wrist.tolist()]
+    return ",".join(map(str, numbers)) + "\n"

@@ -1,6 +1,6 @@
-"""Simulated touches: recording, picture, and truth, each where it was asked for.
+"""`probe-sensor simulate`: touches of a part, as a recording, a picture, and their truth.
 
-Truth stands in a file of its own, never beside the frames.
+Truth stands in a file of its own, never among the frames.
 """
 
 from __future__ import annotations
@@ -8,38 +8,47 @@ from __future__ import annotations
 import json
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 from encoded_objects.base.console import INTERRUPTED, interruption
 from encoded_objects.base.errors import require
 from encoded_objects.base.files import refuse_taken, staged_file
 from encoded_objects.base.output import message, progress_bar, write, write_json
+from probe.command.app import SimulateOptions
 from probe.command.recorded import check_output
-from probe.simulate.simulation import SimulatedProbe, SimulatedTouch
+from probe.simulate.simulation import SimulatedProbe, SimulatedTouch, TouchOptions
+
+if TYPE_CHECKING:
+    from probe.simulate.scan import ScanKind
 
 
-def simulate_touches(
-    probe: SimulatedProbe,
-    *,
-    output: Path | None,
-    png: Path | None,
-    truth: Path | None,
-    as_json: bool,
-) -> int:
-    """Simulate and write; returns the exit code. What an interruption leaves is complete.
+def simulate_touches(options: SimulateOptions) -> int:
+    """Simulate and write; returns the exit code. The files of an interrupted run are complete.
 
     Raises
     ------
     ContactError
-        When a touch has no equilibrium.
+        A touch has no equilibrium.
+    RecordingError, EncodedObjectsError
+        A file is there already, or its name is wrong.
     """
+    output, png, truth = options.output, options.png, options.truth
+    _check_outputs(options)
+    touches = TouchOptions(
+        options.x, options.y, options.theta, options.force, options.tilt_x, options.tilt_y,
+        options.touches, options.frames, options.seed, cast("ScanKind | None", options.scan),
+    )  # fmt: skip
+    probe = SimulatedProbe(
+        options.target, touches, sensor_type=options.sensor_type, overlay=options.overlay,
+        accuracy=options.accuracy, noise="quiet" if options.noise == "quiet" else "typical",
+    )  # fmt: skip
     number = len(probe)
     kept: list[dict[str, Any]] = []
     with ExitStack() as stack:
         recorder = None
         if output is not None:
             recorder = stack.enter_context(probe.recorder(output))
-        told = stack.enter_context(progress_bar("touching", number))
+        bar = stack.enter_context(progress_bar("touching", number))
         interrupted = stack.enter_context(interruption())
         for i, felt in enumerate(probe.touches()):
             if recorder is not None:
@@ -48,7 +57,7 @@ def simulate_touches(
             if i == 0:
                 first = felt
             kept.append(felt.truth())
-            told.show(i + 1, f"{i + 1:,} of {number:,}")
+            bar.show(i + 1, f"{i + 1:,} of {number:,}")
             if interrupted.is_set():
                 break
     if png is not None:
@@ -58,23 +67,16 @@ def simulate_touches(
         with staged_file(truth) as draft:
             draft.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", "utf-8")
     written = [str(out) for out in (output, png, truth) if out is not None]
-    _say(result, first, written, as_json=as_json)
+    _say(result, first, written, as_json=options.as_json)
     if len(kept) == number:
         return 0
     message(f"probe-sensor: interrupted after {len(kept):,} of {number:,} touches")
     return INTERRUPTED
 
 
-def check_outputs(
-    output: Path | None, png: Path | None, truth: Path | None, *, replace: bool
-) -> None:
-    """Refuse names that are taken or wrong, before anything else is done.
-
-    Raises
-    ------
-    RecordingError, EncodedObjectsError
-        When a file is there already.
-    """
+def _check_outputs(options: SimulateOptions) -> None:
+    """Refuse names that are taken or wrong, before anything else is done."""
+    output, png, truth, replace = options.output, options.png, options.truth, options.replace
     if output is not None:
         check_output(output, replace=replace)
     for out, suffix in ((png, ".png"), (truth, ".json")):

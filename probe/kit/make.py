@@ -18,9 +18,8 @@ from encoded_objects.base.errors import require
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from generator.export.atomic import Staging
 from generator.export.meshes import stl_chunks
-from generator.export.slicer_settings import slicer_settings
 from generator.export.step import step_chunks
-from generator.export.threemf import mesh_print_files, print_files
+from generator.export.threemf import print_files, slicer_settings
 from generator.printers import printer_named
 from generator.solid import Mesh, triangles
 from probe.kit.board import (
@@ -137,7 +136,7 @@ def _plates(
         settings = slicer_settings(printer, supports=False)
         some = [(n, mesh) for n, mesh, resin in meshes if resin == (printer_name == RESIN)]
         bed = bed_for([mesh for _, mesh in some], printer.bed_mm)
-        plates = mesh_print_files(title, some, bed, settings) if some else ()
+        plates = print_files(title, some, bed, settings) if some else ()
         for number, file in enumerate(plates):
             more = f"-{number + 1}" if len(plates) > 1 else ""
             yield f"{printer_name}{more}.3mf", file.prusaslicer

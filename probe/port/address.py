@@ -1,11 +1,40 @@
-"""A port's URL in its parts: scheme, what stands behind it, and options."""
+"""What a port is, and its URL in parts: scheme, target, options.
+
+A port is bytes both ways, and knows nothing of packets. `probe.port.open_port(url)` makes one,
+`probe.client` reads frames from it, and opens it again when it went away.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Protocol
 from urllib.parse import parse_qsl
 
 from probe.errors import PortError
+
+
+class Port(Protocol):
+    """A byte stream to a probe. Every method raises `PortError` once the device is gone."""
+
+    @property
+    def url(self) -> str:
+        """The URL that opens this port again."""
+        ...
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return what has come, waiting at most `timeout_s` for the first byte; b"" if nothing.
+
+        Raises EOFError at the end of a port that ends (a recording played once).
+        """
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the device; may be called twice."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

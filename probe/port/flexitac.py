@@ -14,9 +14,8 @@ import numpy as np
 
 from encoded_objects.base.sensor_type import SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named
-from probe.port.address import Address, refuse_unknown
+from probe.port.address import Address, Port, refuse_unknown
 from probe.port.commanded import CommandedProbe
-from probe.port.contract import Port
 from probe.port.marked import MarkedImages
 from probe.port.serial_line import open_line
 from probe.port.url import USUAL_TYPES

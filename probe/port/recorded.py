@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from probe.frame import Frame
-from probe.port.address import Address, number, refuse_unknown
-from probe.port.contract import Port
+from probe.port.address import Address, Port, number, refuse_unknown
 from probe.port.settings import PORT
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket

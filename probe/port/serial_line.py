@@ -17,8 +17,7 @@ from pathlib import Path
 import serial
 
 from probe.errors import PortError
-from probe.port.address import Address, number, refuse_unknown
-from probe.port.contract import Port
+from probe.port.address import Address, Port, number, refuse_unknown
 from probe.port.listing import list_ports
 from probe.port.settings import PORT
 

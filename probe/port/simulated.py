@@ -15,8 +15,7 @@ from encoded_objects.base.errors import EncodedObjectsError
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.errors import PortError
 from probe.frame import Frame
-from probe.port.address import Address, number, refuse_unknown, split_url
-from probe.port.contract import Port
+from probe.port.address import Address, Port, number, refuse_unknown, split_url
 from probe.port.pattern import moving_pattern
 from probe.port.settings import PORT
 from probe.port.software import SoftwareProbe

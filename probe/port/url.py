@@ -21,9 +21,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.errors import PortError
-from probe.port.address import Address, split_url
-from probe.port.contract import Port
+from probe.port.address import Address, Port, split_url
 
 GROUP = "encoded_objects.ports"
 EXAMPLES = "serial:///dev/ttyACM0?baud=1000000, sim: or file:recording.h5"
@@ -37,6 +37,7 @@ SCHEMES = {
 }
 
 USUAL_TYPES = {"flexitac": "flexitac-16x32"}  #: scheme: sensor type, where it is of one
+_TYPE_OPTION = "sensor_type"
 
 
 def open_port(url: str) -> Port:
@@ -81,6 +82,42 @@ def address_of(url: str) -> Address:
             f"the URL names no {needed}", fix=f"write for example {EXAMPLES}", place=url
         )
     return address
+
+
+def typed_port(url: str, asked: str = "") -> tuple[str, SensorType | None]:
+    """Return the URL that opens a port with a type of sensor, and the type if it is known.
+
+    A recording names its own; a simulated probe has the one of its option; `flexitac:` has one.
+    The type behind a serial line is known by its first frame alone.
+
+    Parameters
+    ----------
+    url
+        Of a port.
+    asked
+        Name or file of a type, as `--sensor-type` gives it; empty: as the port tells.
+
+    Raises
+    ------
+    PortError
+        The URL is none.
+    RecordingError
+        It is that of a recording that cannot be read.
+    SensorTypeError
+        No such type, or one of another shape than the recording's images.
+    """
+    address = address_of(url)
+    if address.scheme == "file":
+        from probe.recording.read import Recording
+
+        return url, Recording(address.target).sensor_type(asked)
+    named = asked or address.options.get(_TYPE_OPTION, "") or USUAL_TYPES.get(address.scheme, "")
+    if address.scheme == "sim" and asked and _TYPE_OPTION not in address.options:
+        joint = "&" if address.options else "" if url.endswith("?") else "?"
+        url = f"{url}{joint}{_TYPE_OPTION}={asked}"
+    if not named and address.scheme == "sim":
+        return url, SensorType()
+    return url, choose_sensor_type(named, "", None, url) if named else None
 
 
 def is_url(text: str) -> bool:

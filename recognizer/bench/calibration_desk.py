@@ -9,7 +9,7 @@ from typing import Any
 
 from probe.calibration import read_calibration
 from probe.circuit import Electronics
-from recognizer.bench.calibration_guide import CalibrationGuide, forces_given
+from recognizer.bench.calibration_guide import PageGuide, page_guide
 from recognizer.bench.desk import DeskSession
 from recognizer.bench.errors import BenchError, BusyError
 from recognizer.bench.feed import ProbeFeed
@@ -47,12 +47,12 @@ class CalibrationDesk:
         with session.turn:
             if not isinstance(session.feed, ProbeFeed):
                 raise BusyError("no probe is connected", fix="choose a port first")
-            forces, name = forces_given(forces_n), session.sensor_name()
-            session.frames.guide = CalibrationGuide(name, forces, seconds, board, now)
+            name = session.sensor_name()
+            session.frames.guide = page_guide(name, forces_n, seconds, board, now)
             session.report()
 
     @contextmanager
-    def guide(self) -> Iterator[CalibrationGuide]:
+    def guide(self) -> Iterator[PageGuide]:
         """Work on the calibration that is being made.
 
         Raises

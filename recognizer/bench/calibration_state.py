@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.calibration import Calibration, calibrate_image, drift_of
-from probe.calibration.settings import AVERAGE
+from probe.calibration.load import BIAS_FRAMES
 from probe.errors import ProbeError
 from probe.frame import Frame
 
@@ -35,11 +35,11 @@ class CalibrationState:
         if self._resting is None:
             return []
         self._resting.append(frame.counts)
-        if len(self._resting) < AVERAGE.bias_frames:
+        if len(self._resting) < BIAS_FRAMES:
             return []
         frames, self._resting = np.stack(self._resting), None
         self.bias = frames.mean(axis=0)
-        notices = [f"the bias is the mean of {AVERAGE.bias_frames} frames"]
+        notices = [f"the bias is the mean of {BIAS_FRAMES} frames"]
         if self.calibration is not None:
             self.warning = drift_of(self.calibration, frames).warning
             notices.append(self.warning or "the calibration still holds")

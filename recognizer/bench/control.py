@@ -196,7 +196,7 @@ def control_routes(session: Session, ports: Ports) -> APIRouter:
             session.calibrations.use(body.name)
         else:
             with session.calibrations.guide() as guide:
-                guide.read() if body.do == "read" else guide.again()
+                guide.read() if body.do == "read" else guide.guide.again()
         return session.as_json()
 
     @routes.post("/mosaic")

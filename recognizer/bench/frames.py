@@ -21,7 +21,7 @@ from probe.frame import Frame
 from probe.recording.files import next_free
 from probe.recording.record import Recorder
 from recognizer.bench.broker import Broker
-from recognizer.bench.calibration_guide import CalibrationGuide, condition_json
+from recognizer.bench.calibration_guide import PageGuide, condition_json
 from recognizer.bench.calibration_state import CalibrationState, values_or_counts
 from recognizer.bench.errors import BusyError
 from recognizer.bench.message import FrameMessage
@@ -51,7 +51,7 @@ class FrameHandler:
         recognition: RecognitionThread,
         note: Callable[[str], None],
     ) -> None:
-        self.guide: CalibrationGuide | None = None
+        self.guide: PageGuide | None = None
         self.state = CalibrationState()
         self.replayed = ("", 0)  #: recording that the frames are of, and its first time (ns)
         self.wiring = Wiring()  #: of images as they come; recordings keep these
@@ -84,7 +84,7 @@ class FrameHandler:
         frames = [self.wiring.frame(frame, self._sensor.full) for frame in frames]
         for frame in frames:
             if self.guide is not None:
-                self.guide.take(frame)
+                self.guide.guide.take([frame])
             for notice in self.state.take(frame):
                 self._note(notice)
         if not frames:
@@ -141,7 +141,7 @@ class FrameHandler:
             files = ", ".join(file.name for file in recorder.files)
             self._note(f"{files}: {recorder.frames:,} frames")
 
-    def finish_calibration(self, guide: CalibrationGuide, folder: Path) -> dict[str, Any]:
+    def finish_calibration(self, guide: PageGuide, folder: Path) -> dict[str, Any]:
         """Fit the laws, write and use them; returns what they say of the sensor."""
         found = guide.calibration()
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,7 @@
 """When a touch is worth reading: as soon as it is steady, and again when it has changed.
 
 Forces of frame after frame -> what to do with this one. The page wants an answer at once, so
-one steady frame is enough (`recognizer.touch.contacts` averages many), and a touch that was not
+one steady frame is enough (`recognizer.touch.source` averages many), and a touch that was not
 answered is read again. One that never comes to rest is read all the same after a while.
 """
 

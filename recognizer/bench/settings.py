@@ -66,15 +66,6 @@ class SessionSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class GuideSettings:
-    """How loads of a calibration are judged while they are taken."""
-
-    most_loads: int = 12
-    most_frames: int = 20_000  #: of a load
-    longest: float = 8.0  #: times what was asked for, that frames which repeat themselves are read
-
-
-@dataclass(frozen=True, slots=True)
 class ReplaySettings:
     """How recordings are played."""
 
@@ -147,6 +138,6 @@ class TouchLogSettings:
 
 TRIGGER, RECOGNITION, SESSION = TriggerSettings(), RecognitionSettings(), SessionSettings()
 TOUCHES, SCAN, DESK = TouchLogSettings(), ScanModeSettings(), SensorDeskSettings()
-GUIDE, REPLAY, PRESS = GuideSettings(), ReplaySettings(), PressSettings()
+REPLAY, PRESS = ReplaySettings(), PressSettings()
 LINE, PAGE, UPLOAD = LineSettings(), PageSettings(), UploadSettings()
 EXAMPLE, DATABASE = ExampleSettings(), DatabaseSettings()

@@ -11,8 +11,7 @@ from threading import Event
 from encoded_objects.base.output import message
 from encoded_objects.base.sensor_type import SensorType
 from probe.frame import Frame
-from probe.port.typed import typed_port
-from probe.port.url import address_of
+from probe.port.url import address_of, typed_port
 from probe.recording.read import Recording
 from recognizer.touch.source import TouchSource, source_of
 

@@ -1,8 +1,8 @@
 """Accumulated evidence -> places of the database -> Recognition. Thesis 6.3.
 
-Evidence is located like the fit of one touch (`recognizer.touch.hypothesis`): its strongest cells
-list places, all cells compare them. The pose of the last touch is fitted once more with the symbols
-of the database. `recognizer.touch.verdict` judges all cells together; the number of contradictions
+Evidence is located like the fit of one touch (`find_hypotheses`): its strongest cells list
+places, all cells compare them. The pose of the last touch is fitted once more with the symbols of
+the database. `recognizer.touch.verdict` judges all cells together; the number of contradictions
 that are allowed grows with them.
 """
 
@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.lattice import Evidence
+from recognizer.scan.lattice import LatticeEvidence
 from recognizer.scan.path import RegisteredPath
+from recognizer.touch import verdict
 from recognizer.touch.chance import expected_matches
 from recognizer.touch.evidence import null_log_likelihood, unworn_labels_at, weigh_cells
 from recognizer.touch.hypothesis import (
@@ -34,8 +35,6 @@ from recognizer.touch.recognition import TOO_FEW, Recognition, RunnerUp, refusal
 from recognizer.touch.symbols.fit import Fit, refine_lattices, score_cells
 from recognizer.touch.symbols.image import Image, bend_image
 from recognizer.touch.symbols.posterior import explained_share, refit_pose
-from recognizer.touch.verdict import CONTRADICTION, RATIO, reject_chance, reject_reason
-from recognizer.touch.verdict import Evidence as PlaceEvidence
 from recognizer.touch.verify import SHARES, bend_at
 
 Array = NDArray[np.float64]
@@ -56,7 +55,7 @@ class ScanHypothesis:
     """A place of accumulated evidence."""
 
     embossed: EmbossedArray
-    evidence: Evidence
+    evidence: LatticeEvidence
     hypothesis: Hypothesis
     fit: Fit  #: of the evidence, with the pose of the last touch
     score: float  #: log-likelihood of all touches, nats
@@ -83,7 +82,7 @@ class ScanHypothesis:
 
 def locate_evidence(
     embossed: EmbossedArray,
-    found: Sequence[Evidence],
+    found: Sequence[LatticeEvidence],
     path: RegisteredPath | None,
 ) -> list[ScanHypothesis]:
     """Return the likeliest places of the evidence of one array, best evidence first."""
@@ -152,34 +151,35 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
         runner_up = RunnerUp(*found[1].face, found[1].index)
     if path is not None:
         margin = min(margin, path.margin)
+    by_hand = path is not None and best.evidence.agreement.touches > 1
+    reason = verdict.reject_reason(
+        _verdict_evidence(best), margin, reader.options,
+        least_ratio=RATIO_BY_HAND if by_hand else verdict.RATIO, wrong_share=WRONG,
+    )  # fmt: skip
     answer = answer_at(
         best.embossed, best.fit, best.hypothesis, reader.options, seq,
-        reason=_reject_reason(reader, best, margin), margin=margin, runner_up=runner_up,
+        reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
     if not answer:
         return answer
     doubt = expected_matches(reader.lab.arrays, best.embossed, best.fit, best.hypothesis)
     if path is not None:
         doubt *= math.exp(path.ambiguity)
-    reason = reject_chance(doubt, DOUBT)
-    if reason:
+    if reason := verdict.reject_chance(doubt, DOUBT):
         return refusal(seq, reason, margin=margin, runner_up=runner_up, doubt=doubt)
     return replace(answer, doubt=doubt)
 
 
-def _reject_reason(reader: Reader, best: ScanHypothesis, margin: float) -> str:
-    """Return why the best place is not accepted, or ""."""
-    embossed, fit, agreement = best.embossed, best.fit, best.evidence.agreement
-    by_hand = best.path is not None
-    cells = weigh_cells(embossed, fit, best.hypothesis)
-    chance = null_log_likelihood(embossed, fit)
-    evidence = PlaceEvidence(
+def _verdict_evidence(best: ScanHypothesis) -> verdict.Evidence:
+    """Return the evidence of all touches for a place."""
+    fit, agreement = best.fit, best.evidence.agreement
+    cells = weigh_cells(best.embossed, fit, best.hypothesis)
+    chance = null_log_likelihood(best.embossed, fit)
+    return verdict.Evidence(
         log_likelihood_ratio=best.score - chance,
         inliers=int(cells.agree.sum()),
-        contradictions=int((cells.against > CONTRADICTION).sum()),
+        contradictions=int((cells.against > verdict.CONTRADICTION).sum()),
         best_ratio=fit.value - chance,
-        touches=len(agreement.chosen) if by_hand else 1,
+        touches=1 if best.path is None else len(agreement.chosen),
         agreeing=agreement.touches,
     )
-    least = RATIO_BY_HAND if by_hand and agreement.touches > 1 else RATIO
-    return reject_reason(evidence, margin, reader.options, least_ratio=least, wrong_share=WRONG)

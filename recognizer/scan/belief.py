@@ -23,7 +23,7 @@ from recognizer.scan.answer import (
 )
 from recognizer.scan.lattice import (
     LEAST_VARIANCE,
-    Evidence,
+    LatticeEvidence,
     PlaneLattice,
     accumulate,
     predict_pose,
@@ -335,7 +335,7 @@ def _predicted_poses(lattices: Sequence[PlaneLattice], touch_poses: TouchPoses |
 
 def _evidence_along(
     views: LatticeViews, touch_poses: TouchPoses, pitch_mm: float
-) -> list[Evidence]:
+) -> list[LatticeEvidence]:
     """Return the evidence that agrees with the array along a path; empty if none does."""
     along = PlaneLattice(np.zeros(3), LEAST_VARIANCE * np.eye(3))
     agreement = refine_agreement(views, touch_poses, along, pitch_mm)
@@ -348,7 +348,7 @@ def _evidence_of(
     touch_poses: TouchPoses,
     before: Sequence[PlaneLattice],
     pitch_mm: float,
-) -> list[Evidence]:
+) -> list[LatticeEvidence]:
     """Return the evidence of the followed lattices and of those of the last touch, best first."""
     last = len(touch_poses.poses) - 1
     every = [refine_agreement(views, touch_poses, each, pitch_mm) for each in before]
@@ -360,7 +360,7 @@ def _evidence_of(
     every.sort(key=lambda agreement: -agreement.score)
     at = touch_poses.poses[last]
     distinct: list[PlaneLattice] = []
-    found: list[Evidence] = []
+    found: list[LatticeEvidence] = []
     for agreement in every:
         if any(same_lattice(agreement.lattice, other, at, pitch_mm) for other in distinct):
             continue

@@ -75,7 +75,7 @@ class Agreement:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
+class LatticeEvidence:
     """The accumulated evidence of the cells of a lattice."""
 
     agreement: Agreement
@@ -124,7 +124,7 @@ def predict_pose(
 
 def accumulate(
     views: LatticeViews, touch_poses: TouchPoses, agreement: Agreement, pitch_mm: float
-) -> Evidence | None:
+) -> LatticeEvidence | None:
     """Return the evidence of all touches that agree; None where none does."""
     contradicting = True
     while contradicting:
@@ -163,10 +163,10 @@ def accumulate(
         value=float(most.sum()) + agreement.score + float(views.values.sum()),
         covariance=covariance,
     )
-    return Evidence(agreement, fit)
+    return LatticeEvidence(agreement, fit)
 
 
-def predicted_fit(evidence: Evidence, touch_poses: TouchPoses) -> Fit:
+def predicted_fit(evidence: LatticeEvidence, touch_poses: TouchPoses) -> Fit:
     """Return the fit of the evidence with the last touch at its predicted pose."""
     pose, covariance = predict_pose(evidence.agreement.lattice, touch_poses)
     x, y, theta = pose.tolist()

@@ -139,7 +139,7 @@ class Scan:
         ----------
         touch
             Of one object: counts (rows, columns), a signal, or a touch of
-            `recognizer.touch.contacts`. Without poses, touches of a face should lie within 8 mm
+            `recognizer.touch.source`. Without poses, touches of a face should lie within 8 mm
             or so of the one before (`ScanSettings.by_hand`).
         pose
             (4, 4) T_base_sensor, mm, in any fixed frame; with the arm's own covariance if it

@@ -131,7 +131,7 @@ def invert_floating(readings: Array) -> Array:
     supply nor the background matters (`docs/recognizer.md`). Readings that no network can give
     are returned as they are.
     """
-    from probe.circuit.floating import solve_floating
+    from probe.circuit.network import solve_floating
 
     over = np.maximum(readings, FLOATING.least * float(np.max(readings, initial=1e-12)))
     try:

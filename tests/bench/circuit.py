@@ -38,8 +38,8 @@ from probe.circuit import (
     read_sequence,
     transconductances,
 )
-from probe.circuit.floating import solve_floating
-from probe.circuit.readout import scan_shares, shares
+from probe.circuit.network import solve_floating
+from probe.circuit.reading import scan_shares, shares
 
 X = np.arange(16) - 7.5
 RADIUS = np.hypot(X, X[:, None])

@@ -23,7 +23,7 @@ import numpy as np
 from encoded_objects import Reader, encode, open_lab
 from encoded_objects.base.sensor_type import SensorType
 from probe.circuit import Electronics, Noise, conductances, fsr_of, invert_readings
-from probe.circuit.readout import scan_shares, shares
+from probe.circuit.reading import scan_shares, shares
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.simulate.registered import registered_surface

@@ -43,7 +43,7 @@ from probe.circuit import (
     read_counts,
     read_sequence,
 )
-from probe.circuit.settings import FILM
+from probe.circuit.fsr import BREAK_N, GAIN_S
 from probe.errors import CalibrationError
 
 NONE = np.zeros((16, 16))
@@ -141,8 +141,8 @@ def nominal(board: Electronics) -> Calibration:
     return Calibration(
         sensor="nominal", made="", board=board, full=board.full, loads=(),
         condition=np.zeros(shape), bias_counts=board.bias_lsb * board.lsb * one,
-        rest_counts=board.bias_lsb * board.lsb * one, noise_counts=one, gain_s=FILM.gain_s * one,
-        exponent=one, break_n=FILM.break_n * one, covariance=np.zeros((*shape, 6)),
+        rest_counts=board.bias_lsb * board.lsb * one, noise_counts=one, gain_s=GAIN_S * one,
+        exponent=one, break_n=BREAK_N * one, covariance=np.zeros((*shape, 6)),
         most_n=one, scatter=1.0, repeat=0.05,
     )  # fmt: skip
 

@@ -17,9 +17,8 @@ from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.colours import ANSWERED_RGB, BODY_RGB, SYMBOL_RGB, answered_rgb
-from generator.export.preview import preview_png
+from generator.export.preview import HEIGHT, WIDTH, preview_png
 from generator.export.raster import rasterise
-from generator.export.settings import PREVIEW
 from generator.layout.placement import FaceLayout, Placement
 from generator.polyhedron.shapes import cube
 from generator.solid.part import Facet, Part
@@ -114,8 +113,8 @@ def test_the_preview_shows_a_plain_body_twice_on_paper() -> None:
     parts = body_parts()
     data = preview_png("Würfel", (60.0, 60.0, 60.0), parts, [triangles(p) for p in parts])
     image = np.asarray(Image.open(io.BytesIO(data)))
-    assert image.shape == (PREVIEW.height, PREVIEW.width, 3)
-    for half in (image[:, : PREVIEW.width // 2], image[:, PREVIEW.width // 2 :]):
+    assert image.shape == (HEIGHT, WIDTH, 3)
+    for half in (image[:, : WIDTH // 2], image[:, WIDTH // 2 :]):
         body = np.unique(half[150:600, 100:500].reshape(-1, 3), axis=0, return_counts=True)
         large = body[0][body[1] > 5000].astype(float)
         assert len(large) >= 3  # three faces in three shades

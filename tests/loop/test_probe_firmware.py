@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from probe.circuit import QUIET, Electronics, invert_readings
-from probe.circuit.readout import shares
+from probe.circuit.reading import shares
 from probe.errors import PortError
 from probe.firmware.build import SOURCES
 from probe.port import open_port

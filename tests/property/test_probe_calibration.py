@@ -18,7 +18,7 @@ from probe.calibration import (
     read_calibration,
     write_calibration,
 )
-from probe.calibration.law import fit_laws, law_s
+from probe.calibration.fit import fit_laws, law_s
 from probe.circuit import Electronics
 from probe.errors import CalibrationError
 

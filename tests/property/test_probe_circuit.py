@@ -17,8 +17,8 @@ from probe.circuit import (
     read_counts,
     transconductances,
 )
-from probe.circuit.floating import solve_floating
-from probe.circuit.readout import scan_shares, shares, unscan_shares
+from probe.circuit.network import solve_floating
+from probe.circuit.reading import scan_shares, shares, unscan_shares
 
 seeds = st.integers(0, 2**32)
 sizes = st.tuples(st.integers(2, 9), st.integers(2, 9))

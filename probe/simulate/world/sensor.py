@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.circuit.fsr import Fsr, conductances, fsr_of
-from probe.circuit.loaded_column import loaded_columns
-from probe.circuit.settings import FILM
+from probe.circuit.fsr import GAIN_S, Fsr, conductances, fsr_of
+from probe.circuit.network import loaded_columns
 from probe.contact.contract import Contact, Touch
 from probe.contact.engines import Engine, engine_named
 from probe.contact.gel import depths_mm, gel
@@ -77,7 +76,7 @@ class SensorInstance:
         plain, none = fsr_of(rows, columns), np.zeros((rows, columns))
         dead = self.dead(level) | ~sensor.present()
         hot = np.zeros(dead.size)
-        hot[self.failing[dead.size - round(level.hot * dead.size) :]] = FILM.gain_s * level.hot_n
+        hot[self.failing[dead.size - round(level.hot * dead.size) :]] = GAIN_S * level.hot_n
         return Fsr(
             gain_s=plain.gain_s * np.exp(level.gain * self.gains),
             exponent=level.exponent * sensor.exponent * plain.exponent,
@@ -170,7 +169,7 @@ class LevelSensor:
         conductance, _ = conductances(film, _cross_talk(forces, level.cross_talk), state)
         share = loaded_columns(conductance, instance.floating_rows(level), level.load_ohm)
         coarse = sensor.full / FULL
-        amplification = max(1.0, COUNTS_PER_N / (FULL * level.load_ohm * FILM.gain_s))
+        amplification = max(1.0, COUNTS_PER_N / (FULL * level.load_ohm * GAIN_S))
         offered = sensor.full * amplification * _row_leakage(share, level.bleed)
         noise = coarse * COUNTS_PER_N * level.noise_n * rng.standard_normal(forces.shape)
         return coarse * BIAS + offered + noise, contact

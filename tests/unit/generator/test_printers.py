@@ -11,7 +11,7 @@ import pytest
 
 from generator.errors import GeneratorError
 from generator.export.bed import arrange_plates
-from generator.export.slicer_settings import slicer_settings
+from generator.export.threemf import slicer_settings
 from generator.pipeline.plan import plan_object
 from generator.printers import PRINTERS, known_printers, printer_named
 from generator.spec import ObjectSpec, SpecError, read_specs
@@ -114,7 +114,7 @@ def test_settings_say_layers_bed_and_where_the_colour_changes() -> None:
     assert (said["layer_height"], said["first_layer_height"]) == ("0.2", "0.2")
     assert said["bed_shape"] == "0x0,220x0,220x220,0x220"
     assert said["support_material"] == "0"
-    change = settings.files()["Metadata/Prusa_Slicer_custom_gcode_per_print_z.xml"][0]
+    change = settings.files()["Metadata/Prusa_Slicer_custom_gcode_per_print_z.xml"]
     assert re.search(r'print_z="3.2" .* gcode="M600"', change)
     plain = slicer_settings(printer_named("ender-3"), supports=True)
     assert plain is not None

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from generator.export.robot.text import numbers, quaternion, roll_pitch_yaw
 from manifold3d import Manifold
 
 from generator.errors import SolidError
+from generator.export.robot.model import numbers, quaternion, roll_pitch_yaw
 from generator.solid.convex import ConvexSettings, convex_pieces
 from generator.solid.measure import inertia_of
 

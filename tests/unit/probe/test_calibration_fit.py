@@ -7,16 +7,14 @@ import pytest
 
 from probe.calibration import (
     Condition,
-    ConditionThresholds,
     calibrate_image,
     calibration_from,
     even_load,
     expected_counts,
     known_load,
 )
-from probe.calibration.average import average_frames
-from probe.calibration.law import FittedLaw, fit_laws, law_s
-from probe.calibration.pooled import shrink_laws
+from probe.calibration.fit import FittedLaw, fit_laws, law_s, shrink_laws
+from probe.calibration.load import average_frames
 from probe.circuit import (
     DATASHEET,
     MEASURED,
@@ -197,10 +195,6 @@ def test_frames_that_are_none_are_refused():
     other = [known_load(np.zeros((20, 8, 8)), np.ones((8, 8)))]
     with pytest.raises(CalibrationError, match="one sensor"):
         calibration_from(frames, other, sensor="S1")
-
-
-def test_a_stricter_law_needs_more_loads():
-    refused("a law needs 5", thresholds=ConditionThresholds(levels=5))
 
 
 def test_the_reading_expected_of_a_force_is_the_reading_that_comes():

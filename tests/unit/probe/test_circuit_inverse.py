@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from probe.circuit import QUIET, Electronics, Noise, effective_resistances, invert_readings
-from probe.circuit.floating import solve_floating
-from probe.circuit.readout import scan_shares, shares
+from probe.circuit.network import solve_floating
+from probe.circuit.reading import scan_shares, shares
 from probe.errors import CircuitError
 
 READOUTS = ["floating", "grounded", "virtual"]

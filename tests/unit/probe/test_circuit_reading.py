@@ -17,7 +17,7 @@ from probe.circuit import (
     read_counts,
     read_sequence,
 )
-from probe.circuit.readout import scan_shares, unscan_shares
+from probe.circuit.reading import scan_shares, unscan_shares
 from probe.errors import CircuitError
 
 IDEAL = Electronics(noise=QUIET, settling_s=1.0, coupling=0.0, bias_lsb=0.0)

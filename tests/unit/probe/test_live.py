@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from probe.calibration import calibration_from, even_load, expected_counts
-from probe.calibration.settings import AVERAGE
+from probe.calibration.load import BIAS_FRAMES
 from probe.circuit import Electronics, fsr_of, read_sequence
 from probe.client import ClientStatistics
 from probe.command.live_state import LiveState
@@ -66,7 +66,7 @@ def test_the_scale_rises_at_once_and_falls_slowly(state):
 def test_the_bias_is_the_mean_of_frames_and_comes_off_the_image(state):
     state.toggle_bias()
     assert state.taking_bias
-    noise = np.random.default_rng(2).integers(0, 5, (AVERAGE.bias_frames, 16, 16))
+    noise = np.random.default_rng(2).integers(0, 5, (BIAS_FRAMES, 16, 16))
     state.take(frames_of(*(100 + noise)))
     assert not state.taking_bias
     assert state.bias == pytest.approx(100 + noise.mean(axis=0))
@@ -99,11 +99,11 @@ def test_newtons_with_a_calibration(state):
     assert re.search(r"peak +0\.\d\d N at \(", text)
     assert "days old" in text
     state.toggle_bias()
-    state.take(frames_of(*loads[0][: AVERAGE.bias_frames]))
+    state.take(frames_of(*loads[0][:BIAS_FRAMES]))
     assert state.bias is None, "a calibration has its own bias"
     assert state.notice == "the bias is that of the calibration"
     state.toggle_bias()
-    state.take(frames_of(*loads[40][: AVERAGE.bias_frames]))
+    state.take(frames_of(*loads[40][:BIAS_FRAMES]))
     assert "calibrate again" in state.notice
 
 

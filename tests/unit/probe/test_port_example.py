@@ -13,8 +13,7 @@ import pytest
 
 from probe.client.client import Client
 from probe.errors import PortError
-from probe.port.typed import typed_port
-from probe.port.url import GROUP, open_port
+from probe.port.url import GROUP, open_port, typed_port
 
 EXAMPLE = Path(__file__).parents[3] / "docs/examples/udp_probe"
 

@@ -17,8 +17,7 @@ from probe.client.client import Client
 from probe.errors import PortError
 from probe.port.marked import MARKER, MarkedImages
 from probe.port.settings import PORT
-from probe.port.typed import typed_port
-from probe.port.url import open_port
+from probe.port.url import open_port, typed_port
 
 LENGTH = 512
 RNG = np.random.default_rng(3)

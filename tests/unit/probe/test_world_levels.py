@@ -7,8 +7,8 @@ import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.circuit.electronics import QUIET, Electronics
-from probe.circuit.loaded_column import loaded_columns
-from probe.circuit.readout import shares
+from probe.circuit.network import loaded_columns
+from probe.circuit.reading import shares
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips

@@ -18,6 +18,7 @@ from hostile_recordings import HOSTILE, write_hostile, write_zeros
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import RegisteredPart
+from probe.calibration.guide import LONGEST
 from probe.circuit import Electronics, fsr_of, read_counts
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import frame_from
@@ -25,7 +26,7 @@ from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker, Subscriber
-from recognizer.bench.calibration_guide import CalibrationGuide, forces_given
+from recognizer.bench.calibration_guide import page_guide
 from recognizer.bench.errors import BenchError, BusyError, UnknownError
 from recognizer.bench.feed import ProbeFeed
 from recognizer.bench.files import (
@@ -38,7 +39,7 @@ from recognizer.bench.images import FILTERS, filter_image
 from recognizer.bench.message import FrameMessage, mosaic_message
 from recognizer.bench.read_trigger import ReadTrigger
 from recognizer.bench.replay import ReplayFeed
-from recognizer.bench.settings import GUIDE, TRIGGER, TouchLogSettings, UploadSettings
+from recognizer.bench.settings import TRIGGER, TouchLogSettings, UploadSettings
 from recognizer.bench.simulated import parse_simulation
 from recognizer.bench.touch_log import TouchLog
 from recognizer.bench.uploads import Uploads, folder_bytes
@@ -456,23 +457,21 @@ def fed(guide, newtons, rng, state):
     while guide.as_json()["reading"]:
         counts, state[0] = read_counts(forces, board, fsr, state[0], rng)
         state[1] += 1
-        guide.take(frame_from(counts, t_ns=state[1] * 10_000_000, seq=state[1]))
+        guide.guide.take([frame_from(counts, t_ns=state[1] * 10_000_000, seq=state[1])])
 
 
 def test_a_guide_leads_to_a_calibration():
-    guide = CalibrationGuide(
-        "bench/0", forces_given([80, 200, 600]), 0.3, Electronics(), "2026-01-01"
-    )
+    guide = page_guide("bench/0", [80, 200, 600], 0.3, Electronics(), "2026-01-01")
     rng, state = np.random.default_rng(0), [None, 0]
     with pytest.raises(BusyError):
         guide.calibration()
     for newtons in (0, 80, 200, 600):
         assert guide.as_json()["newtons"] == newtons
         fed(guide, newtons, rng, state)
-    assert guide.done
+    assert guide.as_json()["done"]
     assert "felt by 256 of 256" in guide.as_json()["felt"][-1]
     assert not guide.calibration().bad.any()
-    guide.again()
+    guide.guide.again()
     assert guide.as_json()["step"] == 3
     fed(guide, 600, rng, state)
     with pytest.raises(BusyError):
@@ -480,7 +479,7 @@ def test_a_guide_leads_to_a_calibration():
 
 
 def begun(seconds):
-    guide = CalibrationGuide("bench/0", forces_given([80]), seconds, None, "2026-01-01")
+    guide = page_guide("bench/0", [80], seconds, None, "2026-01-01")
     guide.read()
     return guide
 
@@ -490,14 +489,14 @@ def read_for(guide, images, step_ns=10_000_000):
     for taken, value in enumerate(images):
         if not guide.as_json()["reading"]:
             return taken
-        guide.take(frame_from(np.full((16, 16), value), t_ns=taken * step_ns, seq=taken))
+        guide.guide.take([frame_from(np.full((16, 16), value), t_ns=taken * step_ns, seq=taken)])
     return len(images)
 
 
 def test_a_load_is_read_until_enough_was_told():
     assert read_for(begun(0.5), range(1000)) == 51
     assert read_for(begun(0.5), np.arange(1000) // 5) == 19 * 5 + 1  # each is sent five times
-    assert read_for(begun(0.5), [7] * 1000) == round(0.5 * GUIDE.longest * 100) + 1
+    assert read_for(begun(0.5), [7] * 1000) == round(0.5 * LONGEST * 100) + 1
     assert read_for(begun(0.5), range(9), step_ns=100_000_000) == 9  # slow, and not done yet
 
 
@@ -505,12 +504,12 @@ def test_a_load_is_read_anew_where_the_board_starts_again():
     guide = begun(0.3)
     for t_ms in (*range(5000, 5200, 10), *range(0, 310, 10)):
         assert guide.as_json()["reading"]
-        guide.take(frame_from(np.full((16, 16), t_ms), t_ns=t_ms * 1_000_000, seq=0))
-    assert guide.felt[0].startswith("31 frames")
+        guide.guide.take([frame_from(np.full((16, 16), t_ms), t_ns=t_ms * 1_000_000, seq=0)])
+    assert guide.guide.felt[0].startswith("31 frames")
 
 
 def test_loads_that_tell_nothing_are_refused_with_what_is_missing():
-    guide = CalibrationGuide("bench/0", forces_given([40]), 0.2, Electronics(), "2026-01-01")
+    guide = page_guide("bench/0", [40], 0.2, Electronics(), "2026-01-01")
     rng, state = np.random.default_rng(0), [None, 0]
     for newtons in (0, 40):
         fed(guide, newtons, rng, state)
@@ -519,7 +518,7 @@ def test_loads_that_tell_nothing_are_refused_with_what_is_missing():
     assert refused.value.fix
     for bad in ([], [0.0], [float("nan")], [1e9], [1.0] * 99):
         with pytest.raises(BenchError):
-            forces_given(bad)
+            page_guide("bench/0", bad, 0.2, None, "")
 
 
 # -- the simulated probe

@@ -1,24 +1,76 @@
-"""The overview of a set as PDF: its objects, and a labelled plan of every plate.
+"""What a set has as a whole: the packing list as CSV, and an overview of all plates as PDF.
 
-A4 pages, portrait; the same set gives the same bytes: no dates, fonts embedded. The plan of a
-plate is drawn as the printer shows it: x right, y back, origin at the front left, mm.
+The list says for the technician which part of which object lies where: UTF-8, commas, lines end
+in CR LF (RFC 4180). The overview has A4 pages, portrait: the objects, and a plan of every plate as
+the printer shows it. Plate frame of `bed`: x right, y back, origin at the front left, mm. The same
+set gives the same bytes: no dates, fonts embedded.
 """
 
 from __future__ import annotations
 
+import csv
 import io
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
-from generator.export.colours import BODY_RGB
+from generator.export.bed import BedPlace
+from generator.export.colours import BODY_RGB, hexadecimal
 from generator.export.lettering import transliterate
-from generator.export.packing import PackedPart
 
+COLUMNS = (
+    "object", "part", "printer", "plate", "x_mm", "y_mm", "turned",
+    "width_mm", "depth_mm", "height_mm", "symbols", "fits",
+)  # fmt: skip
 _PAGE = (8.27, 11.69)  # inches
 _LINES = 44  # objects on one page
 _INK, _EDGE = "#0F172A", "#475569"
-_COLUMNS = (("object", 0.0), ("parts", 0.56), ("symbols", 0.67), ("plates", 0.8))
+_TABLE = (("object", 0.0), ("parts", 0.56), ("symbols", 0.67), ("plates", 0.8))
+
+
+@dataclass(frozen=True, slots=True)
+class PackedPart:
+    """One part of a set and its place."""
+
+    order: tuple[int, int]  #: object and part, as the set lists them
+    object: str
+    part: str
+    plate: int  #: from 1
+    printer: str
+    place: BedPlace
+    size_mm: tuple[float, float, float]  #: as it comes from the file, before it is turned
+    symbols: int
+    fits: bool  #: whether the plate fits the bed
+
+    @property
+    def lying_mm(self) -> tuple[float, float]:
+        """Width and depth as it lies on the bed."""
+        width, depth, _ = self.size_mm
+        return (depth, width) if self.place.turned else (width, depth)
+
+
+def packing_csv(packed: Sequence[PackedPart]) -> bytes:
+    """Return the list, one line for each part."""
+    text = io.StringIO(newline="")
+    table = csv.writer(text)
+    table.writerow(COLUMNS)
+    for one in packed:
+        width, depth = one.lying_mm
+        table.writerow(
+            [
+                one.object,
+                one.part,
+                one.printer,
+                one.plate,
+                *(f"{value + 0.0:.1f}" for value in (one.place.x_mm, one.place.y_mm)),
+                "yes" if one.place.turned else "no",
+                *(f"{value:.1f}" for value in (width, depth, one.size_mm[2])),
+                one.symbols,
+                "yes" if one.fits else "no",
+            ]
+        )
+    return text.getvalue().encode()
 
 
 def can_draw() -> bool:
@@ -66,13 +118,13 @@ def _object_pages(title: str, plates: Sequence[Sequence[PackedPart]]) -> list[An
         page, axes = _page(f"{transliterate(title)}: {counts}", (0.08, 0.05, 0.84, 0.85))
         axes.set(xlim=(0, 1), ylim=(_LINES + 1, 0))
         axes.axis("off")
-        for text, x in _COLUMNS:
+        for text, x in _TABLE:
             axes.text(x, 0.5, text, weight="bold", size=9, color=_INK, va="center")
         for line, ((_, name), rows) in enumerate(objects[first : first + _LINES], 1):
             on = ", ".join(str(number) for number in sorted({row.plate for row in rows}))
             symbols = sum(row.symbols for row in rows)
             texts = (transliterate(name), str(len(rows)), str(symbols), on)
-            for (_, x), text in zip(_COLUMNS, texts, strict=True):
+            for (_, x), text in zip(_TABLE, texts, strict=True):
                 axes.text(x, line + 0.5, text, size=9, color=_INK, va="center")
             axes.plot([0, 1], [line, line], color="#CBD5E1", linewidth=0.4)
         pages.append(page)
@@ -93,10 +145,11 @@ def _plate_page(
     width, depth = bed_mm
     axes.add_patch(Rectangle((0, 0), width, depth, facecolor="#F1F5F9", edgecolor=_EDGE))
     ends = [(width, depth)]
-    colour = f"#{BODY_RGB[0]:02X}{BODY_RGB[1]:02X}{BODY_RGB[2]:02X}"
     for row in packed:
         x, y, (w, d) = row.place.x_mm, row.place.y_mm, row.lying_mm
-        axes.add_patch(Rectangle((x, y), w, d, facecolor=colour, edgecolor=_EDGE, linewidth=0.6))
+        axes.add_patch(
+            Rectangle((x, y), w, d, facecolor=hexadecimal(BODY_RGB), edgecolor=_EDGE, linewidth=0.6)
+        )
         upright = d > 1.5 * w
         text = transliterate(row.part)
         room = (d if upright else w) / width * 0.84 * _PAGE[0] * 72  # points

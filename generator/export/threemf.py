@@ -1,0 +1,397 @@
+"""Parts -> 3MF: body and symbols as separate objects, arranged on the printer's bed.
+
+Slicers read two ways to say that a body and its symbols belong together, so each plate is
+made in both; the same meshes are written and deflated once:
+
+- ``components`` (3MF core specification 1.3): each part is an object of two components,
+  "<part> body" and "<part> symbols". Bambu Studio, Orca, Cura and 3D Builder keep them
+  together; PrusaSlicer asks when a person opens the file, and headless it drops the symbols
+  to the bed.
+- ``volumes``: each part is one mesh, and a settings file that PrusaSlicer and SuperSlicer
+  read names the two ranges of its triangles, and `SlicerSettings`. Others see one mesh of
+  two materials.
+
+Body and symbols have a material each. Vertices are written where they lie on the bed: PrusaSlicer
+applies the transform of a build item to the first volume alone. A part of two volumes lists the
+vertices of its symbols first, as they are numbered where the symbols are an object; only the
+body's triangles differ, which are few. Part frame in, plate frame out; mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.export.bed import BedPlace, Plate, Size, arrange_plates
+from generator.export.colours import BODY_RGB, SYMBOL_RGB, hexadecimal
+from generator.export.fixed_text import number_lines
+from generator.export.formats import ExportedObject, Files
+from generator.export.zip_package import DeflatedText, deflate_text, zip_package
+from generator.printers import Printer
+from generator.solid.part import Part
+from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes
+
+PLACES = 6  #: decimals of a coordinate in mm
+BODY, SYMBOLS = 0, 1  #: materials
+_BLOCK = 8_192  # vertices or triangles formatted at once: their text stays in the cache
+_SETTINGS = "Metadata/Slic3r_PE.config"
+_COLOUR_CHANGE = "Metadata/Prusa_Slicer_custom_gcode_per_print_z.xml"
+_MODEL, _CONFIG = "3D/3dmodel.model", "Metadata/Slic3r_PE_model.config"
+
+_XML = '<?xml version="1.0" encoding="UTF-8"?>\n'
+_CONTENT_TYPES = (
+    _XML + '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+    '<Default Extension="rels" '
+    'ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+    '<Default Extension="model" '
+    'ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>'
+    '<Default Extension="config" ContentType="text/xml"/></Types>\n'
+)
+_RELATIONSHIPS = (
+    _XML + '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
+    '<Relationship Target="/3D/3dmodel.model" Id="rel0" '
+    'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>\n'
+)
+_TO_TRIANGLES, _TO_END = "</vertices><triangles>\n", "</triangles></mesh></object>\n"
+
+
+@dataclass(frozen=True, slots=True)
+class SlicerSettings:
+    """How one plate is printed in filament; lengths in mm."""
+
+    nozzle_mm: float
+    layer_mm: float
+    first_layer_mm: float
+    bed_mm: Size
+    supports: bool = False  #: a whole body hangs over
+    colour_change_mm: float = 0.0  #: height at which the filament is changed; 0: nowhere
+
+    def entries(self) -> dict[str, str]:
+        """Return the settings under the slicer's own names."""
+        width, depth = (f"{side:g}" for side in self.bed_mm)
+        return {
+            "printer_technology": "FFF",
+            "printer_settings_id": "encoded-objects",
+            "bed_shape": f"0x0,{width}x0,{width}x{depth},0x{depth}",
+            "nozzle_diameter": f"{self.nozzle_mm:g}",
+            "filament_diameter": "1.75",
+            "filament_density": "1.24",
+            "filament_type": "PLA",
+            "first_layer_temperature": "215",
+            "temperature": "210",
+            "first_layer_bed_temperature": "60",
+            "bed_temperature": "60",
+            "layer_height": f"{self.layer_mm:g}",
+            "first_layer_height": f"{self.first_layer_mm:g}",
+            "fill_density": "15%",
+            "support_material": str(int(self.supports)),
+        }
+
+    @property
+    def of_object(self) -> dict[str, str]:
+        """What an object says itself, over any print settings."""
+        return {"layer_height": f"{self.layer_mm:g}", "support_material": str(int(self.supports))}
+
+    def files(self) -> dict[str, str]:
+        """Return what is added to a package."""
+        lines = [f"; {name} = {value}\n" for name, value in self.entries().items()]
+        found = {_SETTINGS: "; made by encoded-objects\n\n" + "".join(lines)}
+        if self.colour_change_mm > 0:
+            # The slicer changes before the layer that ends at or above this height.
+            z = f"{self.colour_change_mm + self.layer_mm:.6g}"
+            found[_COLOUR_CHANGE] = (
+                '<?xml version="1.0" encoding="utf-8"?>\n<custom_gcodes_per_print_z>\n'
+                f'<code print_z="{z}" type="0" extruder="1" color="{hexadecimal(SYMBOL_RGB)}" '
+                'extra="" gcode="M600"/>\n<mode value="SingleExtruder"/>\n'
+                "</custom_gcodes_per_print_z>\n"
+            )
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class PrintFile:
+    """One plate as two 3MF files; see the module."""
+
+    plate: Plate
+    content: bytes  #: body and symbols as components
+    prusaslicer: bytes  #: as volumes
+
+
+def slicer_settings(
+    printer: Printer, *, supports: bool, colour_change_mm: float = 0.0
+) -> SlicerSettings | None:
+    """Return the settings of a plate, or None for a printer without a nozzle."""
+    if not printer.nozzle_mm:
+        return None
+    change = printer.printed_mm(colour_change_mm) if colour_change_mm else 0.0
+    return SlicerSettings(
+        printer.nozzle_mm,
+        printer.layer_mm,
+        printer.first_layer_mm,
+        printer.bed_mm,
+        supports,
+        change,
+    )
+
+
+def write_plates(exported: ExportedObject) -> Files:
+    """Yield both 3MF files of each plate of an object."""
+    for number, plate in enumerate(exported.plates, 1):
+        stem = exported.name + (f"-plate-{number}" if len(exported.plates) > 1 else "")
+        yield f"{stem}.3mf", plate.content
+        yield f"{stem}-prusaslicer.3mf", plate.prusaslicer
+
+
+def print_files(
+    title: str,
+    parts: Sequence[Part | tuple[str, Mesh]],
+    bed_mm: Size,
+    settings: SlicerSettings | None = None,
+) -> tuple[PrintFile, ...]:
+    """Arrange parts on plates and return the 3MF files of each plate.
+
+    Parameters
+    ----------
+    title
+        Of the model.
+    parts
+        In their own frames, mm, as they lie on the bed; of one without symbols name and mesh.
+    bed_mm
+        Usable width and depth of the bed, mm.
+    settings
+        For slicers that read them; None where there are none.
+    """
+    held = [_bed_part(part) for part in parts]
+    plates = arrange_plates([part.size for part in held], bed_mm)
+    return tuple(
+        PrintFile(plate, *_plate_packages(title, held, plate, settings)) for plate in plates
+    )
+
+
+def print_file(
+    title: str, parts: Sequence[Part], plate: Plate, settings: SlicerSettings | None = None
+) -> PrintFile:
+    """Return the 3MF files of one plate; its places count `parts`, which are all on it."""
+    held = [_bed_part(part) for part in parts]
+    return PrintFile(plate, *_plate_packages(title, held, plate, settings))
+
+
+@dataclass(frozen=True, slots=True)
+class _BedMesh:
+    """A mesh whose vertices are all in use."""
+
+    name: str
+    material: int  #: `BODY` or `SYMBOLS`
+    vertices: NDArray[np.float64]  #: (N, 3) mm
+    triangles: NDArray[np.int64]  #: (M, 3)
+
+    def vertex_text(self) -> DeflatedText:
+        """Return the elements of its vertices."""
+        return deflate_text(self._vertex_lines())
+
+    def triangle_text(self, first: int = 0, properties: str = "") -> DeflatedText:
+        """Return the elements of its triangles, whose vertices are numbered from `first`."""
+        return deflate_text(self._triangle_lines(first, properties))
+
+    def _vertex_lines(self) -> Iterator[bytes]:
+        for start in range(0, len(self.vertices), _BLOCK):
+            some = self.vertices[start : start + _BLOCK]
+            yield number_lines(('<vertex x="', '" y="', '" z="', '"/>\n'), some, PLACES)
+
+    def _triangle_lines(self, first: int, properties: str) -> Iterator[bytes]:
+        words = ('<triangle v1="', '" v2="', '" v3="', f'"{properties}/>\n')
+        for start in range(0, len(self.triangles), _BLOCK):
+            yield number_lines(words, self.triangles[start : start + _BLOCK] + first, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class _BedPart:
+    """What one part puts on the bed: body and symbols (None without symbols)."""
+
+    name: str
+    body: _BedMesh
+    symbols: _BedMesh | None
+    low: NDArray[np.float64]  #: (3,) lowest x, y, z, mm
+    size: Size
+
+    @property
+    def meshes(self) -> tuple[_BedMesh, ...]:
+        """Body and symbols."""
+        return (self.body,) if self.symbols is None else (self.body, self.symbols)
+
+
+def _bed_part(part: Part | tuple[str, Mesh]) -> _BedPart:
+    """Return the meshes of a part."""
+    symbols: list[Mesh] = []
+    if isinstance(part, Part):
+        name, body = part.name, body_mesh(part)
+        symbols = [mesh for mesh in symbol_meshes(part) if len(mesh.triangles)]
+    else:
+        name, body = part
+    own = _BedMesh(f"{name} body", BODY, *_join_meshes([body]))
+    points, stuck = own.vertices, None
+    if symbols:
+        stuck = _BedMesh(f"{name} symbols", SYMBOLS, *_join_meshes(symbols))
+        points = np.vstack([points, stuck.vertices])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return _BedPart(name, own, stuck, low, (float(high[0] - low[0]), float(high[1] - low[1])))
+
+
+def _move_to_bed(mesh: _BedMesh, part: _BedPart, place: BedPlace) -> _BedMesh:
+    """Return a mesh of a part where it lies on the bed."""
+    x, y, z = part.low.tolist()
+    points = mesh.vertices
+    if place.turned:  # (x, y) -> (-y, x)
+        points = np.column_stack([-points[:, 1], points[:, 0], points[:, 2]])
+        corner = (-(y + part.size[1]), x)
+    else:
+        corner = (x, y)
+    shift = np.array([place.x_mm - corner[0], place.y_mm - corner[1], -z])
+    return _BedMesh(mesh.name, mesh.material, points + shift, mesh.triangles)
+
+
+def _join_meshes(meshes: Sequence[Mesh]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices and triangles of meshes as one, with the vertices that a triangle uses."""
+    vertices, triangles = [], []
+    first = 0
+    for mesh in meshes:
+        used = np.zeros(len(mesh.vertices), np.bool_)
+        used[mesh.triangles] = True
+        numbers = np.cumsum(used) - 1 + first
+        vertices.append(mesh.vertices[used])
+        triangles.append(numbers[mesh.triangles])
+        first += len(vertices[-1])
+    return np.concatenate(vertices), np.concatenate(triangles)
+
+
+@dataclass(slots=True)
+class _Model:
+    """The text of one model so far."""
+
+    pieces: list[DeflatedText] = field(default_factory=list)
+    items: list[str] = field(default_factory=list)
+    number: int = 2  #: of the next object; 1 are the materials
+
+    def add(self, *pieces: str | DeflatedText) -> None:
+        self.pieces += [
+            deflate_text([piece.encode()]) if isinstance(piece, str) else piece for piece in pieces
+        ]
+
+    def item(self) -> None:
+        """Put the next object on the bed, where its vertices are."""
+        self.items.append(f'<item objectid="{self.number}"/>\n')
+        self.number += 1
+
+
+def _plate_packages(
+    title: str, parts: Sequence[_BedPart], plate: Plate, settings: SlicerSettings | None
+) -> tuple[bytes, bytes]:
+    """Return one plate as components and as volumes; its places count `parts`."""
+    components, volumes = _Model(), _Model()
+    for model in (components, volumes):
+        model.add(_header(title))
+    for place in plate.places:
+        part = parts[place.part]
+        body = _move_to_bed(part.body, part, place)
+        symbols = None if part.symbols is None else _move_to_bed(part.symbols, part, place)
+        _add_part(part.name, body, symbols, components, volumes)
+    for model in (components, volumes):
+        model.add(f"</resources>\n<build>\n{''.join(model.items)}</build>\n</model>\n")
+    more = {_CONFIG: _volume_settings(parts, plate, settings)}
+    if settings is not None:
+        more |= settings.files()
+    return _package(components.pieces), _package(volumes.pieces, more)
+
+
+def _add_part(
+    name: str, body: _BedMesh, symbols: _BedMesh | None, components: _Model, volumes: _Model
+) -> None:
+    """Add a part as an object of one or two components, and as one mesh of as many volumes."""
+    points, faces = body.vertex_text(), body.triangle_text()
+    references = [_add_mesh(components, body, points, faces)]
+    if symbols is None:
+        volumes.add(_mesh_head(volumes.number, name, BODY), points, _TO_TRIANGLES, faces, _TO_END)
+    else:
+        own, sides = symbols.vertex_text(), symbols.triangle_text()
+        references.append(_add_mesh(components, symbols, own, sides))
+        moved = body.triangle_text(len(symbols.vertices), f' pid="1" p1="{BODY}"')
+        head = _mesh_head(volumes.number, name, SYMBOLS)
+        volumes.add(head, own, points, _TO_TRIANGLES, moved, sides, _TO_END)
+    volumes.item()
+    components.add(
+        f'<object id="{components.number}" type="model" name={quoteattr(name)}>'
+        f"<components>{''.join(references)}</components></object>\n"
+    )
+    components.item()
+
+
+def _add_mesh(model: _Model, mesh: _BedMesh, points: DeflatedText, faces: DeflatedText) -> str:
+    """Add a mesh as an object; return the component that refers to it."""
+    head = _mesh_head(model.number, mesh.name, mesh.material)
+    model.add(head, points, _TO_TRIANGLES, faces, _TO_END)
+    model.number += 1
+    return f'<component objectid="{model.number - 1}"/>'
+
+
+def _mesh_head(number: int, name: str, material: int) -> str:
+    return (
+        f'<object id="{number}" type="model" name={quoteattr(name)} pid="1" pindex="{material}">'
+        "<mesh><vertices>\n"
+    )
+
+
+def _header(title: str) -> str:
+    return (
+        f'{_XML}<model unit="millimeter" xml:lang="en-US" '
+        'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">\n'
+        f'<metadata name="Title">{quoteattr(title)[1:-1]}</metadata>\n'
+        '<metadata name="Application">encoded-objects</metadata>\n<resources>\n'
+        '<basematerials id="1">'
+        f'<base name="body" displaycolor="{hexadecimal(BODY_RGB)}"/>'
+        f'<base name="symbols" displaycolor="{hexadecimal(SYMBOL_RGB)}"/></basematerials>\n'
+    )
+
+
+def _volume_settings(
+    parts: Sequence[_BedPart], plate: Plate, settings: SlicerSettings | None
+) -> str:
+    """Return PrusaSlicer's settings of a plate: the ranges of triangles that are volumes."""
+    own = {} if settings is None else settings.of_object
+    text = [f"{_XML}<config>\n"]
+    for number, place in enumerate(plate.places, 2):
+        part = parts[place.part]
+        text.append(
+            f'<object id="{number}" instances_count="1">\n'
+            f'<metadata type="object" key="name" value={quoteattr(part.name)}/>\n'
+        )
+        text += [
+            f'<metadata type="object" key="{key}" value="{value}"/>\n' for key, value in own.items()
+        ]
+        first = 0
+        for mesh in part.meshes:
+            last = first + len(mesh.triangles) - 1
+            text.append(
+                f'<volume firstid="{first}" lastid="{last}">\n'
+                f'<metadata type="volume" key="name" value={quoteattr(mesh.name)}/>\n'
+                '<metadata type="volume" key="volume_type" value="ModelPart"/>\n'
+                f'<metadata type="volume" key="extruder" value="{mesh.material + 1}"/>\n'
+                "</volume>\n"
+            )
+            first = last + 1
+        text.append("</object>\n")
+    text.append("</config>\n")
+    return "".join(text)
+
+
+def _package(model: Sequence[DeflatedText], more: dict[str, str] | None = None) -> bytes:
+    """Return the zip of a model, of the two files that every 3MF has, and of some more."""
+    before = {"[Content_Types].xml": _CONTENT_TYPES, "_rels/.rels": _RELATIONSHIPS}
+    entries = {name: [deflate_text([text.encode()])] for name, text in before.items()}
+    entries[_MODEL] = list(model)
+    for name, text in (more or {}).items():
+        entries[name] = [deflate_text([text.encode()])]
+    return zip_package(entries)
