@@ -42,6 +42,6 @@ class VerdictSettings:
 
 
 #: Of a reader of prints that are further off than usual.
-PRINTS = ReaderOptions(scale_sd=0.04, scale_most=0.12)
+WIDE_SCALE = ReaderOptions(scale_sd=0.04, scale_most=0.12)
 
 ESTIMATE, VERDICT = EstimateSettings(), VerdictSettings()

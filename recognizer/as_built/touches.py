@@ -35,7 +35,7 @@ def feel_prints(
     Parameters
     ----------
     reader
-        With the options `PRINTS`, so that a print far off is read too.
+        With the options `WIDE_SCALE`, so that a print far off is read too.
     place
         Of the touches, for messages.
 

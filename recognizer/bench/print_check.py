@@ -10,7 +10,7 @@ from generator.database.as_built import AsBuilt
 from probe.frame import Frame
 from recognizer.as_built.keep import keep_prints
 from recognizer.as_built.parts import estimate_parts
-from recognizer.as_built.settings import ESTIMATE, PRINTS
+from recognizer.as_built.settings import ESTIMATE, WIDE_SCALE
 from recognizer.as_built.touches import feel_prints
 from recognizer.as_built.words import as_built_entry, as_built_sizes
 from recognizer.bench.errors import BusyError
@@ -78,7 +78,7 @@ class PrintCheck:
 @lru_cache(maxsize=1)
 def _for_prints(reader: Reader) -> Reader:
     """Return a reader that reads prints which are far off, too."""
-    return Reader(reader.lab, reader.sensor, PRINTS, state=reader.state)
+    return Reader(reader.lab, reader.sensor, WIDE_SCALE, state=reader.state)
 
 
 def _image(frame: Frame) -> TouchImage:

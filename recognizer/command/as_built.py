@@ -88,7 +88,7 @@ def _touched_prints(
     """Return what each touch of a recording says of the print."""
     from encoded_objects.base.output import progress_bar, warning
     from probe.recording.read import Recording
-    from recognizer.as_built.settings import PRINTS
+    from recognizer.as_built.settings import WIDE_SCALE
     from recognizer.as_built.touches import feel_prints
     from recognizer.touch.lab import open_lab
     from recognizer.touch.reader import Reader
@@ -99,7 +99,7 @@ def _touched_prints(
     source = source_of(opened, sensor_type, overlay=overlay, calibration=calibration)
     if source.notice:
         warning(source.notice)
-    reader = Reader(lab, source.sensor, PRINTS)
+    reader = Reader(lab, source.sensor, WIDE_SCALE)
     with progress_bar("reading", source.frames) as bar:
         touches = _counted(source.touches(opened.frames(), reader.options), bar)
         return feel_prints(reader, touches, calibration=source.calibration, place=str(recording))

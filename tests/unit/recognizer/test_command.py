@@ -24,8 +24,8 @@ from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist
 from recognizer.command import run
 from recognizer.command.scanning import ScanError, pose_during, read_joints
-from recognizer.touch.contacts import TouchImage
 from recognizer.touch.robot import Seating
+from recognizer.touch.source import TouchImage
 
 SPEC = "name: Cube\nshape: {cube: 40 mm}\n"
 KEYS = {"seq", "object", "face", "index", "T_face_probe", "T_object_probe", "margin", "reason"}
