@@ -25,10 +25,13 @@ html_theme = "alabaster"
 html_static_path: list[str] = []
 
 autosummary_generate = True
-autodoc_typehints = "signature"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_preserve_defaults = True  # the signature as written, not the value
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "undoc-members": False, "show-inheritance": True}
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 suppress_warnings = ["myst.xref_missing"]  # links to files of the repository beside the guide

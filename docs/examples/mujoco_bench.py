@@ -41,7 +41,7 @@ from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist, WristPose, gripper_to_plate, plate_to_sensor
 from probe.wrist.springs import stiffness
 from recognizer.touch.robot import carried_pose, object_pose
-from recognizer.validation.written import written_surface
+from recognizer.validation.touch_plan import written_surface
 
 Array = np.ndarray
 Shown = Callable[[Any, Array, Any], None] | None

@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -20,21 +19,19 @@ from typing import Any, overload
 from encoded_objects.base.yaml_tree import Tree, tree_of
 from generator.cad.read import polyhedron_from
 from generator.layout.placement import Layout
-from generator.pipeline.choose import Choice
 from generator.pipeline.encode import encode as encode_specs
 from generator.pipeline.encode import plan_in_lab
 from generator.pipeline.files import parts_of
 from generator.pipeline.made import Encoded, MadeObject
-from generator.pipeline.make import Order, make_under_lock
-from generator.pipeline.plan import ObjectPlan, plan_object
+from generator.pipeline.make import MakeJob, make_under_lock
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.read import MESHES, STEP
 from generator.solid import Part
 from generator.spec import Problem, SpecError, read_specs
 from generator.spec.option import database_option
 from generator.spec.problem import SPEC
+from generator.spec.read import SOURCE, spec_of, tree_from
 from generator.spec.resolved import ShapeSpec
-from generator.spec.script import SOURCE, spec_of, tree_from
 
 DIGITS = 6  #: of a coordinate (mm) by which two solids are told apart
 
@@ -191,27 +188,21 @@ def encode(
         )
     polyhedron = polyhedron_from(given)
     url = url or database_option("lab.db")
-    located = spec_of(named, ShapeSpec("solid", {"sha256": _digest(polyhedron)}))
-
-    def plan_solid(choice: Choice) -> list[ObjectPlan]:
-        plan = plan_object(choice.specs[0], polyhedron)
-        return [dataclasses.replace(plan, notes=(*plan.notes, *choice.notes))]
-
-    engine, (plan,), rehearsal = plan_in_lab(
-        [located], url, plan_solid, lab_key="", make=True, replace_changed=replace, solid=polyhedron
+    spec = spec_of(named, ShapeSpec("solid", {"sha256": _digest(polyhedron)}))
+    engine, (plan,), dry_build = plan_in_lab(
+        [spec], url, make=True, replace_changed=replace, solid=polyhedron
     )
     assert engine is not None  # it was made
-    order = Order(
+    to_make = MakeJob(
         plan,
         where or plan.spec.folder,
         plan.spec.formats if formats is None else tuple(formats),
         verify,
         replace,
-        rehearsal=rehearsal,
     )
-    product = make_under_lock(engine, order)
-    layout = product.placed.layout
-    return EncodedSolid(product.made, url, polyhedron, layout, parts_of(plan, layout)[0])
+    made = make_under_lock(engine, to_make, dry_build=dry_build)
+    parts = parts_of(plan, made.layout)[0]
+    return EncodedSolid(made, url, polyhedron, made.layout, parts)
 
 
 def _spec_source(given: str | Path | Mapping[str, Any], named: Mapping[str, Any]) -> Path | Tree:

@@ -7,8 +7,7 @@
     tools.py           encode-object init | schema | printers
     objects.py         encode-object lab | list | show | retire | export | import
     made_report.py     what was made, as text and as JSON
-    object_report.py   what is registered, as text and as JSON
-    lab_report.py      the lab's key, and how full its arrays are
+    object_report.py   what is registered and how full the lab is, as text and as JSON
 
 Results go to stdout, progress and messages to stderr (`encoded_objects.base.output`). Exit codes:
 0 done, 1 could not be written, 2 bad input, 4 database, 130 interrupted. Nothing heavy is

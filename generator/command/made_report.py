@@ -1,4 +1,7 @@
-"""What `encode-object` says of the objects that it made, as text and as JSON."""
+"""What `encode-object` says of the objects that it made, as text and as JSON.
+
+The last line says what a person does next with what was really made.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from encoded_objects.base import output
-from generator.command.next_step import next_step
-from generator.command.promise_report import face_values, promise_lines
 from generator.database.open import without_password
+from generator.layout.recognition_rate import LOW, NOT_READABLE, RecognitionRate
 from generator.pipeline import Encoded, MadeObject
 from generator.pipeline.faces import FaceReport
+
+NAMED_KINDS = 3  #: kinds of faces that are named one by one
 
 
 def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
@@ -80,7 +84,7 @@ def _object_text(made: MadeObject, dry_run: bool) -> str:
     if made.touches > 1:
         lines.append(f"  read by a scan: about {made.touches} touches (recognize-object --scan)")
     lines += _face_lines(made.face_reports)
-    lines += promise_lines(made.face_reports)
+    lines += rate_lines(made.face_reports)
     if made.fit is not None:
         lines.append(
             f"  panels put together: {made.fit.overlap_mm3:.3f} mm3 overlap, "
@@ -165,3 +169,129 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
         "dry_run": dry_run,
         "seconds": round(result.seconds, 3),
     }
+
+
+def rate_lines(faces: Sequence[FaceReport]) -> list[str]:
+    """Return a line on an object, and one on each kind of face that answers too little."""
+    promised = [(face, face.promise) for face in faces if face.promise is not None]
+    if not promised:
+        return []
+    area = sum(face.area_mm2 for face, _ in promised)
+    share = sum(face.area_mm2 * promise.at_once for face, promise in promised) / area
+    later = [face.area_mm2 * promise.within_three for face, promise in promised
+             if promise.within_three is not None]  # fmt: skip
+    within = f", {_percent(sum(later) / area)} within three" if later else ""
+    lines = [f"  {_percent(share)} of touches are answered at once{within}"]
+    alike: dict[tuple[str, ...], list[FaceReport]] = {}
+    for face, promise in sorted(promised, key=lambda one: one[1].at_once):
+        if promise.at_once < LOW:
+            key = f"{min(face.size_mm):.3g}", _why(face, promise), promise.remedy
+            alike.setdefault(key, []).append(face)
+    lines += [_low_text(key[1], key[2], some) for key, some in list(alike.items())[:NAMED_KINDS]]
+    if rest := [face.name for some in list(alike.values())[NAMED_KINDS:] for face in some]:
+        lines.append(f"  fewer than half of the touches on {', '.join(rest)} too")
+    return lines
+
+
+def _why(face: FaceReport, promise: RecognitionRate) -> str:
+    """Return why a face answers less than half of its touches."""
+    if not face.symbols:
+        return "not readable: it is blank"
+    if promise.one_row:
+        return "not readable by single touches: one row of symbols"
+    return "not readable by single touches" if promise.at_once < NOT_READABLE else ""
+
+
+def _low_text(why: str, remedy: str, faces: Sequence[FaceReport]) -> str:
+    """Return what is said of faces as narrow as the first of them."""
+    promises = [face.promise for face in faces if face.promise is not None]
+    shares = [promise.at_once for promise in promises]
+    share = f"{_range(shares)} of touches are answered at once"
+    later = [one.within_three for one in promises if one.within_three is not None]
+    share += f", {_range(later)} within three" if later else ""
+    others = f" (and {', '.join(f.name for f in faces[1:])}, as narrow)" if faces[1:] else ""
+    said = why if not max(shares) else f"{why}; {share}" if why else share
+    help_ = f"; would help: {remedy}" if remedy else ""
+    return f"  {faces[0].name}, {faces[0].place}{others}: {said}{help_}"
+
+
+def face_values(face: FaceReport) -> dict[str, Any]:
+    """Return what is known of a face as plain values."""
+    values = asdict(face)
+    if face.promise is not None:
+        values["promise"] = {
+            "at_once": face.promise.at_once,
+            "within_three": face.promise.within_three,
+            "one_row": face.promise.one_row,
+            "remedy": face.promise.remedy,
+        }
+    return values
+
+
+def _range(shares: Sequence[float]) -> str:
+    low, high = _percent(min(shares)), _percent(max(shares))
+    return high if low == high else f"{low} to {high}"
+
+
+def _percent(share: float) -> str:
+    """Return a share in per cent, never as all or none where it is not."""
+    if 0 < share < 0.01:
+        return "under 1 %"
+    return "over 99 %" if 0.99 < share < 1 else f"{share:.0%}".replace("%", " %")
+
+
+def next_step(result: Encoded) -> str:
+    """Return what to open, print and put together; empty where nothing was written."""
+    if result.set_files:
+        return _of_set(result)
+    steps: list[str] = []
+    for made in result.objects:
+        steps += _of_object(made)
+    return f"next: {', then '.join(steps)}" if steps else ""
+
+
+def _of_set(result: Encoded) -> str:
+    files = result.set_files
+    plates = [file for file in files if file.suffix == ".3mf"]
+    plain = [file for file in plates if not file.stem.endswith("-prusaslicer")]
+    sheet = next((file for file in files if file.name.endswith("-build.html")), None)
+    steps = []
+    if plain:
+        first = plain[0].name if len(plain) == 1 else f"{plain[0].name} ... {plain[-1].name}"
+        lies = "as it lies" if len(plain) == 1 else "as they lie"
+        if all(made.lying is None for made in result.objects):
+            lies += ", backs down, symbols up, no supports, 100 % scale"
+        where = f"{first} in {plain[0].parent} ({_twin_name(plain[0])} in PrusaSlicer)"
+        steps.append(f"print {where} {lies}")
+    if sheet:
+        steps.append(f"put the objects together by {sheet}")
+    elif not steps:
+        return ""
+    whole = [made for made in result.objects if made.lying is not None]
+    if whole:
+        steps.append("; ".join(f"{made.name}: {made.lying}" for made in whole))
+    return "next: " + ", then ".join(steps)
+
+
+def _of_object(made: MadeObject) -> list[str]:
+    """Return the steps for one object alone."""
+    sheet = next((file for file in made.files if file.name.endswith("-build.html")), None)
+    steps = [f"open {sheet}"] if sheet else []
+    printable = [f for suffix in (".3mf", ".stl") for f in made.files if f.suffix == suffix]
+    plates = [f for f in printable if f.suffix == ".3mf" and "-prusaslicer" not in f.stem]
+    if not printable:
+        return steps
+    chosen = plates or printable[:1]
+    name = str(chosen[0]) if len(chosen) == 1 else f"{chosen[0]} ... {chosen[-1].name}"
+    twin = chosen[0].with_name(_twin_name(chosen[0]))
+    if twin in made.files:
+        name += f" (in PrusaSlicer {twin.name})"
+    if made.lying is None:
+        steps.append(f"print {name} as it lies, backs down, symbols up, no supports, 100 % scale")
+        return steps
+    steps.append(f"print {name} as it lies, {made.lying}, 100 % scale")
+    return steps
+
+
+def _twin_name(plate: Path) -> str:
+    return f"{plate.stem}-prusaslicer.3mf"

@@ -1,6 +1,7 @@
-"""The array of a run: the lab's own of the profile, and for `auto` the one that the objects need.
+"""The lab that objects are made in, and the array of a run.
 
-Of arrays with the same symbols the smallest is taken in which the objects fit beside what the
+The array is the lab's own of the profile, and for `auto` the one that the objects need. Of arrays
+with the same symbols the smallest is taken in which the objects fit together with what the
 database holds, an empty one with room for more of them: `large`, and its next sizes. Objects that
 are registered keep the array they are on and their pitch, and a lab goes on with the arrays that
 it has: what it made objects on under a profile's name is what that profile means. The finer
@@ -17,40 +18,83 @@ from typing import Any
 from sqlalchemy import Connection
 
 from generator.array.contract import SymbolArray
+from generator.array.lab_key import draw_lab_key, read_lab_key
 from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, next_larger
 from generator.database.cells import occupancy
-from generator.database.lab import MOST_FILLED, LabArrays
+from generator.database.lab import MOST_FILLED, LabArrays, lab_arrays, require_lab_key
 from generator.database.read import find_object, read_array
 from generator.database.registered import RegisteredArray
 from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
 from generator.pipeline.place import NO_CELLS, lay_out_object
-from generator.pipeline.plan import ObjectPlan, plan_object
-from generator.pipeline.settings import CHOICE
+from generator.pipeline.plan import ObjectPlan, plan_objects
 from generator.polyhedron import Polyhedron
-from generator.spec import LocatedSpec, error_at
-from generator.spec.profile import AUTO, SMALLEST
-from generator.spec.script import with_profile
+from generator.spec import ObjectSpec
+from generator.spec.problem import error_location
+from generator.spec.read import with_profile
+from generator.spec.resolved import AUTO, SMALLEST
+
+LARGER = 4  # sizes tried beyond `large`
+FINER_SHARES = (0.9, 0.8)
+"""Pitches tried where faces stay blank, over that which the sensor proposes: 4.5 and 4 mm."""
+FIRST = 0.5  # of an array's room that its first objects may fill
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
-    """The specs with their array, and what the person should know about it."""
+class ArrayChoice:
+    """The objects on their array."""
 
-    specs: tuple[LocatedSpec, ...]
-    notes: tuple[str, ...] = ()
+    plans: tuple[ObjectPlan, ...]
+    notes: tuple[str, ...] = ()  #: what the person should know about the choice
     alone: tuple[Layout, ...] = ()  #: of each, on the empty array; () where none was needed
+
+    @property
+    def noted_plans(self) -> tuple[ObjectPlan, ...]:
+        """The plans, of which the first has the notes."""
+        first, *others = self.plans
+        return (replace(first, notes=(*first.notes, *self.notes)), *others)
+
+
+def lab_of(
+    specs: Sequence[ObjectSpec], connection: Connection | None, lab_key: str = ""
+) -> LabArrays:
+    """Return key and arrays of the lab in which specs are made.
+
+    Parameters
+    ----------
+    specs
+        Of one run; they agree on a key, or say none.
+    connection
+        Of a transaction on the lab's database; None where there is none yet, and a key that
+        nobody asked for is drawn.
+    lab_key
+        In place of the specs' own.
+
+    Raises
+    ------
+    GeneratorError
+        The key is misspelt, or the database has another one.
+    """
+    wanted = read_lab_key(lab_key) if lab_key else specs[0].lab_key
+    if connection is None:
+        return LabArrays(wanted or draw_lab_key(), {})
+    if lab_key:
+        require_lab_key(connection, wanted)
+    elif wanted:
+        with error_location(specs[0].source, "output.lab_key"):
+            require_lab_key(connection, wanted)
+    return lab_arrays(connection)
 
 
 def choose_array(
-    specs: Sequence[LocatedSpec],
+    specs: Sequence[ObjectSpec],
     lab: LabArrays,
     connection: Connection | None,
     solid: Polyhedron | None = None,
     *,
     replace_changed: bool = False,
-) -> Choice:
-    """Return the specs on the array that they are made on, with a profile in place of `auto`.
+) -> ArrayChoice:
+    """Return the plans of objects on the array that they are made on.
 
     Parameters
     ----------
@@ -63,7 +107,7 @@ def choose_array(
     solid
         Shape of the one object, where it does not come from its spec.
     replace_changed
-        Objects of another lab may be made anew, on an array of this one.
+        Objects of another lab may be made again, on an array of this one.
 
     Raises
     ------
@@ -71,41 +115,44 @@ def choose_array(
         No array is large enough, or an object cannot be made at all.
     """
     other = None if replace_changed else _array_of_another_lab(specs, lab, connection)
-    named = [one.spec for one in specs if one.spec.profile != AUTO]
+    named = [one for one in specs if one.profile != AUTO]
     if named:  # on the same array, or the specs would have been refused
         profile = named[0].profile
         if profile not in PROFILES or not PROFILES[profile].keyed:
-            published = named[0].encoding, ""
-            return Choice(tuple(_follow(one, profile, *published) for one in specs))
-        made = (other.definition, other.lab_key) if other else _made_on(PROFILES[profile], lab)
-        return Choice(tuple(_follow(one, profile, *made) for one in specs))
+            made: tuple[Mapping[str, Any], str] = named[0].encoding, ""
+        elif other:
+            made = other.definition, other.lab_key
+        else:
+            made = lab.of_profile(PROFILES[profile]).definition(), lab.key_of(PROFILES[profile])
+        return ArrayChoice(plan_objects([_follow(one, profile, *made) for one in specs], solid))
     pitches = _registered_pitches(specs, connection)
     kept = other or _array_kept(specs, lab, connection)
     if kept is not None:
         made = kept.definition, kept.lab_key
-        new = next(iter(pitches.values()), None)  # as those that stand beside it
-        return Choice(
-            tuple(
-                _with_array(one, kept.profile, *made, pitches.get(one.spec.name, new))
-                for one in specs
-            )
-        )
+        new = next(iter(pitches.values()), None)  # of new objects: that of those registered
+        found = [
+            with_profile(one, kept.profile, AUTO, *made, pitches.get(one.name, new))
+            for one in specs
+        ]
+        return ArrayChoice(plan_objects(found, solid))
     short: list[str] = []  # why each smaller array does not do
     for candidate in _candidates():
         array = lab.of_profile(candidate)
         made = array.definition(), lab.key_of(candidate)
-        tried = tuple(_with_array(one, candidate.name, *made) for one in specs)
-        needed, blank, alone = _count_needs(tried, solid)
+        plans = plan_objects(
+            [with_profile(one, candidate.name, AUTO, *made) for one in specs], solid
+        )
+        alone = _layouts(plans)
         room = _room(array, connection)
         size = f"{candidate.name} {array.rows}x{array.columns}"
-        if needed is None:
+        if alone is None:
             short.append(f"one object alone does not fit into {size}")
-        elif needed > room:
+        elif (needed := _cells(alone)) > room:
             short.append(f"{needed} cells are needed, and {size} has room for {room}")
         else:
             notes = (_larger_note(candidate, array, short[-1]),) if short else ()
-            found = Choice(tried, notes, alone)
-            return _choose_finer(found, blank, room, solid) if blank else found
+            choice = ArrayChoice(plans, notes, alone)
+            return _choose_finer(choice, room, solid) if _blank(plans, alone) else choice
     raise LayoutError(
         f"the objects fit no array that is made here: {short[-1]}",
         fix="make them in several databases",
@@ -120,20 +167,23 @@ def _larger_note(chosen: Profile, array: SymbolArray, why: str) -> str:
     return f"profile {chosen.name} is taken ({window}): {why}"
 
 
-def _choose_finer(coarse: Choice, blank: int, room: int, solid: Polyhedron | None) -> Choice:
+def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> ArrayChoice:
     """Take finer symbols on the same array where they show faces that stay blank otherwise."""
-    found, left = coarse, blank
-    for share in CHOICE.finer_shares:
-        pitch = _share_mm(share, coarse.specs[0])
+    blank = left = _blank(coarse.plans, coarse.alone)
+    found, specs = coarse, [plan.spec for plan in coarse.plans]
+    for share in FINER_SHARES:
         try:
-            finer = tuple(_with_pitch(one, _share_mm(share, one)) for one in coarse.specs)
-            needed, now, alone = _count_needs(finer, solid)
+            plans = plan_objects([_at_pitch(one, _share_mm(share, one)) for one in specs], solid)
+            alone = _layouts(plans)
         except GeneratorError:  # the printer cannot make them
             break
-        if needed is not None and now < left and needed <= room:
+        if alone is None or _cells(alone) > room:
+            continue
+        if (now := _blank(plans, alone)) < left:
             faces = f"{blank - now} of the {blank} faces that coarser symbols leave blank"
+            pitch = _share_mm(share, specs[0])
             note = f"pitch {pitch:g} mm is taken: it shows places on {faces}"
-            found, left = Choice(finer, (*coarse.notes, note), alone), now
+            found, left = ArrayChoice(plans, (*coarse.notes, note), alone), now
     return found
 
 
@@ -141,7 +191,7 @@ def _candidates() -> Iterator[Profile]:
     """Yield the arrays from the smallest on."""
     larger = PROFILES[SMALLEST]
     yield larger
-    for _ in range(CHOICE.larger):
+    for _ in range(LARGER):
         try:
             larger = next_larger(larger)
         except ArrayError:
@@ -150,19 +200,14 @@ def _candidates() -> Iterator[Profile]:
         yield replace(larger, name=f"large-{rows}x{columns}")
 
 
-def _made_on(profile: Profile, lab: LabArrays) -> tuple[Mapping[str, Any], str]:
-    """Return the definition of the lab's array of a profile, and the key it was made from."""
-    return lab.of_profile(profile).definition(), lab.key_of(profile)
-
-
 def _array_of_another_lab(
-    specs: Sequence[LocatedSpec], lab: LabArrays, connection: Connection | None
+    specs: Sequence[ObjectSpec], lab: LabArrays, connection: Connection | None
 ) -> RegisteredArray | None:
     """Return the one array of another lab that all objects are registered on, with its profile."""
     numbers = set()
     for one in specs:
-        known = None if connection is None else find_object(connection, one.spec.name)
-        if known is None or one.spec.profile not in (AUTO, known.profile):
+        known = None if connection is None else find_object(connection, one.name)
+        if known is None or one.profile not in (AUTO, known.profile):
             return None
         numbers.add(known.array_id)
     if connection is None or len(numbers) != 1:
@@ -173,23 +218,23 @@ def _array_of_another_lab(
 
 
 def _registered_pitches(
-    specs: Sequence[LocatedSpec], connection: Connection | None
+    specs: Sequence[ObjectSpec], connection: Connection | None
 ) -> dict[str, float]:
     """Return the pitch of each object that is registered already, mm."""
     if connection is None:
         return {}
-    entries = (find_object(connection, one.spec.name) for one in specs)
+    entries = (find_object(connection, one.name) for one in specs)
     return {entry.name: entry.pitch_mm for entry in entries if entry is not None}
 
 
 def _array_kept(
-    specs: Sequence[LocatedSpec], lab: LabArrays, connection: Connection | None
+    specs: Sequence[ObjectSpec], lab: LabArrays, connection: Connection | None
 ) -> RegisteredArray | None:
     """Return the array of the lab's own that one of the objects is registered on."""
     if connection is None:
         return None
     for one in specs:
-        known = find_object(connection, one.spec.name)
+        known = find_object(connection, one.name)
         kept = lab.made.get(known.profile) if known else None
         if kept is not None and _of_candidate(kept.profile):
             return kept
@@ -201,66 +246,49 @@ def _of_candidate(profile: str) -> bool:
     return profile in (DEFAULT_PROFILE, "fine") or profile.partition("-")[0] == SMALLEST
 
 
-def _with_array(
-    located: LocatedSpec,
-    profile: str,
-    encoding: Mapping[str, Any],
-    array_key: str,
-    pitch_mm: float | None = None,
-) -> LocatedSpec:
-    """Return a spec of `auto` on an array; at a pitch, if its own is to be chosen."""
-    return with_profile(located, profile, AUTO, encoding, array_key, pitch_mm)
-
-
-def _share_mm(share: float, located: LocatedSpec) -> float:
+def _share_mm(share: float, spec: ObjectSpec) -> float:
     """Return a share of the pitch that the sensor of an object proposes, mm."""
-    return round(share * located.spec.sensor.symbol_pitch_mm, 2)
+    return round(share * spec.sensor.symbol_pitch_mm, 2)
 
 
-def _with_pitch(located: LocatedSpec, pitch_mm: float) -> LocatedSpec:
-    spec = located.spec
-    return _with_array(located, spec.profile, spec.encoding, spec.array_key, pitch_mm)
+def _at_pitch(spec: ObjectSpec, pitch_mm: float) -> ObjectSpec:
+    return with_profile(spec, spec.profile, AUTO, spec.encoding, spec.array_key, pitch_mm)
 
 
 def _follow(
-    located: LocatedSpec, profile: str, encoding: Mapping[str, Any], array_key: str
-) -> LocatedSpec:
+    spec: ObjectSpec, profile: str, encoding: Mapping[str, Any], array_key: str
+) -> ObjectSpec:
     """Return a spec on an array; with the profile of another one, if its own is to be chosen."""
-    if located.spec.profile != AUTO:
-        spec = replace(located.spec, encoding=encoding, array_key=array_key)
-        return replace(located, spec=spec)
+    if spec.profile != AUTO:
+        return replace(spec, encoding=encoding, array_key=array_key)
     defaults = profile if profile in PROFILES else AUTO
-    return with_profile(located, profile, defaults, encoding, array_key)
+    return with_profile(spec, profile, defaults, encoding, array_key)
 
 
-def _count_needs(
-    specs: Sequence[LocatedSpec], solid: Polyhedron | None
-) -> tuple[int | None, int, tuple[Layout, ...]]:
-    """Return how many cells the objects need, None if one does not fit, and their blank faces.
-
-    With the layout of each, on the empty array.
-    """
-    known: dict[str, tuple[int, int, Layout]] = {}
-    found = []
-    for one in specs:
-        key = repr(one.spec.meaning)
+def _layouts(plans: Sequence[ObjectPlan]) -> tuple[Layout, ...] | None:
+    """Return the layout of each object on the empty array; None if one does not fit."""
+    known: dict[str, Layout] = {}
+    for plan in plans:
+        key = repr(plan.spec.meaning)
         if key not in known:
-            plan = plan_object(one, solid)
             try:
-                layout = lay_out_object(plan, NO_CELLS)
+                known[key] = lay_out_object(plan, NO_CELLS)
             except LayoutError as error:
-                if "is full" not in error.cause:
-                    raise error_at(one, error, "shape") from error
-                return None, 0, ()
-            known[key] = (*_counts(plan, layout), layout)
-        found.append(known[key])
-    cells, blank, layouts = zip(*found, strict=True)
-    return sum(cells), sum(blank), layouts
+                if "is full" in error.cause:
+                    return None
+                with error_location(plan.spec.source, "shape"):
+                    raise
+    return tuple(known[repr(plan.spec.meaning)] for plan in plans)
 
 
-def _counts(plan: ObjectPlan, layout: Layout) -> tuple[int, int]:
-    cells = sum(len(face.labels) for face in layout.faces)
-    return cells, len(set(layout.blank_faces) - plan.blank_faces)
+def _cells(layouts: Sequence[Layout]) -> int:
+    return sum(len(face.labels) for layout in layouts for face in layout.faces)
+
+
+def _blank(plans: Sequence[ObjectPlan], layouts: Sequence[Layout]) -> int:
+    """Return how many faces could carry symbols and show none."""
+    pairs = zip(plans, layouts, strict=True)
+    return sum(len(set(layout.blank_faces) - plan.blank_faces) for plan, layout in pairs)
 
 
 def _room(array: SymbolArray, connection: Connection | None) -> int:
@@ -270,4 +298,4 @@ def _room(array: SymbolArray, connection: Connection | None) -> int:
     """
     taken = 0 if connection is None else occupancy(connection, array).used
     room = max(0, int(MOST_FILLED * array.rows * array.columns) - taken)
-    return room if taken else int(CHOICE.first * room)
+    return room if taken else int(FIRST * room)

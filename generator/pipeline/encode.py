@@ -9,10 +9,9 @@ finds the cells in the database and makes the same bytes again.
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -22,27 +21,25 @@ from generator.database.cells import occupancy
 from generator.database.lab import lab_key as stored_lab_key
 from generator.database.open import open_database, open_if_there
 from generator.database.transaction import read_transaction
-from generator.layout.placement import Layout
-from generator.pipeline.choose import Choice, choose_array
+from generator.pipeline.choose import ArrayChoice, choose_array, lab_of
 from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
-from generator.pipeline.lab import lab_of
 from generator.pipeline.made import Encoded, MadeObject, describe_object
-from generator.pipeline.make import Order, Rehearsal, make_under_lock
+from generator.pipeline.make import MakeJob, make_under_lock
 from generator.pipeline.place import (
-    ObjectPlacement,
+    PlacedObject,
     occupancy_of,
     occupancy_with,
     place_object,
 )
-from generator.pipeline.plan import ObjectPlan, plan_object
+from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.polyhedron import Polyhedron
-from generator.spec import LocatedSpec
+from generator.spec import ObjectSpec
 
 
 def encode(
-    specs: Sequence[LocatedSpec],
+    specs: Sequence[ObjectSpec],
     *,
     folder: Path | None = None,
     formats: Sequence[str] | None = None,
@@ -94,40 +91,32 @@ def encode(
         See `generator.errors`. Objects before the one at fault stay made.
     """
     began = time.perf_counter()
-    url = database or specs[0].spec.database
-
-    def plan_all(choice: Choice) -> list[ObjectPlan]:
-        plans = []
-        for number, located in enumerate(choice.specs):
-            progress(f"planning {located.spec.name}", 0.1 * number / len(specs))
-            plan = plan_object(located)
-            notes = choice.notes if number == 0 else ()
-            plans.append(dataclasses.replace(plan, notes=(*plan.notes, *notes)))
-        return plans
-
-    engine, plans, rehearsal = plan_in_lab(
-        specs, url, plan_all, lab_key=lab_key, make=not dry_run, replace_changed=replace
+    url = database or specs[0].database
+    progress("planning", 0.0)
+    engine, plans, dry_build = plan_in_lab(
+        specs, url, lab_key=lab_key, make=not dry_run, replace_changed=replace
     )
     rest = part_of_progress(progress, 0.1, 1.0)
     files: tuple[Path, ...] = ()
     if engine is None or dry_run:
         with read_transaction(engine) if engine else nullcontext() as connection:
-            made, used = _rehearse(connection, plans, replace, rest)
+            made, used = _dry_run(connection, plans, replace, rest)
     else:
-        orders = [
-            Order(
-                plan, _folder(plan, folder, len(plans)), _formats(plan, formats), verify, replace,
-                slice_plates and len(plans) == 1, rehearsal,
+        to_make = [
+            MakeJob(
+                plan, _folder(plan, folder, len(plans)),
+                plan.spec.formats if formats is None else tuple(formats),
+                verify, replace, slice_plates and len(plans) == 1,
             )
             for plan in plans
         ]  # fmt: skip
-        if len(orders) == 1:
-            made = [make_under_lock(engine, orders[0], rest).made]
+        if len(to_make) == 1:
+            made = [make_under_lock(engine, to_make[0], rest, dry_build)]
         else:
             from generator.pipeline.sets import make_set, set_folder  # loads what sets alone need
 
             made, files = make_set(
-                engine, url, orders, set_folder(orders, folder), jobs, rest,
+                engine, url, to_make, set_folder(to_make, folder), jobs, rest,
                 slice_plates=slice_plates,
             )  # fmt: skip
         with read_transaction(engine) as connection:
@@ -138,21 +127,18 @@ def encode(
 
 
 def plan_in_lab(
-    specs: Sequence[LocatedSpec],
+    specs: Sequence[ObjectSpec],
     url: str,
-    plan_all: Callable[[Choice], list[ObjectPlan]],
     *,
-    lab_key: str,
+    lab_key: str = "",
     make: bool,
     replace_changed: bool,
     solid: Polyhedron | None = None,
-) -> tuple[Engine | None, list[ObjectPlan], Rehearsal | None]:
-    """Return a lab's database, the plans of objects on its array, and how one was rehearsed.
+) -> tuple[Engine | None, tuple[ObjectPlan, ...], PlacedObject | None]:
+    """Return a lab's database, the plans of objects on its array, and a dry build of one object.
 
     Parameters
     ----------
-    plan_all
-        The plans of specs whose array is chosen.
     lab_key
         See `encode`.
     make
@@ -166,68 +152,66 @@ def plan_in_lab(
         with read_transaction(engine) if engine else nullcontext() as connection:
             lab = lab_of(specs, connection, lab_key)
             choice = choose_array(specs, lab, connection, solid, replace_changed=replace_changed)
-        plans = plan_all(choice)
         if engine is not None or not make:
-            return engine, plans, None
-        rehearsal = _rehearse_first(plans, choice.alone)
+            return engine, choice.noted_plans, None
+        dry_build = _dry_build(choice)
         engine = open_database(url, lab_key=lab.key)
         with read_transaction(engine) as connection:
             if stored_lab_key(connection) == lab.key:
-                return engine, plans, rehearsal
+                return engine, choice.noted_plans, dry_build
 
 
-def _rehearse_first(plans: Sequence[ObjectPlan], alone: Sequence[Layout]) -> Rehearsal | None:
-    """Lay out and build one of each kind, so that what is refused leaves no empty database.
+def _dry_build(choice: ArrayChoice) -> PlacedObject | None:
+    """Lay out and build one object of each kind, so that a refusal leaves no empty database.
 
-    Where they fill more than half of the array, places are found for all. What was built of a
-    single object is returned. `alone`: their layouts, where the choice of the array needed them.
+    Where they fill more than half of the array, places are found for all. A single object is
+    returned with its parts.
     """
     kinds: dict[str, int] = {}
     needed = 0
+    plans = choice.plans
     for number, plan in enumerate(plans):
         kind = json.dumps(plan.meaning, sort_keys=True, default=str)
         if kind not in kinds:
-            if alone:
-                place = ObjectPlacement(alone[number], taken=0, reused=False, replaces=False)
+            if choice.alone:
+                layout = choice.alone[number]
             else:
-                place = place_object(None, plan, replace=False)
-            rehearsal = Rehearsal(place, parts_of(plan, place.layout))
-            kinds[kind] = sum(len(face.labels) for face in place.layout.faces)
+                layout = place_object(None, plan, replace=False).layout
+            built = parts_of(plan, layout)
+            kinds[kind] = sum(len(face.labels) for face in layout.faces)
         needed += kinds[kind]
     if 2 * needed > plans[0].array.rows * plans[0].array.columns:
         taken = occupancy_of(None, plans[0])
         for plan in plans:
             taken = occupancy_with(taken, place_object(None, plan, False, taken).layout)
-    return rehearsal if len(plans) == 1 else None
+    if len(plans) > 1:
+        return None
+    return PlacedObject(layout, taken=0, reused=False, replaces=False, built=built)
 
 
-def _rehearse(
+def _dry_run(
     connection: Connection | None, plans: Sequence[ObjectPlan], replace: bool, progress: Progress
 ) -> tuple[list[MadeObject], int]:
-    """Return what `encode` would make, each object beside the ones before it, and cells used."""
+    """Return what `encode` would make, each object after the ones before it, and cells used."""
     made: list[MadeObject] = []
     taken = occupancy_of(connection, plans[0])
     used = 0
     for number, plan in enumerate(plans):
         step = part_of_progress(progress, number / len(plans), (number + 1) / len(plans))
         step(f"placing {plan.spec.name}", 0.0)
-        place = place_object(connection, plan, replace, taken)
+        placed = place_object(connection, plan, replace, taken)
         step(f"building {plan.spec.name}", 0.5)
-        parts, warnings = parts_of(plan, place.layout)
-        faces = face_reports(plan, place.layout, smallest=True)
+        parts, warnings = parts_of(plan, placed.layout)
+        faces = face_reports(plan, placed.layout, smallest=True)
         made.append(
             describe_object(
-                plan, place.layout, len(parts), warnings, (), faces, reused=place.reused
+                plan, placed.layout, len(parts), warnings, (), faces, reused=placed.reused
             )
         )
-        if not place.reused:
-            taken = occupancy_with(taken, place.layout)
-        used = place.taken + made[-1].symbols
+        if not placed.reused:
+            taken = occupancy_with(taken, placed.layout)
+        used = placed.taken + made[-1].symbols
     return made, used
-
-
-def _formats(plan: ObjectPlan, formats: Sequence[str] | None) -> tuple[str, ...]:
-    return tuple(formats) if formats is not None else plan.spec.formats
 
 
 def _folder(plan: ObjectPlan, folder: Path | None, objects: int) -> Path:

@@ -13,6 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from generator.database.registered import RegisteredPart
 from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.atomic import Staging
@@ -20,13 +23,12 @@ from generator.export.formats import EXPORTERS, ExportedObject, stage_formats
 from generator.export.preview import preview_png
 from generator.export.threemf import SlicerSettings, slicer_settings
 from generator.layout.placement import Layout, object_code
-from generator.pipeline.blame import errors_at
 from generator.pipeline.faces import FaceReport, face_reports
+from generator.pipeline.place import BuiltParts
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.pipeline.sheet import SheetPlate, build_sheet
-from generator.pipeline.size import outer_size_mm
-from generator.polyhedron import face_polygon
+from generator.polyhedron import Polyhedron, face_polygon
 from generator.solid import (
     Part,
     emboss_whole,
@@ -34,11 +36,10 @@ from generator.solid import (
     prove_closed,
     triangles,
 )
+from generator.spec.problem import error_location
 
 if TYPE_CHECKING:
     from generator.export.check import FitReport
-
-BuiltParts = tuple[tuple[Part, ...], tuple[str, ...]]  #: of `parts_of`: the parts, what they lack
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ class StagedObject:
     registered: tuple[RegisteredPart, ...]
     parts: int
     warnings: tuple[str, ...]
-    faces: tuple[FaceReport, ...]  #: what they show and promise
+    faces: tuple[FaceReport, ...]
     fit: FitReport | None = None  #: of panels that were verified as STL
 
 
@@ -96,7 +97,7 @@ def stage(
     )  # fmt: skip
     for_robots = any(EXPORTERS[name].robot for name in formats)
     if for_robots:
-        with errors_at(plan.located, "robot.collision, robot"):
+        with error_location(plan.spec.source, "robot.collision, robot"):
             _ = exported.robot
     staged = stage_formats(exported, formats, staging, verify=verify, progress=progress)
     registered = tuple(
@@ -162,7 +163,7 @@ def parts_of(plan: ObjectPlan, layout: Layout) -> BuiltParts:
     spec = plan.spec
     if spec.parts == "whole":
         return (emboss_whole(plan.polyhedron, layout, plan.outlines, spec.name),), ()
-    with errors_at(plan.located, "print.wall, print, shape"):
+    with error_location(plan.spec.source, "print.wall, print, shape"):
         made = panels(
             plan.polyhedron,
             layout,
@@ -189,3 +190,28 @@ def _array_picture(plan: ObjectPlan, layout: Layout) -> str:
     array = plan.array
     title = f"{plan.spec.name} on the array {array.rows} x {array.columns}"
     return array_svg(title, array.rows, array.columns, layout.pitch_mm, faces, plan.outlines)
+
+
+def outer_size_mm(polyhedron: Polyhedron, parts: Sequence[Part]) -> NDArray[np.float64]:
+    """Return the lengths of the box (3,) mm.
+
+    The facets that stand for a round face leave it by their chord error (a can of 60 mm measures
+    59.96 mm between their corners); where it goes all around, its circles count in their place.
+    """
+    closed = {face.name: (part, face) for part in parts for face in part.analytic if face.closed}
+    kept = np.ones(len(polyhedron.vertices), bool)
+    points = []
+    for surface in polyhedron.surfaces:
+        found = closed.get(polyhedron.faces[surface.carrier].name)
+        if found is None:
+            continue
+        part, face = found
+        for facet in surface.facets:
+            kept[[v for loop in polyhedron.faces[facet].loops for v in loop]] = False
+        T = part.T_object_part @ face.T_part_axis
+        axis = T[:3, 2]
+        across = np.sqrt(np.maximum(0.0, 1.0 - axis**2))  # of a circle of radius 1, along x, y, z
+        for rim in (face.low, face.high):
+            centre = T[:3, 3] + rim.height_mm * axis
+            points += [centre - rim.radius_mm * across, centre + rim.radius_mm * across]
+    return np.asarray(np.ptp([*polyhedron.vertices[kept], *points], axis=0))

@@ -2,8 +2,8 @@
 
 Either under the lock of the database from beginning to end (`make_under_lock`), or with a
 place chosen before, so that several processes build at once and only the rows wait for
-their turn (`make_at`). Whoever chose cells that another writer took meanwhile makes his
-object again under the lock.
+their turn (`make_at`). Where another writer took the chosen cells meanwhile, the object is made
+again under the lock.
 """
 
 from __future__ import annotations
@@ -20,23 +20,15 @@ from generator.database.read import find_object
 from generator.database.register import ObjectRecord, register
 from generator.database.transaction import WriteConflictError, write_transaction
 from generator.export.atomic import Staging
-from generator.pipeline.files import BuiltParts, StagedObject, parts_of, stage
+from generator.pipeline.files import StagedObject, parts_of, stage
 from generator.pipeline.made import MadeObject, describe_object
-from generator.pipeline.place import ObjectPlacement, occupancy_of, place_object
+from generator.pipeline.place import PlacedObject, occupancy_of, place_object
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 
 
 @dataclass(frozen=True, slots=True)
-class Rehearsal:
-    """An object built before there was a database: alone on its array."""
-
-    place: ObjectPlacement
-    built: BuiltParts
-
-
-@dataclass(frozen=True, slots=True)
-class Order:
+class MakeJob:
     """One object to make: its plan and what is wanted of it."""
 
     plan: ObjectPlan
@@ -45,80 +37,71 @@ class Order:
     verify: bool = False
     replace: bool = False
     slice_plates: bool = False
-    rehearsal: Rehearsal | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Product:
-    """What became of an order."""
+def make_under_lock(
+    engine: Engine,
+    job: MakeJob,
+    progress: Progress = no_progress,
+    dry_build: PlacedObject | None = None,
+) -> MadeObject:
+    """Make one object; nobody else writes to the database meanwhile.
 
-    made: MadeObject
-    placed: ObjectPlacement
-
-
-def make_under_lock(engine: Engine, order: Order, progress: Progress = no_progress) -> Product:
-    """Make one object; nobody else writes to the database meanwhile."""
-    name = order.plan.spec.name
-    with Staging(order.folder) as staging:
+    `dry_build` is taken where the array is as empty as it was for the dry build.
+    """
+    plan, name = job.plan, job.plan.spec.name
+    with Staging(job.folder) as staging:
         with write_transaction(engine) as connection:
             progress(f"placing {name}", 0.0)
-            place = _place(connection, order)
-            files = _stage(order, place, staging, part_of_progress(progress, 0.1, 0.9))
+            if (
+                dry_build is not None
+                and find_object(connection, name) is None
+                and not occupancy_of(connection, plan).used
+            ):
+                placed = dry_build
+            else:
+                placed = place_object(connection, plan, job.replace)
+            staged = _stage(job, placed, staging, part_of_progress(progress, 0.1, 0.9))
             progress(f"registering {name}", 0.9)
-            _register(connection, order, place, files)
-        return _finish(order, place, files, staging)
+            _register(connection, plan, placed, staged)
+        return _commit(job, placed, staged, staging)
 
 
 def make_at(
-    engine: Engine, order: Order, place: ObjectPlacement, progress: Progress = no_progress
-) -> Product:
-    """Make one object at a place chosen before, or anew where that was lost to another writer."""
+    engine: Engine, job: MakeJob, placed: PlacedObject, progress: Progress = no_progress
+) -> MadeObject:
+    """Make one object at a place chosen before, or under the lock if another writer took it."""
     try:
-        with Staging(order.folder) as staging:
-            files = _stage(order, place, staging, part_of_progress(progress, 0.0, 0.9))
+        with Staging(job.folder) as staging:
+            staged = _stage(job, placed, staging, part_of_progress(progress, 0.0, 0.9))
             with write_transaction(engine) as connection:
-                known = find_object(connection, order.plan.spec.name)
-                if (known is not None) != (place.reused or place.replaces):
+                known = find_object(connection, job.plan.spec.name)
+                if (known is not None) != (placed.reused or placed.replaces):
                     raise WriteConflictError("an object of this name came or went meanwhile")
-                _register(connection, order, place, files)
-            return _finish(order, place, files, staging)
+                _register(connection, job.plan, placed, staged)
+            return _commit(job, placed, staged, staging)
     except WriteConflictError:
-        return make_under_lock(engine, order, progress)
-
-
-def _place(connection: Connection, order: Order) -> ObjectPlacement:
-    """Find the object's place: that of the rehearsal where the array is as empty as it was then."""
-    plan, rehearsal = order.plan, order.rehearsal
-    if rehearsal is not None:
-        known = find_object(connection, plan.spec.name)
-        if known is None and not occupancy_of(connection, plan).used:
-            return rehearsal.place
-    return place_object(connection, plan, order.replace)
+        return make_under_lock(engine, job, progress)
 
 
 def _stage(
-    order: Order, place: ObjectPlacement, staging: Staging, progress: Progress
+    job: MakeJob, placed: PlacedObject, staging: Staging, progress: Progress
 ) -> StagedObject:
     progress("building the parts", 0.0)
-    rehearsal = order.rehearsal
-    if rehearsal is not None and place is rehearsal.place:
-        built = rehearsal.built
-    else:
-        built = parts_of(order.plan, place.layout)
     return stage(
-        order.plan, place.layout, built, order.formats, staging, verify=order.verify,
-        slice_plates=order.slice_plates, progress=progress,
+        job.plan, placed.layout, placed.built or parts_of(job.plan, placed.layout), job.formats,
+        staging, verify=job.verify, slice_plates=job.slice_plates, progress=progress,
     )  # fmt: skip
 
 
 def _register(
-    connection: Connection, order: Order, place: ObjectPlacement, files: StagedObject
+    connection: Connection, plan: ObjectPlan, placed: PlacedObject, staged: StagedObject
 ) -> None:
-    plan, url = order.plan, connection.engine.url
+    url = connection.engine.url
     registration = ObjectRecord(
         name=plan.spec.name,
         polyhedron=plan.polyhedron,
-        layout=place.layout,
+        layout=placed.layout,
         array=plan.array,
         profile=plan.spec.profile,
         lab_key=plan.spec.array_key,
@@ -127,16 +110,18 @@ def _register(
         spec=plan.meaning,
         tool_version=version("encoded-objects"),
         parts=tuple(
-            dataclasses.replace(part, file=part_file(url, part.file)) for part in files.registered
+            dataclasses.replace(part, file=part_file(url, part.file)) for part in staged.registered
         ),
     )
-    register(connection, registration, replace=place.replaces)
+    register(connection, registration, replace=placed.replaces)
 
 
-def _finish(order: Order, place: ObjectPlacement, files: StagedObject, staging: Staging) -> Product:
-    written = tuple(w.path for w in staging.commit())
-    made = describe_object(
-        order.plan, place.layout, files.parts, files.warnings, written, files.faces,
-        reused=place.reused, fit=files.fit,
+def _commit(
+    job: MakeJob, placed: PlacedObject, staged: StagedObject, staging: Staging
+) -> MadeObject:
+    """Let the files appear under their final names."""
+    written = tuple(file.path for file in staging.commit())
+    return describe_object(
+        job.plan, placed.layout, staged.parts, staged.warnings, written, staged.faces,
+        reused=placed.reused, fit=staged.fit,
     )  # fmt: skip
-    return Product(made, place)

@@ -20,7 +20,8 @@ from sqlalchemy import Engine
 
 from generator.database.open import open_database
 from generator.pipeline.progress import Progress
-from generator.pipeline.settings import CHOICE
+
+FEW = 16  # fewer tasks are done in this process, where nobody asked for others
 
 Result = TypeVar("Result")
 
@@ -72,7 +73,7 @@ class Workers:
     """
 
     def __init__(self, jobs: int | None) -> None:
-        self._few = 2 if jobs else CHOICE.few
+        self._few = 2 if jobs else FEW
         self._jobs = jobs or len(os.sched_getaffinity(0))
         self._pool: ProcessPoolExecutor | None = None
 

@@ -1,6 +1,6 @@
 """An object's place on the array: its cells in the database, or free ones.
 
-Plan + cells of others -> ObjectPlacement. Thesis 6.3.
+Plan + cells of others -> PlacedObject. Thesis 6.3.
 """
 
 from __future__ import annotations
@@ -16,25 +16,29 @@ from generator.database.register import require_same_spec
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Cells, Occupancy
 from generator.layout.placement import Layout
-from generator.pipeline.blame import errors_at
 from generator.pipeline.plan import ObjectPlan
+from generator.solid import Part
+from generator.spec.problem import error_location
+
+BuiltParts = tuple[tuple[Part, ...], tuple[str, ...]]  #: the parts, and what they lack
 
 NO_CELLS = (np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 @dataclass(frozen=True, slots=True)
-class ObjectPlacement:
+class PlacedObject:
     """Where an object's symbols are, and what is around them."""
 
     layout: Layout
     taken: int  #: cells that other objects hold
     reused: bool  #: registered before, on these cells
     replaces: bool  #: registered before from another spec, which goes
+    built: BuiltParts | None = None  #: its parts, where a dry build made them
 
 
 def place_object(
     connection: Connection | None, plan: ObjectPlan, replace: bool, taken: Occupancy | None = None
-) -> ObjectPlacement:
+) -> PlacedObject:
     """Find the object's cells in the database, or choose free ones.
 
     Parameters
@@ -46,12 +50,12 @@ def place_object(
     replace
         Whether a changed spec may take the place of the registered one.
     taken
-        Of the array, where that is known already: by the database and by what comes beside it.
+        Of the array, where that is known already: by the database and by other objects of the run.
 
     Raises
     ------
     GeneratorError
-        The array is full, no place of the object can be told, or another spec is registered
+        The array is full, no place of the object can be identified, or another spec is registered
         under its name.
     """
     others = occupancy_of(connection, plan) if taken is None else taken
@@ -63,10 +67,10 @@ def place_object(
         if not replace or known.same_spec(plan.meaning):
             require_same_spec(connection, known, plan.meaning)
             layout = read_layout(connection, plan.spec.name)
-            return ObjectPlacement(layout, others.used, reused=True, replaces=False)
+            return PlacedObject(layout, others.used, reused=True, replaces=False)
         replaces = True
-    with errors_at(plan.located, "shape"):
-        return ObjectPlacement(
+    with error_location(plan.spec.source, "shape"):
+        return PlacedObject(
             lay_out_object(plan, others), others.used, reused=False, replaces=replaces
         )
 
@@ -79,7 +83,7 @@ def occupancy_of(connection: Connection | None, plan: ObjectPlan) -> Occupancy:
 
 
 def occupancy_with(taken: Occupancy, layout: Layout) -> Occupancy:
-    """Return what is taken together with a layout."""
+    """Return the taken cells together with those of a layout."""
     return taken.with_cells(
         np.concatenate([face.rows for face in layout.faces]),
         np.concatenate([face.columns for face in layout.faces]),
@@ -87,7 +91,7 @@ def occupancy_with(taken: Occupancy, layout: Layout) -> Occupancy:
 
 
 def lay_out_object(plan: ObjectPlan, others: Occupancy | Cells) -> Layout:
-    """Lay the object out; faces too small to be told stay blank, unless all are."""
+    """Lay the object out; faces that show no identifiable place stay blank, unless all do."""
 
     def attempt(allow_blank_faces: bool) -> Layout:
         return lay_out(

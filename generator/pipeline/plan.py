@@ -1,12 +1,16 @@
 """Spec -> what the stages need: polyhedron, array, outlines and clearances.
 
 Every error is given the line of the setting that causes it. Lengths in mm.
+
+A round face is no flat panel, so an object that has one is printed whole. Each round face is laid
+out on its development, under the number of its first facet; the other facets carry nothing.
+Cylinder and cone stand on their base when they are printed, so it stays blank.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,11 +21,10 @@ from generator.alphabet.known import Alphabet, alphabet_named
 from generator.alphabet.outline import Tiers, footprint_half_mm, outlines
 from generator.alphabet.printable import check_printable
 from generator.array import SymbolArray, array_from
-from generator.errors import ArrayError, SolidError
+from generator.errors import ArrayError, LayoutError, SolidError
 from generator.layout.layout import Clearances, Outlines
-from generator.pipeline.blame import errors_at
-from generator.pipeline.round import RoundFaces, as_one_part, reach_mm, round_faces
 from generator.polyhedron import Polyhedron, dihedral, face_polygon
+from generator.polyhedron.development import Development, development
 from generator.polyhedron.front import Loop, covered_parts
 from generator.polyhedron.round import ROUND_SHAPES
 from generator.polyhedron.shapes import SHAPES
@@ -29,33 +32,34 @@ from generator.printers import Printer
 from generator.solid.mitre import symbol_clearance_mm
 from generator.solid.part import edge_numbers
 from generator.solid.plate import cut_corners, plain_panels, top_insets_mm
-from generator.spec import LocatedSpec, ObjectSpec, ShapeSpec
+from generator.solid.wrap import bend_problem
+from generator.spec import ObjectSpec, ShapeSpec
+from generator.spec.problem import error_location
 
 LAYER_MM = 0.02  # by which a printed height may differ from the designed one, unsaid
+STANDING = ("cylinder", "cone")  #: shapes that are printed standing on F1
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectPlan:
     """One object, ready to be laid out and built."""
 
-    located: LocatedSpec
+    spec: ObjectSpec
     polyhedron: Polyhedron
     array: SymbolArray
     alphabet: Alphabet
     outlines: tuple[Tiers, ...]  #: one per label of the array
     footprint_half_mm: float  #: half side of the square that holds every symbol's foot
     clearances_mm: Clearances  #: [face][loop][edge], from the edge to the nearest foot
-    printer: Printer
-    developed: Outlines = field(
-        default_factory=dict
-    )  #: round faces by the facet that carries them, unrolled; faces less what is covered
+    #: round faces by the facet that carries them, unrolled; faces less what is covered
+    developed: Outlines = field(default_factory=dict)
     blank_faces: frozenset[int] = frozenset()  #: that carry no symbols of their own
     notes: tuple[str, ...] = ()  #: what was decided for the person who asked
 
     @property
-    def spec(self) -> ObjectSpec:
-        """The spec that this plan comes from."""
-        return self.located.spec
+    def printer(self) -> Printer:
+        """What prints it."""
+        return self.spec.printer
 
     @property
     def meaning(self) -> dict[str, Any]:
@@ -67,13 +71,37 @@ class ObjectPlan:
         return meaning
 
 
-def plan_object(located: LocatedSpec, solid: Polyhedron | None = None) -> ObjectPlan:
+@dataclass(frozen=True, slots=True)
+class RoundFaces:
+    """The round faces that carry symbols, and the faces that carry none."""
+
+    developments: Mapping[int, Development]  #: by the facet that carries them
+    blank: frozenset[int]
+    notes: tuple[str, ...]
+
+
+def plan_objects(
+    specs: Sequence[ObjectSpec], solid: Polyhedron | None = None
+) -> tuple[ObjectPlan, ...]:
+    """Return the plan of each object; copies share the work."""
+    known: dict[tuple[str, Path | None], ObjectPlan] = {}
+    plans = []
+    for spec in specs:
+        key = repr(spec.meaning), spec.shape.file
+        if key not in known:
+            known[key] = plan_object(spec, solid)
+        plan = known[key]
+        plans.append(replace(plan, spec=replace(spec, parts=plan.spec.parts)))
+    return tuple(plans)
+
+
+def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan:
     """Return the plan of one object.
 
     Parameters
     ----------
-    located
-        Its spec.
+    spec
+        What is asked for.
     solid
         Its shape, where it does not come from the spec.
 
@@ -83,51 +111,91 @@ def plan_object(located: LocatedSpec, solid: Polyhedron | None = None) -> Object
         The shape is not a solid, the array cannot be made, its symbols do not suit the
         alphabet, or the printer cannot make them: at the line that says so.
     """
-    spec = located.spec
-    printer = spec.printer
-    with errors_at(located, "shape"):
+    source, printer = spec.source, spec.printer
+    with error_location(source, "shape"):
         polyhedron = _polyhedron(spec.shape) if solid is None else solid
-    located = as_one_part(located, polyhedron)
-    spec = located.spec
-    with errors_at(located, "encoding, profile"):
+    spec = _as_one_part(spec, polyhedron)
+    with error_location(source, "encoding, profile"):
         array = array_from(spec.encoding)
-    with errors_at(located, "symbols.alphabet, encoding.alphabet, profile"):
+    with error_location(source, "symbols.alphabet, encoding.alphabet, profile"):
         alphabet = alphabet_named(spec.alphabet)
         _check_order(alphabet, array)
-    with errors_at(located, "symbols.pitch, symbols, profile"):
+    with error_location(source, "symbols.pitch, symbols, profile"):
         check_printable(alphabet, spec.style, printer)
         shapes = outlines(alphabet, spec.style)
         half = footprint_half_mm(alphabet, spec.style)
-    with errors_at(located, "shape"):
-        faces = round_faces(polyhedron, shapes, spec, printer)
-    plain = [k for k in range(len(polyhedron.faces)) if k not in faces.blank]
-    plain = [k for k in plain if k not in faces.developments]
-    covered = covered_parts(polyhedron, plain, reach_mm(spec, printer))
-    kept_free = {**covered, **_cut_corners(polyhedron, spec, printer, covered)}
-    clearances = _clearances(polyhedron, spec, printer, faces, kept_free)
+    reach = 2.0 * spec.style.height_mm + printer.gap_min_mm  # room for symbols of two faces
+    with error_location(source, "shape"):
+        faces = _round_faces(polyhedron, shapes, spec, reach)
+    plain = [
+        k
+        for k in range(len(polyhedron.faces))
+        if k not in faces.blank and k not in faces.developments
+    ]
+    covered = covered_parts(polyhedron, plain, reach)
+    kept_free = {**covered, **_cut_corners(polyhedron, spec, covered)}
     outlines_of = {k: (*face_polygon(polyhedron, k), *loops) for k, loops in kept_free.items()}
     outlines_of |= {number: (face.outline,) for number, face in faces.developments.items()}
     return ObjectPlan(
-        located,
+        spec,
         polyhedron,
         array,
         alphabet,
         shapes,
         half,
-        clearances,
-        printer,
+        _clearances(polyhedron, spec, faces, kept_free),
         outlines_of,
         faces.blank,
-        (
-            *faces.notes,
-            *_covered_note(polyhedron, covered, reach_mm(spec, printer)),
-            *_layer_note(spec),
-        ),
+        (*faces.notes, *_covered_note(polyhedron, covered, reach), *_layer_note(spec)),
     )
 
 
+def _as_one_part(spec: ObjectSpec, polyhedron: Polyhedron) -> ObjectSpec:
+    """Return the spec of an object with round faces as one that is printed whole."""
+    if not (polyhedron.surfaces or polyhedron.blank) or spec.parts == "whole":
+        return spec
+    asked = spec.source.value.get("print")
+    if isinstance(asked, dict) and asked.get("parts") == "panels":
+        with error_location(spec.source, "print.parts"):
+            raise SolidError(
+                "a round face cannot be printed as a flat panel", fix="set parts to whole"
+            )
+    return replace(spec, parts="whole")
+
+
+def _round_faces(
+    polyhedron: Polyhedron, tiers: tuple[Tiers, ...], spec: ObjectSpec, reach: float
+) -> RoundFaces:
+    """Unroll the round faces; one whose curvature the printer cannot follow stays blank."""
+    developments: dict[int, Development] = {}
+    blank = set(polyhedron.blank)
+    notes: list[str] = []
+    unrolled = [development(polyhedron, surface) for surface in polyhedron.surfaces]
+    problems = [bend_problem(each, tiers, spec.style, spec.printer) for each in unrolled]
+    bent = [s for s, problem in zip(polyhedron.surfaces, problems, strict=True) if not problem]
+    covered = covered_parts(polyhedron, [facet for s in bent for facet in s.facets], reach)
+    for surface, flat, problem in zip(polyhedron.surfaces, unrolled, problems, strict=True):
+        name = polyhedron.faces[surface.carrier].name
+        if not problem and not covered.keys().isdisjoint(surface.facets):
+            problem = f"another face is nearer than {reach:.2g} mm in front of it"
+        if problem:
+            notes.append(f"{surface.kind} {name} stays blank: {problem}")
+            blank |= set(surface.facets)
+        else:
+            developments[surface.carrier] = flat
+            blank |= set(surface.facets[1:])
+    if polyhedron.kind in STANDING:
+        blank.add(0)
+        notes.append(f"{polyhedron.faces[0].name} stays blank: the part is printed standing on it")
+    if len(blank - set(developments)) == len(polyhedron.faces):
+        why = "; ".join((*polyhedron.notes, *notes))
+        fix = "give it a planar face, or a cylinder or cone face between two circles"
+        raise LayoutError(f"no face of the object carries symbols: {why}", fix=fix)
+    return RoundFaces(developments, frozenset(blank), tuple(notes))
+
+
 def _layer_note(spec: ObjectSpec) -> tuple[str, ...]:
-    """Return what whole layers make of a wall and symbols that are none."""
+    """Return the note that wall or symbols are no whole layers, and print otherwise."""
     printer, height = spec.printer, spec.style.height_mm
     if not printer.nozzle_mm:
         return ()
@@ -174,17 +242,16 @@ def _check_order(alphabet: Alphabet, array: SymbolArray) -> None:
 def _cut_corners(
     polyhedron: Polyhedron,
     spec: ObjectSpec,
-    printer: Printer,
     covered: Mapping[int, tuple[Loop, ...]],
 ) -> dict[int, tuple[Loop, ...]]:
-    """Return what is cut off the tops of panels, with what other faces cover of the same ones."""
+    """Return what is cut off the tops of panels, and what other faces cover of these faces."""
     if spec.parts != "panels":
         return {}
     try:
-        plain = plain_panels(polyhedron, spec.wall_mm, printer, spec.gap_mm, spec.name)
+        plain = plain_panels(polyhedron, spec.wall_mm, spec.printer, spec.gap_mm, spec.name)
     except SolidError:
-        return {}  # told with its place when the parts are built
-    cut = cut_corners(polyhedron, plain, printer)
+        return {}  # the error is raised with its place when the parts are built
+    cut = cut_corners(polyhedron, plain, spec.printer)
     return {face: (*covered.get(face, ()), *loops) for face, loops in cut.items()}
 
 
@@ -200,11 +267,11 @@ def _covered_note(
 def _clearances(
     polyhedron: Polyhedron,
     spec: ObjectSpec,
-    printer: Printer,
     faces: RoundFaces,
     covered: Mapping[int, tuple[Loop, ...]],
 ) -> Clearances:
     """Return what printer, mitre and the neighbouring face's symbols need along each edge."""
+    printer = spec.printer
     apart = {
         edge: symbol_clearance_mm(dihedral(polyhedron, number), spec.style.height_mm)
         for edge, number in edge_numbers(polyhedron).items()

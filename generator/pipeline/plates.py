@@ -1,65 +1,83 @@
-"""A set on the printer's bed: plates, a labelled overview, a packing list.
+"""A set on the printer's bed: plates, a labelled overview, a packing list, a build sheet.
 
 Objects with their layouts -> `SET-plate-1.3mf`, `SET-plate-1-prusaslicer.3mf`, ...,
 `SET-build.html`, `SET-overview.pdf`, `SET-packing.csv`. Objects for one printer share its
-plates. The packing list is made each time; where it is what stands there already, and all plates
-are there, they stay.
+plates; each object has a sheet of its own. The packing list is made each time; where it is what
+stands there already, and all plates are there, they stay.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from generator.export.atomic import Staging
 from generator.export.bed import Plate, arrange_plates
 from generator.export.set_files import PackedPart, can_draw, overview_pdf, packing_csv
+from generator.export.sheet.drawing import draw_boxes
+from generator.export.sheet.page import sheet_html
+from generator.export.sheet.values import BuildSheet, Rows
 from generator.export.threemf import PrintFile, SlicerSettings, print_file
-from generator.layout.placement import Layout
+from generator.layout.placement import Layout, object_code
 from generator.pipeline.files import parts_of, settings_of
+from generator.pipeline.make import MakeJob
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, part_of_progress
-from generator.pipeline.set_sheet import SetObject, SetPart, SetPlate, set_sheet
+from generator.pipeline.sheet import layers_text, lies_text, material_text
+from generator.printers import Printer
 from generator.solid import Part, box, volume
 
 if TYPE_CHECKING:
     from generator.printed.slicer import PlateCost
 
+SetObject = tuple[MakeJob, Layout]  #: one object of a set, as it was made
+
+
+@dataclass(frozen=True, slots=True)
+class SetPart:
+    """One part and the room it takes."""
+
+    number: int  #: of the object
+    name: str
+    size_mm: tuple[float, float, float]
+    symbols: int
+    volume_mm3: float
+
+
+@dataclass(frozen=True, slots=True)
+class SetPlate:
+    """One plate, and the parts that its places count."""
+
+    printer: Printer
+    settings: SlicerSettings | None
+    plate: Plate
+    parts: tuple[SetPart, ...]
+
 
 def write_set(
     objects: Sequence[SetObject],
-    sheets: Sequence[Path],
     folder: Path,
     workers: Workers,
     progress: Progress,
     *,
     slice_plates: bool = False,
 ) -> tuple[Path, ...]:
-    """Write the files of a set; return their paths.
-
-    Parameters
-    ----------
-    sheets
-        The build sheet of each object.
-
-    Raises
-    ------
-    GeneratorError
-        A file cannot be written.
-    """
+    """Write the files of a set; return their paths."""
     name = _name(objects)
     measured: list[SetPart] = []
-    for number, one in enumerate(objects):
-        progress(f"measuring {one.plan.spec.name}", 0.3 * number / len(objects))
-        measured += _measure(number, one.plan, one.layout)
+    for number, (job, layout) in enumerate(objects):
+        progress(f"measuring {job.plan.spec.name}", 0.3 * number / len(objects))
+        measured += _measure(number, job.plan, layout)
     plates = _plates(objects, measured)
     packed = [_packing_rows(objects, plate, number) for number, plate in enumerate(plates, 1)]
     rows = sorted((row for some in packed for row in some), key=lambda row: row.order)
     listed = packing_csv(rows)
-    with_models = any("3mf" in one.formats for one in objects)
+    with_models = any("3mf" in job.formats for job, _ in objects)
     models = [
         f"{name}-plate-{number}{kind}.3mf"
         for number in range(1, len(plates) + 1)
@@ -89,7 +107,7 @@ def write_set(
                     from generator.printed.slicer import slice_plate
 
                     costs[number - 1] = slice_plate(twin.staged)
-        page = set_sheet(name, objects, sheets, folder, plates, costs)
+        page = _set_sheet(name, objects, folder, plates, costs)
         staging.write(f"{name}-build.html", page.encode())
         if overview:
             progress("drawing the overview", 0.9)
@@ -100,9 +118,14 @@ def write_set(
     return tuple(folder / each for each in names)
 
 
+def build_sheet_path(job: MakeJob) -> Path:
+    """Return where the build sheet of an object stands."""
+    return job.folder / f"{job.plan.spec.name}-build.html"
+
+
 def _name(objects: Sequence[SetObject]) -> str:
     """Return what the files of the set are called: as the spec file that it comes from."""
-    names = {one.plan.located.origin for one in objects}
+    names = {job.plan.spec.origin for job, _ in objects}
     return names.pop() if len(names) == 1 and all(names) else "set"
 
 
@@ -119,14 +142,9 @@ def _measure(number: int, plan: ObjectPlan, layout: Layout) -> list[SetPart]:
 def _plates(objects: Sequence[SetObject], parts: Sequence[SetPart]) -> list[SetPlate]:
     """Arrange all parts: what one printer prints with the same settings lies together."""
     plates: list[SetPlate] = []
-    kinds = dict.fromkeys((one.plan.printer, settings_of(one.plan)) for one in objects)
-    for printer, settings in kinds:
-        own = tuple(
-            part
-            for part in parts
-            if (objects[part.number].plan.printer, settings_of(objects[part.number].plan))
-            == (printer, settings)
-        )
+    ways = [(job.plan.printer, settings_of(job.plan)) for job, _ in objects]
+    for printer, settings in dict.fromkeys(ways):
+        own = tuple(part for part in parts if ways[part.number] == (printer, settings))
         sizes = [part.size_mm[:2] for part in own]
         groups = [part.number for part in own]
         for plate in arrange_plates(sizes, printer.bed_mm, groups=groups):
@@ -141,7 +159,7 @@ def _packing_rows(objects: Sequence[SetObject], plate: SetPlate, number: int) ->
         rows.append(
             PackedPart(
                 order=(part.number, place.part),
-                object=objects[part.number].plan.spec.name,
+                object=objects[part.number][0].plan.spec.name,
                 part=part.name,
                 plate=number,
                 printer=plate.printer.name,
@@ -165,7 +183,8 @@ def _plate_task(
     for number in numbers:
         names = [p.name for p in (plate.parts[q.part] for q in places) if p.number == number]
         position |= {name: len(position) + k for k, name in enumerate(names)}
-        wanted.append((objects[number].plan, objects[number].layout, names))
+        job, layout = objects[number]
+        wanted.append((job.plan, layout, names))
     moved = tuple(
         dataclasses.replace(place, part=position[plate.parts[place.part].name]) for place in places
     )
@@ -193,3 +212,85 @@ def _same_files(folder: Path, names: Sequence[str], listed: bytes) -> bool:
     except OSError:
         return False
     return same and all((folder / name).is_file() for name in names)
+
+
+def _set_sheet(
+    name: str,
+    objects: Sequence[SetObject],
+    folder: Path,
+    plates: Sequence[SetPlate],
+    costs: Sequence[PlateCost | None],
+) -> str:
+    """Return the build sheet of a set: its plates, and the objects with their codes."""
+    printers = list(dict.fromkeys(plate.printer for plate in plates))
+    drawings, lying = [], [list[str]() for _ in objects]
+    for number, (plate, cost) in enumerate(zip(plates, costs, strict=True), 1):
+        held = sorted({plate.parts[place.part].number for place in plate.plate.places})
+        for one in held:
+            lying[one].append(str(number))
+        what = ", ".join(objects[one][0].plan.spec.name for one in held)
+        if len(printers) > 1:
+            what = f"{plate.printer.name}: {what}"
+        drawings.append(
+            (
+                f"{name}-plate-{number}.3mf",
+                what + (f"; {cost}" if cost else ""),
+                draw_boxes(
+                    [(p.name, p.size_mm[:2]) for p in plate.parts],
+                    plate.plate,
+                    plate.printer.bed_mm,
+                ),
+            )
+        )
+    listed = tuple(
+        (
+            job.plan.spec.name,
+            object_code(layout, job.plan.array.rows, job.plan.array.columns),
+            ", ".join(on),
+            Path(os.path.relpath(build_sheet_path(job), folder)).as_posix(),
+        )
+        for (job, layout), on in zip(objects, lying, strict=True)
+    )
+    facts = _facts(objects, plates, costs, printers)
+    sort = (
+        "Every back names its object, or bears the object's short code: sort the parts by object "
+        "before anything is glued."
+    )
+    again = (
+        "The plates above hold everything. Each folder has plates of its object alone, too: for "
+        "one that is printed again."
+    )
+    return sheet_html(BuildSheet(name, facts, tuple(drawings), notes=(sort, again), objects=listed))
+
+
+def _facts(
+    objects: Sequence[SetObject],
+    plates: Sequence[SetPlate],
+    costs: Sequence[PlateCost | None],
+    printers: Sequence[Printer],
+) -> Rows:
+    parts = [plate.parts[place.part] for plate in plates for place in plate.plate.places]
+    rows = [("objects", str(len(objects))), ("parts", str(len(parts)))]
+    rows.append(("plates", str(len(plates))))
+    for printer in printers:
+        rows += [("printer", f"{printer.name}: {printer.description}")]
+        rows += [("layers", layers_text(printer))]
+    by_way: dict[str, list[str]] = {}
+    for job, layout in objects:
+        by_way.setdefault(lies_text(job.plan, layout), []).append(job.plan.spec.name)
+    for way, names in by_way.items():
+        rows.append(("lies", way if len(by_way) == 1 else f"{', '.join(names)}: {way}"))
+    rows.append(("scale", "100 %"))
+    for resin in sorted({not printer.nozzle_mm for printer in printers}):
+        volume_mm3 = sum(
+            plate.parts[place.part].volume_mm3
+            for plate in plates
+            for place in plate.plate.places
+            if (not plate.printer.nozzle_mm) == resin
+        )
+        rows.append(("material", material_text(volume_mm3, resin=resin)))
+    if plates and all(cost is not None for cost in costs):
+        minutes = sum(cost.minutes for cost in costs if cost)
+        grams = sum(cost.filament_g for cost in costs if cost)
+        rows.append(("printing", f"{minutes // 60} h {minutes % 60} min, {grams:.0f} g"))
+    return tuple(rows)

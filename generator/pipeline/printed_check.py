@@ -13,18 +13,17 @@ from pathlib import Path
 
 from generator.database.open import open_if_there
 from generator.database.transaction import read_transaction
-from generator.pipeline.choose import choose_array
+from generator.pipeline.choose import choose_array, lab_of
 from generator.pipeline.files import parts_of
-from generator.pipeline.lab import lab_of
 from generator.pipeline.place import occupancy_of, occupancy_with, place_object
-from generator.pipeline.plan import ObjectPlan, plan_object
+from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.printed.check import PrintedCheck, check_parts, check_png
 from generator.printed.faults import PrintFaults
 from generator.printed.profiles import print_profile, profile_of_printer
 from generator.printed.slicer import find_slicer
 from generator.solid import Part
-from generator.spec import LocatedSpec
+from generator.spec import ObjectSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +37,7 @@ class PrintedObject:
 
 
 def check_printed(
-    specs: Sequence[LocatedSpec],
+    specs: Sequence[ObjectSpec],
     *,
     folder: Path | None = None,
     database: str | None = None,
@@ -70,9 +69,9 @@ def check_printed(
     """
     find_slicer()
     profiles = [
-        print_profile(profile) if profile else profile_of_printer(one.spec.printer) for one in specs
+        print_profile(profile) if profile else profile_of_printer(one.printer) for one in specs
     ]
-    built = _build(specs, database or specs[0].spec.database, part_of_progress(progress, 0.0, 0.2))
+    built = _build(specs, database or specs[0].database, part_of_progress(progress, 0.0, 0.2))
     found = []
     for number, ((plan, parts), chosen) in enumerate(zip(built, profiles, strict=True)):
         share = [0.2 + 0.8 * (number + k) / len(built) for k in (0, 1)]
@@ -93,17 +92,16 @@ def check_printed(
 
 
 def _build(
-    specs: Sequence[LocatedSpec], url: str, progress: Progress
+    specs: Sequence[ObjectSpec], url: str, progress: Progress
 ) -> list[tuple[ObjectPlan, tuple[Part, ...]]]:
-    """Return the parts of each object, placed beside the ones before it."""
+    """Return the parts of each object, placed after the ones before it."""
     engine = open_if_there(url, writable=False)
     built = []
     with read_transaction(engine) if engine else nullcontext() as connection:
         taken = None
         choice = choose_array(specs, lab_of(specs, connection), connection)
-        for number, located in enumerate(choice.specs):
-            progress(f"building {located.spec.name}", number / len(specs))
-            plan = plan_object(located)
+        for number, plan in enumerate(choice.plans):
+            progress(f"building {plan.spec.name}", number / len(specs))
             taken = occupancy_of(connection, plan) if taken is None else taken
             place = place_object(connection, plan, False, taken)
             if not place.reused:

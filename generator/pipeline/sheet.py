@@ -17,7 +17,7 @@ from generator.export.sheet.drawing import draw_back, draw_front, draw_plate, dr
 from generator.export.sheet.page import sheet_html
 from generator.export.sheet.values import BuildSheet, Check, GlueStep, PartCard, Rows
 from generator.layout.placement import FaceLayout, Layout, object_code
-from generator.pipeline.overhang import overhang_of
+from generator.pipeline.made import overhang_of
 from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon
 from generator.polyhedron.assembly import AssemblyStep, assembly_order, telling_faces

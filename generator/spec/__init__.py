@@ -2,34 +2,24 @@
 
 ::
 
-    settings.py   the settings, with shape.py, encoding.py and name.py (pydantic)
+    settings.py   the settings (pydantic), with shape.py
     explain.py    validation errors in the words of specs
-    profile.py    what a profile's name gives
     resolve.py    defaults, and what settings mean together -> resolved.ObjectSpec
-    read.py       files and sets -> located.Located objects
+    read.py       files, sets, values of a script -> ObjectSpec
+    option.py     options of commands, by the rules of specs
     schema.py     the JSON schema for editors
     starter.py    commented specs to begin with
 
     SpecError     problem.py: every problem with place, line, caret and fix
 
-How files become values that remember line and column: `encoded_objects.base.document`.
+How files become values that remember line and column: `encoded_objects.base.yaml_tree`.
 """
 
 from __future__ import annotations
 
 from encoded_objects.base.document import Problem
-from generator.spec.located import LocatedSpec, error_at, locate
 from generator.spec.problem import SpecError
 from generator.spec.read import read_specs
 from generator.spec.resolved import ObjectSpec, ShapeSpec
 
-__all__ = [
-    "LocatedSpec",
-    "ObjectSpec",
-    "Problem",
-    "ShapeSpec",
-    "SpecError",
-    "error_at",
-    "locate",
-    "read_specs",
-]
+__all__ = ["ObjectSpec", "Problem", "ShapeSpec", "SpecError", "read_specs"]

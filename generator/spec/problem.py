@@ -1,9 +1,15 @@
-"""What is wrong with a spec, in the words of specs."""
+"""What is wrong with a spec, in the words of specs, and at which setting an error lies."""
 
 from __future__ import annotations
 
-from encoded_objects.base.document import DocumentError, DocumentKind
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from encoded_objects.base.document import DocumentError, DocumentKind, Problem, SourceMark
+from encoded_objects.base.yaml_tree import Place, Tree
 from generator.errors import GeneratorError
+
+INPUT_ERROR = 2  # exit code of errors that a spec can cause
 
 
 class SpecError(DocumentError, GeneratorError):
@@ -20,3 +26,61 @@ SPEC = DocumentKind(
     repeat="write the value out; a set shares what stands beside objects:",
     large="give a large polyhedron as a file, for example shape: {file: part.stl}",
 )
+
+
+@contextmanager
+def error_location(source: Tree, path: str) -> Iterator[None]:
+    """Give errors of a stage the place of the setting that causes them.
+
+    Errors that no spec can cause (a database that does not open) and errors that have places
+    already pass as they are. Of others a `SpecError` is raised with their cause and fix; a place
+    of their own (a face, say) stands before the cause.
+
+    Parameters
+    ----------
+    source
+        The spec's settings as written: `ObjectSpec.source`.
+    path
+        As for `mark_of`.
+    """
+    try:
+        yield
+    except GeneratorError as error:
+        if error.exit_code != INPUT_ERROR or isinstance(error, SpecError):
+            raise
+        cause = f"{error.place}: {error.cause}" if error.place else error.cause
+        raise SpecError([Problem(cause, error.fix, mark_of(source, path))]) from error
+
+
+def mark_of(tree: Tree, path: str) -> SourceMark:
+    """Return where a setting stands.
+
+    Parameters
+    ----------
+    tree
+        Settings with their places.
+    path
+        Names with points between them, "symbols.pitch"; several with commas between them,
+        of which the first one that is written in the file counts. Where none is, the place
+        is that of the nearest block around the first, at last that of the object.
+    """
+    places = [_place(part.strip()) for part in path.split(",")]
+    for place in places:
+        if place in tree.values:
+            return _value_or_key(tree, place)
+    place = places[0]
+    while place and place not in tree.values:
+        place = place[:-1]
+    return tree.key_mark(place)
+
+
+def _place(path: str) -> Place:
+    return tuple(int(part) if part.isdecimal() else part for part in path.split(".") if part)
+
+
+def _value_or_key(tree: Tree, place: Place) -> SourceMark:
+    """Return the mark of a plain value, or of the key of a block."""
+    value = tree.value
+    for part in place:
+        value = value[part]
+    return tree.key_mark(place) if isinstance(value, dict | list) else tree.value_mark(place)

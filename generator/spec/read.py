@@ -1,34 +1,38 @@
 """Read specs: one object a file, or a set of objects that share one array.
 
-Files -> Located objects. All problems of all files are reported at once.
+Files -> `ObjectSpec` values. All problems of all files are reported at once.
+
+Settings from a Python script are written as YAML and read as a file is, so that a script and a
+file understand the same words and get the same messages; the place is `encode():line:column`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import yaml
 from pydantic import ValidationError
 
 from encoded_objects.base.document import Problem
-from encoded_objects.base.yaml_tree import Place, Tree, read_tree
+from encoded_objects.base.yaml_tree import Place, Tree, read_tree, tree_of
 from generator.spec.explain import explain_errors
-from generator.spec.located import LocatedSpec, mark_of
-from generator.spec.problem import SPEC, SpecError
-from generator.spec.profile import AUTO
+from generator.spec.problem import SPEC, SpecError, mark_of
 from generator.spec.resolve import folder_name, resolve
-from generator.spec.resolved import ShapeSpec
+from generator.spec.resolved import AUTO, ObjectSpec, ShapeSpec
 from generator.spec.settings import Defaults, NamedSettings, ObjectSettings, SharedSettings
 
 OBJECTS_MAX = 10_000
 PROBLEMS_SHOWN = 25
+SOURCE = "encode()"  #: how messages call the values of a script
 SHARED_BLOCKS = ("symbols", "print", "output")  # merged setting by setting
 
 
 def read_specs(
     paths: Sequence[Path | str | Tree], *, database: str | None = None, sensor_type: str = ""
-) -> tuple[LocatedSpec, ...]:
+) -> tuple[ObjectSpec, ...]:
     """Read all objects of one run.
 
     Parameters
@@ -42,7 +46,7 @@ def read_specs(
 
     Returns
     -------
-    tuple of Located
+    tuple of ObjectSpec
         One for each object and copy, in the order of the files.
 
     Raises
@@ -52,11 +56,11 @@ def read_specs(
 
     Examples
     --------
-    >>> read_specs(["fixtures/cube.yaml"])[0].spec.style.pitch_mm
+    >>> read_specs(["fixtures/cube.yaml"])[0].style.pitch_mm
     5.0
     """
     problems: list[Problem] = []
-    found: list[LocatedSpec] = []
+    found: list[ObjectSpec] = []
     for path in paths:
         try:
             source = path if isinstance(path, Tree) else read_tree(Path(path), SPEC)
@@ -65,14 +69,14 @@ def read_specs(
             continue
         problems += source.problems
         origin = _origin(path, source)
-        for said in _collect_trees(_objects(source, problems), problems):
-            tree = said
+        for written in _collect_trees(_objects(source, problems), problems):
+            tree = written
             if sensor_type and isinstance(tree.value, dict):
                 tree = replace(tree, value={**tree.value, "sensor_type": sensor_type})
             try:
                 settings = ObjectSettings.model_validate(tree.value)
                 if len(found) + settings.copies <= OBJECTS_MAX:
-                    found += [LocatedSpec(spec, tree, origin) for spec in resolve(settings, tree)]
+                    found += [replace(spec, origin=origin) for spec in resolve(settings, tree)]
                 else:
                     problems.append(_too_many(tree))
             except ValidationError as error:
@@ -85,6 +89,97 @@ def read_specs(
     if problems:
         raise SpecError(_unique_problems(problems))
     return tuple(found)
+
+
+def spec_of(settings: Mapping[str, Any], shape: ShapeSpec) -> ObjectSpec:
+    """Return the spec of one object.
+
+    Parameters
+    ----------
+    settings
+        As in a spec file: name, profile, symbols, print, output, ...; None means not given.
+    shape
+        What the object is.
+
+    Raises
+    ------
+    SpecError
+        Every setting that is unknown, out of range or does not go with the others.
+    """
+    tree = tree_from(settings)
+    if tree.problems:
+        raise SpecError(tree.problems)
+    try:
+        read = NamedSettings.model_validate(tree.value)
+    except ValidationError as error:
+        raise SpecError(explain_errors(error, tree, NamedSettings)) from None
+    if read.copies != 1:
+        fix = "call encode once for each copy, with a name of its own"
+        raise SpecError(
+            [Problem("one solid is encoded at a time", fix, tree.key_mark(("copies",)))]
+        )
+    return resolve(read, tree, shape)[0]
+
+
+def tree_from(settings: Mapping[str, Any]) -> Tree:
+    """Return settings as the tree of a file that says them; None means not given.
+
+    Raises
+    ------
+    SpecError
+        A setting that no file can say.
+    """
+    try:
+        text = yaml.safe_dump(_without_none(settings), sort_keys=False, allow_unicode=True)
+    except yaml.YAMLError as error:
+        fix = "give numbers, texts, lists and dicts of them, as in a spec file"
+        cause = f"a setting is not a plain value: {error}"
+        raise SpecError([Problem(cause, fix, file=SOURCE)]) from None
+    return tree_of(text, SOURCE, Path(), SPEC)
+
+
+def with_profile(
+    spec: ObjectSpec,
+    name: str,
+    defaults: str,
+    encoding: Mapping[str, Any],
+    array_key: str,
+    pitch_mm: float | None = None,
+) -> ObjectSpec:
+    """Return a spec on another array.
+
+    Parameters
+    ----------
+    name
+        Of the profile, as the database will name it.
+    defaults
+        Profile whose symbols and printer hold where the spec names none.
+    encoding
+        Complete definition of the array.
+    array_key
+        Lab key that it was made from; empty for a published one.
+    pitch_mm
+        Where the spec says none, in place of that of `defaults`.
+
+    Raises
+    ------
+    SpecError
+        The spec's own settings do not go with those of the profile.
+    """
+    value = {key: inner for key, inner in spec.source.value.items() if key != "shape"}
+    if pitch_mm is not None:
+        given = {k: v for k, v in (value.get("symbols") or {}).items() if v is not None}
+        value["symbols"] = {"pitch": pitch_mm, **given}
+    read = NamedSettings.model_validate({**value, "profile": defaults, "copies": 1})
+    (made,) = resolve(read, spec.source, spec.shape)
+    return replace(
+        made,
+        name=spec.name,  # of a copy
+        origin=spec.origin,
+        profile=name,
+        encoding=encoding,
+        array_key=array_key,
+    )
 
 
 def _collect_trees(trees: Iterable[Tree], problems: list[Problem]) -> list[Tree]:
@@ -208,41 +303,40 @@ def _names_array(tree: Tree) -> bool:
     return any(tree.value.get(key) is not None for key in ("profile", "encoding"))
 
 
-def _shared_problems(found: Sequence[LocatedSpec], database: str | None) -> list[Problem]:
+def _shared_problems(found: Sequence[ObjectSpec], database: str | None) -> list[Problem]:
     """Return what keeps the objects from standing on one array, in one database."""
     problems: list[Problem] = []
     first = found[0]  # those of `auto` follow the ones that name an array
-    on_array = next((one for one in found if one.spec.profile != AUTO), first)
-    names: dict[str, LocatedSpec] = {}
-    for located in found:
-        spec = located.spec
-        other = names.setdefault(folder_name(spec.name).casefold(), located)
-        if other is not located:
-            where = mark_of(other.tree, "name")
+    on_array = next((one for one in found if one.profile != AUTO), first)
+    names: dict[str, ObjectSpec] = {}
+    for spec in found:
+        other = names.setdefault(folder_name(spec.name).casefold(), spec)
+        if other is not spec:
+            where = mark_of(other.source, "name")
             problems.append(
                 Problem(
                     f"two objects are called '{spec.name}', the first in {where}"
-                    if other.spec.name == spec.name
-                    else f"'{spec.name}' differs from '{other.spec.name}' in {where} only by "
+                    if other.name == spec.name
+                    else f"'{spec.name}' differs from '{other.name}' in {where} only by "
                     "case, spaces or dashes",
                     "give it another name",
-                    mark_of(located.tree, "name"),
+                    mark_of(spec.source, "name"),
                 )
             )
         path, beside = "", first
-        if spec.profile != AUTO and spec.encoding != on_array.spec.encoding:
+        if spec.profile != AUTO and spec.encoding != on_array.encoding:
             path, what, beside = "profile, encoding", "array", on_array
-            one, two = spec.profile, on_array.spec.profile
-        elif database is None and spec.database != first.spec.database:
+            one, two = spec.profile, on_array.profile
+        elif database is None and spec.database != first.database:
             path, what = "output.database", "database"
-            one, two = spec.database, first.spec.database
-        elif spec.lab_key != first.spec.lab_key:
+            one, two = spec.database, first.database
+        elif spec.lab_key != first.lab_key:
             path, what = "output.lab_key", "lab key"
-            one, two = spec.lab_key or "none", first.spec.lab_key or "none"
+            one, two = spec.lab_key or "none", first.lab_key or "none"
         if path:
-            cause = f"'{spec.name}' is on another {what} ({one}) than '{beside.spec.name}' ({two})"
+            cause = f"'{spec.name}' is on another {what} ({one}) than '{beside.name}' ({two})"
             fix = f"run encode-object once for each {what}"
-            problems.append(Problem(cause, fix, mark_of(located.tree, path)))
+            problems.append(Problem(cause, fix, mark_of(spec.source, path)))
     return problems
 
 
@@ -273,3 +367,12 @@ def _file(problem: Problem) -> str:
 
 def _position(problem: Problem) -> tuple[int, int]:
     return (problem.mark.line, problem.mark.column) if problem.mark else (0, 0)
+
+
+def _without_none(value: Any) -> Any:
+    """Return settings without those that are None; paths as text, tuples as lists."""
+    if isinstance(value, Mapping):
+        return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
+    if isinstance(value, list | tuple):
+        return [_without_none(inner) for inner in value]
+    return str(value) if isinstance(value, Path) else value

@@ -1,50 +1,71 @@
 """From settings to a resolved object: defaults by profile, and what settings mean together.
 
-ObjectSettings + Tree -> ObjectSpec for each copy, or every problem with its place.
+ObjectSettings + Tree -> ObjectSpec for each copy, or every problem with its place. Array,
+alphabet and pitch of a profile stand in `generator.array.profiles`; here is what embossing adds
+to them. Thesis 5.2, 5.5, 6.2.
 """
 
 from __future__ import annotations
 
+import hashlib
 import re
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from encoded_objects.base.document import DocumentError, Problem
 from encoded_objects.base.sensor_type import SENSOR_FILES, USUAL_SENSOR, SensorType
-from encoded_objects.base.yaml_tree import Tree
+from encoded_objects.base.yaml_tree import Tree, read_tree
 from generator.alphabet.known import ALPHABETS, Alphabet
 from generator.alphabet.outline import SymbolStyle
 from generator.alphabet.printable import check_printable
 from generator.array.definition import array_from
 from generator.array.profiles import PROFILES
 from generator.errors import AlphabetError, ArrayError
-from generator.printers import Printer, printer_named
-from generator.spec.encoding import Encoding
-from generator.spec.located import mark_of
-from generator.spec.printer import resolved_printer
-from generator.spec.problem import SpecError
-from generator.spec.profile import (
-    AUTO,
-    DATABASE,
-    DRAFTS_RAD,
-    EXPLICIT,
-    FORMATS,
-    GAP_MM,
-    HEIGHT_MM,
-    SMALLEST,
-    WALL_MM,
-    SymbolDefaults,
-    auto_defaults,
-    defaults_of_order,
-    defaults_of_profile,
-)
-from generator.spec.resolve_shape import Refuse, resolved_shape
-from generator.spec.resolved import ObjectSpec, ShapeSpec
-from generator.spec.settings import NamedSettings, ObjectSettings
+from generator.printers import Printer, printer_named, printer_of_nozzle
+from generator.spec.explain import explain_errors
+from generator.spec.problem import SPEC, SpecError, mark_of
+from generator.spec.resolved import AUTO, EXPLICIT, GAP_MM, SMALLEST, ObjectSpec, ShapeSpec
+from generator.spec.settings import Encoding, NamedSettings, ObjectSettings, PrinterSettings
+from generator.spec.shape import EXAMPLES, KINDS, Shape
 
+Refuse = Callable[[str, str, str], None]
+"""Takes path, cause and fix of a problem."""
+
+HEIGHT_MM = 1.0  # of symbols: a multiple of common layer heights
+DRAFTS_RAD = (0.174532925199, 0.130899693900, 0.087266462600, 0.043633231300)
+"""10 degrees, and 7.5, 5, 2.5 where strokes leave no room for the ones before."""
+WALL_MM = 3.0
 WALL_STROKES = 2  # least wall, in narrowest strokes of the printer
+FORMATS = ("step", "stl", "3mf")
+DATABASE = "sqlite:///lab.db"
+PRINTER = "fdm-0.4"
+COARSER_MM = (3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 12.0)
+"""`auto` takes the pitch that the sensor type proposes, for `fsr-16` the 5 mm that touches are read
+best at, on nozzles of 0.4 and 0.6 mm and CAD surfaces alike (docs/pitches.md); and the first of
+these beyond it that prints, where a spec or a printer asks for more room."""
+
+
+@dataclass(frozen=True, slots=True)
+class SymbolDefaults:
+    """Symbols and printer where a spec does not name them."""
+
+    alphabet: str
+    pitch_mm: float
+    printer: str
+    coarser_mm: tuple[float, ...] = ()  #: pitches for symbols that need more room, rising
+
+
+_OF_ORDER = {
+    2: SymbolDefaults("thesis-2", 12.0, PRINTER),
+    4: SymbolDefaults("dense-4", 7.0, PRINTER),
+    8: SymbolDefaults("dense-8", 8.0, PRINTER),
+}
 
 
 def resolve(
@@ -78,15 +99,10 @@ def resolve(
 
     shape = solid
     if isinstance(settings, ObjectSettings):
-        shape = resolved_shape(settings.shape, tree, refuse)
+        shape = _shape(settings.shape, tree, refuse)
     sensor = _sensor(settings, tree, problems)
     encoding, order = _array(settings, refuse)
-    if settings.encoding is None and _profile(settings) == AUTO:
-        defaults = auto_defaults(sensor.symbol_pitch_mm)
-    elif settings.encoding is None or order is None:
-        defaults = defaults_of_profile(_array_profile(settings))
-    else:
-        defaults = defaults_of_order(order)
+    defaults = _defaults(settings, order, sensor)
     printer = _printer(settings, defaults, tree, problems)
     style = _style(settings, defaults, printer)
     alphabet = ALPHABETS[settings.symbols.alphabet or defaults.alphabet]
@@ -137,6 +153,7 @@ def resolve(
         density_kg_m3=settings.robot.density or printer.density_kg_m3,
         collision=settings.robot.collision,
         sensor=sensor,
+        source=tree,
     )
     if settings.copies == 1:
         return (spec,)
@@ -146,6 +163,20 @@ def resolve(
 def folder_name(name: str) -> str:
     """Return the folder of an object's files: names that give the same one are told apart badly."""
     return re.sub(r"[\s-]+", "-", name.lower())
+
+
+def _defaults(settings: NamedSettings, order: int | None, sensor: SensorType) -> SymbolDefaults:
+    """Return what the profile gives, or the smallest alphabet for an array that is written out."""
+    if settings.encoding is None and _profile(settings) == AUTO:
+        pitch = sensor.symbol_pitch_mm
+        coarser = tuple(more for more in COARSER_MM if more > pitch)
+        return SymbolDefaults(PROFILES[SMALLEST].alphabet, pitch, PRINTER, coarser)
+    if settings.encoding is None or order is None:
+        name = _array_profile(settings)
+        profile = PROFILES[name]
+        printer = "resin" if name == "fine" else PRINTER  # `fine` is meant for resin
+        return SymbolDefaults(profile.alphabet, profile.pitch_mm, printer)
+    return _OF_ORDER[next((enough for enough in _OF_ORDER if enough >= order), max(_OF_ORDER))]
 
 
 def _sensor(settings: NamedSettings, tree: Tree, problems: list[Problem]) -> SensorType:
@@ -173,10 +204,38 @@ def _printer(
     """Return what prints; problems of its file are added."""
     if settings.print.printer is not None:
         try:
-            return resolved_printer(settings.print.printer, tree)
+            return _described_printer(settings.print.printer, tree)
         except SpecError as error:
             problems += error.problems
     return printer_named(defaults.printer)
+
+
+def _described_printer(settings: PrinterSettings, tree: Tree) -> Printer:
+    """Return the printer that settings name or describe; raises `SpecError` for its file."""
+    if settings.file is not None:
+        own = read_tree(tree.folder / settings.file, SPEC)
+        if own.problems:
+            raise SpecError(own.problems)
+        try:
+            return _described_printer(PrinterSettings.model_validate(own.value), own)
+        except ValidationError as error:
+            raise SpecError(explain_errors(error, own, PrinterSettings)) from None
+    base = printer_named(settings.like)
+    own_limits: dict[str, Any] = {
+        "bed_mm": settings.bed, "layer_mm": settings.layer, "stroke_min_mm": settings.stroke,
+        "gap_min_mm": settings.gap, "height_min_mm": settings.height,
+        "edge_min_mm": settings.edge, "overhang_max_rad": settings.overhang,
+    }  # fmt: skip
+    given = {name: value for name, value in own_limits.items() if value is not None}
+    if settings.nozzle is not None:
+        limits = printer_of_nozzle(settings.nozzle)
+        base = replace(limits, name=base.name, description=base.description, bed_mm=base.bed_mm)
+    if settings.gap is not None:
+        given["gap_inside_mm"] = settings.gap * base.gap_inside_mm / base.gap_min_mm
+    if not given and settings.nozzle is None and settings.name is None:
+        return base
+    name = settings.name or f"own (like {settings.like})"
+    return replace(base, name=name, description=f"as the spec says, like {settings.like}", **given)
 
 
 def _whole_layers_mm(height_mm: float, printer: Printer) -> float:
@@ -286,3 +345,87 @@ def _array(settings: NamedSettings, refuse: Refuse) -> tuple[dict[str, Any], int
 def _profile_definition(name: str) -> tuple[dict[str, Any], int]:
     array = PROFILES[name].array()
     return array.definition(), array.order
+
+
+def _shape(shape: Shape, tree: Tree, refuse: Refuse) -> ShapeSpec | None:
+    """Return the one shape that is given; None after a refusal."""
+    given = [kind for kind in KINDS if getattr(shape, kind) is not None]
+    if not given:
+        refuse("shape", "the shape has no size", f"write shape: {EXAMPLES['cube']}")
+        return None
+    if len(given) > 1:
+        written = [key for key in tree.value["shape"] if key in given]
+        refuse(
+            f"shape.{written[1]}",
+            f"an object has one shape, not {' and '.join(written)}",
+            "leave one out; several objects stand in a list under objects:",
+        )
+        return None
+    kind = given[0]
+    value = getattr(shape, kind)
+    if shape.scale is not None and kind != "file":
+        refuse("shape.scale", f"a {kind} has a size, no scale", "leave it out, and write the size")
+        return None
+    if kind == "box":
+        return ShapeSpec(kind, {"size": list(value)})
+    if kind == "polyhedron":
+        _check_faces(value.faces, len(value.vertices), refuse)
+        faces = [[list(loop) for loop in face] for face in value.faces]
+        return ShapeSpec(kind, {"vertices": [list(v) for v in value.vertices], "faces": faces})
+    if kind == "file":
+        return _model_file(value, shape.scale or 1.0, tree.folder, refuse)
+    if isinstance(value, float):
+        return ShapeSpec(kind, {"side": value})
+    sizes = value.model_dump(exclude_none=True)
+    if kind in ("prism", "pyramid") and ("side" in sizes) == ("radius" in sizes):
+        given_sizes = "both side and radius" if "side" in sizes else "neither side nor radius"
+        refuse(f"shape.{kind}", f"'{kind}' has {given_sizes}", f"write shape: {EXAMPLES[kind]}")
+        return None
+    return ShapeSpec(kind, sizes)
+
+
+def _check_faces(faces: list[tuple[tuple[int, ...], ...]], vertices: int, refuse: Refuse) -> None:
+    """Refuse faces that name vertices which are not there."""
+    for number, loops in enumerate(faces):
+        wrong = [vertex for loop in loops for vertex in loop if not 0 <= vertex < vertices]
+        if wrong:
+            refuse(
+                f"shape.polyhedron.faces.{number}",
+                f"face {number} names vertex {wrong[0]}, but there are {vertices}",
+                f"use vertices 0 to {vertices - 1}",
+            )
+
+
+def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeSpec | None:
+    """Return a shape that is read from a model file, which must be there."""
+    from generator.polyhedron.read import MESHES, STEP
+
+    path = folder / name
+    if path.suffix.lower() not in (*STEP, *MESHES):
+        refuse(
+            "shape.file",
+            f"'{name}' is no model that is read here",
+            f"give a file that ends in {', '.join((*STEP, *MESHES))}",
+        )
+        return None
+    try:
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        refuse("shape.file", f"cannot read '{path}': {reason}", _similar_model(path))
+        return None
+    scaled = {} if scale == 1.0 else {"scale": scale}  # as if it had been left out
+    return ShapeSpec("file", {"sha256": digest, **scaled}, path)
+
+
+def _similar_model(path: Path) -> str:
+    """Return a fix that names models like `path` beside it."""
+    from generator.polyhedron.read import MESHES, STEP
+
+    try:
+        models = [f.name for f in path.parent.iterdir() if f.suffix.lower() in (*STEP, *MESHES)]
+    except (OSError, ValueError):
+        return f"check the folder '{path.parent}'; file names are relative to the spec"
+    near = get_close_matches(path.name, sorted(models), n=1, cutoff=0.5)
+    return f"did you mean '{near[0]}'?" if near else "file names are relative to the spec"

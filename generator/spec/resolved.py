@@ -1,20 +1,26 @@
 """One object, all settings resolved: what the pipeline works from.
 
-Lengths in mm, angles in radians. Nothing here depends on how the spec was written.
+Lengths in mm, angles in radians. Nothing but `source`, which is for messages, depends on how the
+spec was written.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
+from encoded_objects.base.yaml_tree import Tree
 from generator.alphabet.outline import SymbolStyle
 from generator.errors import GeneratorError
 from generator.printers import Printer, printer_named
-from generator.spec.profile import GAP_MM
+
+AUTO = "auto"  # profile by default: array and pitch are chosen when the objects are made
+SMALLEST = "large"  # of the arrays that `auto` takes: room for some hundred objects
+EXPLICIT = "explicit"  # stands for the profile's name where an encoding is written out
+GAP_MM = 0.14  # between assembled panels
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +70,14 @@ class ObjectSpec:
     formats: tuple[str, ...]  #: of step, stl, 3mf, glb, stpz, mjcf, urdf, sdf, usd
     folder: Path  #: for the files; relative to the current folder
     database: str  #: URL
+    source: Tree = field(repr=False, compare=False)  #: its settings as written, and their places
     lab_key: str = ""  #: of the database, where the spec says it
     colours: int = 1  #: of the filament: 2 where it is changed for the symbols
     density_kg_m3: float = 1240.0  #: of what is printed, for robots and simulators
     collision: Literal["body", "symbols"] = "body"  #: what other bodies hit there
     sensor: SensorType = USUAL_SENSOR  #: what will touch it
+    #: name of the file or set that was given: files of a set bear it
+    origin: str = field(default="", compare=False)
     array_key: str = ""  #: lab key that `encoding` was made from; empty: the published array
 
     @property

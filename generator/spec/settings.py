@@ -2,14 +2,24 @@
 
 These models read one object (`ObjectSettings`) or a set (`SetSettings`) and are the
 source of the JSON schema. Lengths are in mm and angles in radians after reading.
+
+An array is named by a profile, or explicitly (`Encoding`, Thesis 5.1 to 5.5): a sequence alone
+(prbs, prmvs), folded on the torus (prba, prmva), or the product of two sequences (prpa, prmvpa).
+What only the mathematics can tell (primitive, coprime, unique windows) is checked where the array
+is made; the keys are those of `generator.array.definition`.
+
+A printer is a name, a file, or a block, which takes what it leaves out from the printer that it
+is `like`; a nozzle of its own brings the limits of that nozzle.
 """
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from encoded_objects.base.document import did_you_mean
 from encoded_objects.base.settings import (
     Angle,
     Block,
@@ -22,11 +32,9 @@ from encoded_objects.base.settings import (
 )
 from generator.alphabet.known import ALPHABETS
 from generator.array.lab_key import read_lab_key
-from generator.errors import LabKeyError
+from generator.errors import GeneratorError, LabKeyError
 from generator.export.formats import EXPORTERS
-from generator.spec.encoding import Encoding
-from generator.spec.name import ObjectName
-from generator.spec.printer import PrinterChoice
+from generator.printers import MACHINES, PRINTERS, printer_named
 from generator.spec.shape import EXAMPLES, Shape
 
 if TYPE_CHECKING:
@@ -38,8 +46,15 @@ else:  # those that are registered
 
 SPEC_VERSION = 1
 COPIES_MAX = 1000
+NAME_LENGTH_MAX = 60
+CELLS_MAX = 2**64
+ORDER_MAX = 64  # larger fields have no alphabet in sight
+POLYNOMIAL_LENGTH_MAX = 1000
 SCHEMES = ("sqlite", "postgresql", "postgres", "postgresql+psycopg")  #: of databases
+SUFFIXES = (".yaml", ".yml")  #: of a printer's file
+_NAME = re.compile(r"[^\W_][\w .()+-]*\Z")
 
+Family = Literal["prbs", "prmvs", "prba", "prmva", "prpa", "prmvpa"]
 ProfileName = Literal["one-touch", "thesis", "product", "large", "fine", "auto"]
 
 
@@ -109,6 +124,78 @@ def lab_key(value: Any) -> str:
         raise refuse(error.cause, error.fix) from None
 
 
+def object_name(value: Any) -> str:
+    """Return the name of an object: it names files and rows of the database too."""
+    if not isinstance(value, str):
+        raise refuse(f"a name must be text, not {value!r}", f"put it in quotes: '{value}'")
+    if not value.strip():
+        raise refuse("the name is empty", "write, for example, name: Cube")
+    if len(value) > NAME_LENGTH_MAX:
+        cause = f"the name has {len(value)} characters, {NAME_LENGTH_MAX} are allowed"
+        raise refuse(cause, "shorten it")
+    if not _NAME.match(value) or value[-1] in " .":
+        fix = "use letters, digits, spaces and - _ . ( ) +, a letter or digit first"
+        raise refuse(f"{value!r} cannot be part of a file name", fix)
+    return value
+
+
+def polynomial(value: Any) -> str | tuple[int, ...]:
+    """Return labels, x^0 first, from a list; text and `0x1099` as text."""
+    if type(value) is int and 1 < value < 2**65:
+        return hex(value)
+    if isinstance(value, str) and 0 < len(value) <= POLYNOMIAL_LENGTH_MAX:
+        return value
+    listed = isinstance(value, list) and 2 <= len(value) <= 65
+    if listed and all(type(label) is int and 0 <= label < ORDER_MAX for label in value):
+        return tuple(value)
+    raise refuse(
+        "a polynomial is text, a list of coefficients (x^0 first), or a hexadecimal number",
+        "write, for example, x^6+x^2+x+A, [2, 1, 1] or 0x1099",
+    )
+
+
+def window(value: Any) -> Any:
+    """Return `[3, 2]` for `3x2`; lists stay as they are."""
+    if isinstance(value, str):
+        match = re.fullmatch(r"\s*([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})\s*", value)
+        if match:
+            return [int(match[1]), int(match[2])]
+    if not isinstance(value, list) or len(value) != 2:
+        raise refuse("a window is rows and columns", "write, for example, [3, 2]")
+    return value
+
+
+def printer_block(value: Any) -> Any:
+    """Return the block that a name or a file stands for."""
+    if isinstance(value, str):
+        return {"file": value} if value.endswith(SUFFIXES) else {"like": value}
+    if not isinstance(value, dict):
+        fix = "write printer: ender-3, the name of a .yaml file, or {bed: 300 x 300 mm, ...}"
+        raise refuse("a printer is a name, a file or a block of settings", fix)
+    return value
+
+
+def known_name(value: Any) -> str:
+    """Return the name of a known printer."""
+    try:
+        return printer_named(str(value)).name
+    except GeneratorError as error:
+        names = [*PRINTERS, *MACHINES]
+        begun = [name for name in names if name.startswith(f"{value}-")]
+        near = begun[0] if begun else did_you_mean(str(value), names)
+        raise refuse(error.cause, f"did you mean '{near}'?" if near else error.fix) from None
+
+
+def bed_sides(value: Any) -> Any:
+    """Return both sides of a bed as a list; `300 x 300 mm` is one too."""
+    parts = [part.strip() for part in value.lower().split("x")] if isinstance(value, str) else value
+    if not isinstance(parts, list) or len(parts) != 2:
+        raise refuse("a bed has two sides", "write bed: 250 x 210 mm")
+    if isinstance(value, str) and parts[0].replace(".", "").isdecimal():
+        parts[0] += parts[1].lstrip("0123456789. ")
+    return parts
+
+
 Version = Annotated[Literal[1], BeforeValidator(version)]
 Copies = Annotated[int, Field(ge=1, le=COPIES_MAX), whole_number(1, COPIES_MAX, "copies")]
 FormatList = Annotated[
@@ -119,6 +206,109 @@ FormatList = Annotated[
 SensorTypeName = Annotated[str, BeforeValidator(sensor_type_name)]
 DatabaseUrl = Annotated[str, BeforeValidator(database_url)]
 LabKey = Annotated[str, BeforeValidator(lab_key)]
+ObjectName = Annotated[str, BeforeValidator(object_name)]
+Order = Annotated[int, Field(ge=2, le=ORDER_MAX), whole_number(2, ORDER_MAX, "order")]
+Degree = Annotated[int, Field(ge=1, le=64), whole_number(1, 64, "degree")]
+Extent = Annotated[int, Field(ge=1), whole_number(1, CELLS_MAX, "a size")]
+Label = Annotated[int, Field(ge=0, le=ORDER_MAX), whole_number(0, ORDER_MAX, "a label")]
+Side = Annotated[int, Field(ge=1, le=64), whole_number(1, 64, "a side of the window")]
+Polynomial = Annotated[
+    str | tuple[int, ...],
+    BeforeValidator(polynomial),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": ["integer", "string"]},
+                {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 2},
+            ]
+        }
+    ),
+]
+Window = Annotated[
+    tuple[Side, Side],
+    BeforeValidator(window, json_schema_input_type=tuple[Side, Side] | str),
+]
+
+
+class SequenceBlock(Block):
+    """One sequence over GF(q)."""
+
+    order: Order | None = None
+    """Number of different terms: a prime power q; 2 if left out."""
+    degree: Degree | None = None
+    """Degree n of the primitive polynomial; the sequence has q^n - 1 terms."""
+    polynomial: Polynomial | None = None
+    """x^2+x+A, its coefficients from x^0 upwards [2, 1, 1], or 0x13; one on file if left out."""
+    field: list[Label] | None = None
+    """Minimal polynomial of A, from A^0 upwards; the usual one if left out."""
+    initial: list[Label] | None = None
+    """The first n terms; 0 ... 0 1 if left out."""
+
+
+class Factors(Block):
+    """The two sequences of a product array."""
+
+    rows: SequenceBlock
+    """The sequence that runs down the rows."""
+    columns: SequenceBlock
+    """The sequence that runs along the columns."""
+
+
+class Encoding(SequenceBlock):
+    """An array, named explicitly."""
+
+    family: Family
+    """prbs, prmvs: a sequence; prba, prmva: a folded one; prpa, prmvpa: the product of two."""
+    rows: Extent | None = None
+    """Rows of the array; the squarest fold if left out."""
+    columns: Extent | None = None
+    """Columns of the array; rows x columns = q^n - 1, without a common factor."""
+    window: Window | None = None
+    """Rows and columns of the window that is unique: [6, 2] or 6x2; the smallest if left out."""
+    factors: Factors | None = None
+    """The two sequences of a product array."""
+    law: list[list[Label]] | None = None
+    """Product law: the symbol for each pair of terms [row][column]; q row + column if left out."""
+
+
+class PrinterSettings(Block):
+    """A printer of one's own; what is left out is as of the printer that it is like."""
+
+    like: Annotated[str, BeforeValidator(known_name)] = "fdm-0.4"
+    """A known printer: encode-object printers lists them."""
+    file: PathText | None = None
+    """A YAML file with such a block."""
+    name: ObjectName | None = None
+    """What it is called in lists and messages."""
+    bed: (
+        Annotated[
+            tuple[Length, Length],
+            BeforeValidator(bed_sides, json_schema_input_type=list[Any] | str),
+        ]
+        | None
+    ) = None
+    """Usable width and depth of the bed: 250 x 210 mm."""
+    nozzle: Length | None = None
+    """Diameter of the nozzle; brings its limits with it."""
+    layer: Length | None = None
+    """Layer height."""
+    stroke: Length | None = None
+    """Narrowest stroke that prints at its full volume."""
+    gap: Length | None = None
+    """Narrowest gap between two symbols that stays open; inside a symbol, that share of it which
+    the printer keeps that it is like."""
+    height: Length | None = None
+    """Lowest symbol that can be felt after printing."""
+    edge: Length | None = None
+    """Least distance from a symbol's foot to the edge of a face."""
+    overhang: Angle | None = None
+    """Steepest overhang, from the vertical, that needs no support."""
+
+
+PrinterChoice = Annotated[
+    PrinterSettings,
+    BeforeValidator(printer_block, json_schema_input_type=PrinterSettings | str),
+]
 
 
 class Symbols(Block):

@@ -1,52 +1,63 @@
-"""Frames for the bench: what a feed is, and that of a probe that may go and come back.
-
-A probe that is not there is tried again for as long as it is wanted.
-"""
+"""Where the bench's frames come from: a probe that may go and come back, or a recording."""
 
 from __future__ import annotations
 
+import threading
 import time
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from itertools import islice
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from encoded_objects.base.errors import EncodedObjectsError
 from probe.client.statistics import ClientStatistics
 from probe.client.stream import Stream
 from probe.frame import Frame
-from probe.protocol import IdentPacket
-from recognizer.bench.errors import BenchError
-from recognizer.bench.settings import SESSION
+from probe.recording.layout import FrameBlock
+from probe.recording.read import Recording
+from recognizer.bench.errors import BenchError, BusyError
+
+RETRY_S = 1.0  #: after a probe went away for good
+SILENT_S = 0.6  #: without a frame a probe is gone
+AT_ONCE = 512  #: frames of a recording that are taken at a time
+POINTS = 800  #: of the time line's picture
+MOST_FRAMES = 2_000_000  #: of a recording that is played, or uploaded
+MOST_VALUES = 1 << 30  #: of its images: twice as many as 2,000,000 of 16 x 16 have
+FAINT = 2048.0  #: counts of all tactels; a recording of noise alone looks like one
+PAUSE_S = 0.5  #: longer pauses in a recording are shortened to it
 
 
-class Feed(Protocol):
+class Feed(ABC):
     """Where frames come from."""
 
-    url: str
+    url: str = ""
 
+    @abstractmethod
     def take(self, timeout_s: float) -> list[Frame]:
         """Return the frames that wait, or wait for one."""
-        ...
 
+    @abstractmethod
     def as_json(self) -> dict[str, Any]:
         """Return the state for the page: state, cause, fix, and the time line if there is one."""
-        ...
 
     def notices(self) -> list[str]:
         """Return what happened since the last call."""
-        ...
+        return []
 
-    def rest(self, *, wanted: bool) -> None:
+    def rest(self, *, wanted: bool) -> None:  # noqa: B027, most feeds do nothing
         """Stop frames that nobody wants, or let them come again."""
-        ...
 
-    def close(self) -> None:
-        """Let go."""
-        ...
+    def close(self) -> None:  # noqa: B027
+        """Release the port."""
 
 
-class NoFeed:
+class NoFeed(Feed):
     """Nothing is connected."""
-
-    url = ""
 
     def take(self, timeout_s: float) -> list[Frame]:
         """Return nothing, after a while."""
@@ -57,19 +68,9 @@ class NoFeed:
         """Return that there is nothing."""
         return {"state": "none"}
 
-    def notices(self) -> list[str]:
-        """Return nothing."""
-        return []
 
-    def rest(self, *, wanted: bool) -> None:
-        """Do nothing."""
-
-    def close(self) -> None:
-        """Do nothing."""
-
-
-class ProbeFeed:
-    """A probe behind a port."""
+class ProbeFeed(Feed):
+    """A probe behind a port; one that is not there is tried again for as long as it is wanted."""
 
     def __init__(self, url: str, sensor: int | None = None) -> None:
         self.url = url
@@ -80,11 +81,6 @@ class ProbeFeed:
         self._heard_s = self._tried_s = -1e9
         self._counts = ClientStatistics()
         self._closed = self._resting = False
-
-    @property
-    def ident(self) -> IdentPacket | None:
-        """What the device said it is."""
-        return None if self._stream is None else self._stream.client.ident
 
     def take(self, timeout_s: float) -> list[Frame]:
         """Return the frames that wait; opens the port, or tries it again."""
@@ -99,7 +95,7 @@ class ProbeFeed:
                 frames = stream.take(timeout_s)
         except EncodedObjectsError as gone:
             self._lose(gone)
-        self._judge(frames)
+        self._note_state(frames)
         if not frames:  # an ended stream does not wait
             time.sleep(max(0.0, min(timeout_s, began_s + timeout_s - time.monotonic())))
         return frames
@@ -109,7 +105,8 @@ class ProbeFeed:
         stream = self._stream
         if stream is not None:
             self._counts = stream.client.statistics()
-        ident, counts = self.ident, self._counts
+        ident = None if stream is None else stream.client.ident
+        counts = self._counts
         return {
             "state": self._state,
             "cause": self._cause,
@@ -140,41 +137,40 @@ class ProbeFeed:
             self._stream.client.select_sensor(sensor)
 
     def rest(self, *, wanted: bool) -> None:
-        """Let go of the port while nobody wants frames."""
+        """Close the port while nobody wants frames."""
         if wanted or self._resting:
             self._resting = not wanted
             return
         self._resting = True
         self._tried_s = -1e9
-        if self._stream is not None:
-            self._counts = self._stream.client.statistics()
-            self._stream.__exit__(None, None, None)
-            self._stream = None
+        self._end_stream()
         if self._state == "live":
             self._state = "waiting"
 
     def close(self) -> None:
-        """Let go of the port."""
+        """Close the port for good."""
         self._closed = True
-        if self._stream is not None:
-            self._stream.__exit__(None, None, None)
+        self._end_stream()
 
     def _opened(self, now_s: float) -> Stream | None:
-        if self._stream is None and not self._closed and now_s - self._tried_s > SESSION.retry_s:
+        if self._stream is None and not self._closed and now_s - self._tried_s > RETRY_S:
             self._tried_s = now_s
             self._stream = Stream(self.url, sensor=self._sensor)
         return self._stream
 
-    def _lose(self, gone: EncodedObjectsError) -> None:
+    def _end_stream(self) -> None:
         if self._stream is not None:
             self._counts = self._stream.client.statistics()
             self._stream.__exit__(None, None, None)
             self._stream = None
+
+    def _lose(self, gone: EncodedObjectsError) -> None:
+        self._end_stream()
         if self._state == "live" or self._cause != gone.cause:
             self._notices.append(gone.cause)
         self._state, self._cause, self._fix = "gone", gone.cause, gone.fix
 
-    def _judge(self, frames: list[Frame]) -> None:
+    def _note_state(self, frames: list[Frame]) -> None:
         now_s = time.monotonic()
         if frames:
             self._heard_s = now_s
@@ -182,7 +178,165 @@ class ProbeFeed:
                 self._notices.append("the probe is back")
             self._state = "live"
             self._cause = self._fix = ""
-        elif self._state == "live" and now_s - self._heard_s > SESSION.silent_s:
+        elif self._state == "live" and now_s - self._heard_s > SILENT_S:
             self._notices.append("the probe is gone")
             self._state, self._fix = "gone", "plug it in again; it is looked for all the time"
             self._cause = "no frame comes any more"
+
+
+class ReplayFeed(Feed):
+    """A recording with a time line: it plays at once, pauses, and goes to any place.
+
+    Pauses of the recording are shortened, and a clock that was set back stands still, so that the
+    time line has no empty stretch. Only times and strengths are kept in memory.
+
+    Parameters
+    ----------
+    url
+        Its port.
+    recording
+        Read once as a whole, for the time line.
+    ending
+        Whether the server ends; reading then ends, too.
+    """
+
+    def __init__(
+        self, url: str, recording: Recording, ending: Callable[[], bool] = lambda: False
+    ) -> None:
+        self.url = url
+        self.recording = recording
+        self._turn = threading.Lock()
+        t_ns, self.strength = _times_and_strengths(playable_blocks(recording, ending))
+        pauses = np.clip(np.diff(t_ns, prepend=t_ns[:1]) * 1e-9, 0.0, PAUSE_S)
+        self._at_s = np.cumsum(pauses)
+        self.began_ns = int(t_ns[0]) if len(t_ns) else 0  #: time of the first frame
+        self.seconds = float(self._at_s[-1]) if len(t_ns) else 0.0
+        self._playing, self._speed = bool(len(t_ns)), 1.0
+        self._place_s = 0.0
+        self._clock_s = time.monotonic()
+        self._next = 0
+        self._frames: Iterator[Frame] = iter(())
+        self._position = -1  # number of the frame that `_frames` yields next
+
+    def take(self, timeout_s: float) -> list[Frame]:
+        """Return the frames that are due."""
+        with self._turn:
+            place_s = self._advance()
+            last = int(np.searchsorted(self._at_s, place_s, side="right"))
+            first, self._next = self._next, max(self._next, last)
+            frames = self._between(first, last)
+            pause_s = timeout_s
+            if self._playing and self._next < len(self._at_s):
+                pause_s = min(timeout_s, (self._at_s[self._next] - place_s) / self._speed)
+        if not frames:
+            time.sleep(max(0.001, pause_s))
+        return frames
+
+    def play(self, *, playing: bool | None, speed: float | None, at_s: float | None) -> None:
+        """Play or pause, faster or slower, from a place on the time line.
+
+        Raises
+        ------
+        BenchError
+            For a speed or a place that is none.
+        """
+        if speed is not None and not 0.1 <= speed <= 20:
+            raise BenchError(f"a speed of {speed:g}", fix="give 0.1 to 20")
+        with self._turn:
+            place_s = self._advance()
+            if playing and place_s >= self.seconds and at_s is None:
+                at_s = 0.0
+            if at_s is not None:
+                self._place_s = min(max(at_s, 0.0), self.seconds)
+                # the frame that is there is shown, also while it pauses
+                at = int(np.searchsorted(self._at_s, self._place_s, side="right"))
+                self._next = max(0, at - 1)
+            self._speed = self._speed if speed is None else speed
+            self._playing = self._playing if playing is None else playing
+            self._playing = self._playing and bool(len(self._at_s))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the place on the time line."""
+        with self._turn:
+            place_s = self._advance()
+            return {
+                "state": "replay",
+                "device": self.recording.origin.sensor,
+                "frames": len(self.recording),
+                "at": round(place_s, 3),
+                "seconds": round(self.seconds, 3),
+                "playing": self._playing,
+                "speed": self._speed,
+            }
+
+    def overview(self) -> list[float]:
+        """Return how strong the touches are along the time line, at even places, 0 ... 1."""
+        if not len(self._at_s):
+            return []
+        bins = min(POINTS, len(self._at_s))
+        place = np.minimum(self._at_s / max(self.seconds, 1e-9) * bins, bins - 1).astype(int)
+        top = np.zeros(bins)
+        np.maximum.at(top, place, self.strength)
+        return [round(float(v), 3) for v in top / max(float(top.max()), FAINT)]
+
+    def close(self) -> None:
+        """Pause."""
+        with self._turn:
+            self._playing = False
+
+    def _advance(self) -> float:
+        """Bring the place up to now; pause at the end."""
+        now_s = time.monotonic()
+        passed_s, self._clock_s = now_s - self._clock_s, now_s
+        if self._playing:
+            self._place_s += passed_s * self._speed
+            if self._place_s >= self.seconds:
+                self._place_s, self._playing = self.seconds, False
+        return self._place_s
+
+    def _between(self, first: int, last: int) -> list[Frame]:
+        """Return frames `first` ... `last` - 1, the newest of them if there are many."""
+        first = max(first, last - AT_ONCE)
+        if first >= last:
+            return []
+        if self._position != first:
+            self._frames = self.recording.frames(first)
+        self._position = last
+        return list(islice(self._frames, last - first))
+
+
+def playable_blocks(recording: Recording, ending: Callable[[], bool]) -> Iterator[FrameBlock]:
+    """Yield all blocks of a recording that is short enough to be played.
+
+    Raises
+    ------
+    BenchError
+        It is too long; nothing was read.
+    BusyError
+        `ending` says that the server ends.
+    """
+    frames = len(recording)
+    if frames > MOST_FRAMES or frames * prod(recording.shape) > MOST_VALUES:
+        rows, columns = recording.shape
+        raise BenchError(
+            f"a recording of {frames:,} frames of {rows} x {columns}; {MOST_FRAMES:,} "
+            f"frames or {MOST_VALUES:,} values can be played",
+            fix="play a part of it",
+            place=Path(recording.path).name,
+        )
+    for block in recording.blocks():
+        if ending():
+            raise BusyError("open-bench ends", fix="start it again")
+        yield block
+
+
+def _times_and_strengths(
+    blocks: Iterator[FrameBlock],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return times (ns) and strengths of all frames."""
+    times, strengths = [np.zeros(0, np.int64)], [np.zeros(0)]
+    for block in blocks:
+        times.append(block.t_ns)
+        over = block.counts.reshape(len(block), -1).astype(np.float64)
+        strengths.append(over.sum(axis=1) - over.shape[1] * np.quantile(over, 0.05, axis=1))
+    return np.concatenate(times), np.concatenate(strengths)

@@ -1,22 +1,31 @@
 """What the page may read and write: recordings and calibrations of one folder, printed parts.
 
 A name is a name: no path, no link that leads out. Parts are those that the database names, and
-only where they lie in its folder.
+only where they lie in its folder. Uploaded recordings are written as they come, bounded in number,
+time and space; the guard bounds the length of one.
 """
 
 from __future__ import annotations
 
+import asyncio
 import re
-from collections.abc import Callable
+import tempfile
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
+
+from fastapi.concurrency import run_in_threadpool
 
 from generator.database.open import normal_url, part_path
 from generator.database.registered import RegisteredPart
 from probe.errors import RecordingError
 from probe.recording.read import Recording
-from recognizer.bench.errors import UnknownError
-from recognizer.bench.replay import playable_blocks
-from recognizer.bench.settings import PAGE
+from recognizer.bench.errors import BenchError, BusyError, UnknownError
+from recognizer.bench.feed import playable_blocks
+
+LISTED = 200  #: files of a kind that are offered
+AT_ONCE = 2  #: recordings that are uploaded at the same time
+SILENT_S = 15.0  #: without a byte, after which an upload is given up
+QUOTA = 2 * 1024**3  #: bytes of all recordings in the folder; beyond, none is taken
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}")
 
@@ -63,29 +72,7 @@ def list_files(folder: Path, suffix: str) -> list[str]:
         and _NAME.fullmatch(path.name)
     ]
     dated = sorted((-path.stat().st_mtime, path.name) for path in found)
-    return [name for _, name in dated[: PAGE.listed]]
-
-
-def keep_recording(draft: Path, path: Path, ending: Callable[[], bool]) -> int:
-    """Give a file that was sent in its name, if it is a recording; returns its frames.
-
-    Raises
-    ------
-    RecordingError
-        It is none.
-    BenchError
-        It is too long to be played.
-    BusyError
-        `ending` says that the server ends.
-    """
-    try:
-        recording = Recording(draft)
-        for _ in playable_blocks(recording, ending):  # every value is looked at
-            pass
-    except RecordingError as error:
-        raise RecordingError(error.cause, fix=error.fix, place=path.name) from error
-    draft.rename(path)
-    return len(recording)
+    return [name for _, name in dated[:LISTED]]
 
 
 def part_folder(database: str) -> Path | None:
@@ -111,3 +98,77 @@ def part_to_send(database: str, folder: Path | None, part: RegisteredPart) -> Pa
             fix="start open-bench with --parts and the folder in which the parts lie",
         )
     return path
+
+
+class Uploads:
+    """Recordings that pages send; on the server's loop."""
+
+    def __init__(self, folder: Path, ending: Callable[[], bool] = lambda: False) -> None:
+        self._folder, self._ending = folder, ending
+        self._coming = 0
+
+    async def take(self, name: str, chunks: AsyncIterator[bytes]) -> int:
+        """Keep a recording, if it is one; returns its frames.
+
+        Raises
+        ------
+        BenchError, UnknownError
+            There is one of this name, or the name is none; no room is left, nothing comes, or
+            it is too long to be played.
+        BusyError
+            Others are being sent in, or the server ends.
+        RecordingError
+            It is no recording; nothing is kept.
+        """
+        path = self._folder / checked_name(name, ".h5")
+        if path.exists():
+            raise BenchError(f"there is a recording {name} already", fix="give another name")
+        if self._coming >= AT_ONCE:
+            raise BusyError(f"{self._coming} recordings are being sent in", fix="wait for them")
+        self._coming += 1
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix=".coming-", dir=self._folder) as place:
+                draft = Path(place) / path.name
+                await self._write(draft, chunks)
+                return await run_in_threadpool(_keep, draft, path, self._ending)
+        finally:
+            self._coming -= 1
+
+    async def _write(self, draft: Path, chunks: AsyncIterator[bytes]) -> None:
+        room = QUOTA - folder_bytes(self._folder)
+        coming = aiter(chunks)
+        with draft.open("wb") as file:
+            while True:
+                try:
+                    chunk = await asyncio.wait_for(anext(coming), SILENT_S)
+                except StopAsyncIteration:
+                    return
+                except TimeoutError:
+                    raise BenchError(
+                        f"nothing came for {SILENT_S:g} s", fix="send it in again"
+                    ) from None
+                room -= len(chunk)
+                if room < 0:
+                    raise BenchError(
+                        f"recordings here take {QUOTA / 1024**3:g} GB already",
+                        fix="move old ones elsewhere",
+                    )
+                file.write(chunk)
+
+
+def _keep(draft: Path, path: Path, ending: Callable[[], bool]) -> int:
+    """Give an uploaded file its name if it is a recording; returns its frames."""
+    try:
+        recording = Recording(draft)
+        for _ in playable_blocks(recording, ending):  # every value is looked at
+            pass
+    except RecordingError as error:
+        raise RecordingError(error.cause, fix=error.fix, place=path.name) from error
+    draft.rename(path)
+    return len(recording)
+
+
+def folder_bytes(folder: Path) -> int:
+    """Return how much all recordings of a folder take."""
+    return sum(path.stat().st_size for path in folder.glob("*.h5")) if folder.is_dir() else 0

@@ -21,11 +21,15 @@ from probe.frame import Frame
 from probe.recording.files import next_free
 from probe.recording.record import Recorder
 from recognizer.bench.broker import Broker
-from recognizer.bench.calibration_guide import PageGuide, condition_json
-from recognizer.bench.calibration_state import CalibrationState, values_or_counts
+from recognizer.bench.calibration import (
+    CalibrationState,
+    PageGuide,
+    condition_json,
+    values_or_counts,
+)
 from recognizer.bench.errors import BusyError
 from recognizer.bench.message import FrameMessage
-from recognizer.bench.recognition_thread import PendingFrame, RecognitionThread
+from recognizer.bench.reading import PendingFrame, RecognitionThread
 from recognizer.sensor.wiring import Wiring
 
 Array = NDArray[np.float64]
@@ -58,7 +62,7 @@ class FrameHandler:
         self._sensor, self._broker, self._recognition = sensor, broker, recognition
         self._note = note
         self._newest: Frame | None = None
-        self._told_shape: tuple[int, int] | None = None  # of frames that are not shown
+        self._refused_shape: tuple[int, int] | None = None  # of frames that are not shown
         self._recorder: Recorder | None = None
 
     @property
@@ -71,8 +75,8 @@ class FrameHandler:
         known = [frame for frame in frames if frame.counts.shape == self._sensor.shape]
         if len(known) < len(frames):
             rows, columns = frames[-1].counts.shape
-            if self._told_shape != (rows, columns):
-                self._told_shape = rows, columns
+            if self._refused_shape != (rows, columns):
+                self._refused_shape = rows, columns
                 self._note(
                     f"frames of {rows} x {columns} readings are not shown: this bench is for "
                     f"{self._sensor.name}; start it with their --sensor-type"

@@ -1,25 +1,37 @@
-"""Registered objects, arrays and alphabets as JSON, for the page to draw.
+"""Registered objects, arrays and alphabets for the page: JSON to draw them, a small picture.
 
-An object is its faces (`face_mesh`) and its symbols (label, place on their face, pose on the
-object); how a symbol of each label looks is sent once. An array is the cells that
-objects hold, whatever its size: what nobody holds is not sent. mm, rad. Thesis 6.3.
+An object is its faces (triangles on the object, places on the face), its symbols (label, place
+on their face, pose on the object), and once per label the triangles of a symbol. A round face is
+drawn as the facets that stand for it; what is picked on them is a place of the unrolled plane,
+and each of its symbols stands in the plane that is tangent there. An array is the cells that
+objects hold, whatever its size. mm, rad. Thesis 6.3.
 """
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy import Connection, select
 
 from generator.database import tables
 from generator.database.read import list_objects, read_object
-from generator.database.registered import RegisteredObject
-from probe.surface.body import symbol_triangles
+from generator.database.registered import RegisteredFace, RegisteredObject
+from probe.surface.body import symbol_triangles, triangulate
 from probe.surface.symbols import Relief, emboss
-from recognizer.bench.face_mesh import DIGITS, drawn_faces, mesh_json, nested_lists, stands_json
 from recognizer.touch.lab import EmbossedArray, Lab
+
+Array = NDArray[np.float64]
+
+DIGITS = 4  #: after the point, of mm: a tenth of a micrometre
+VIEW = np.array([0.55, -1.0, 0.6])  #: from where the picture is seen, object frame, as on the page
+SUN = np.array([0.25, -0.65, 1.0])
+DARK, LIGHT = 52.0, 84.0  #: lightness (%) of faces in the shade and in the sun
+DOT = 0.42  #: of a pitch, diameter of a symbol's dot
 
 
 def objects_json(connection: Connection) -> list[dict[str, Any]]:
@@ -63,34 +75,6 @@ def object_json(connection: Connection, name: str) -> dict[str, Any]:
             for i, part in enumerate(held.parts)
         ],
     }
-
-
-def _face(held: RegisteredObject, number: int) -> dict[str, Any]:
-    face, cells = held.faces[number], held.layout.faces[number]
-    loops = face.polygon_mm if face.round is None else (face.round.outline_mm,)
-    return {
-        "name": face.name,
-        "loops": [nested_lists(loop) for loop in loops],
-        "round": face.round is not None,
-        "blank": face.placement is None,
-        "labels": cells.labels.tolist(),
-        "centres": nested_lists(cells.centres_mm),
-        "stands": stands_json(face, cells.centres_mm),
-        **mesh_json(held, face),
-    }
-
-
-def _glyphs(held: RegisteredObject) -> list[list[float]]:
-    """Return the triangles of every label's symbol, corner after corner."""
-    style = held.style
-    relief = Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
-    glyphs = held.alphabet["glyphs"]
-    strokes = tuple(tuple((tuple(a), tuple(b)) for a, b in glyph["strokes"]) for glyph in glyphs)
-    symbols = emboss(strokes, held.alphabet["reach"] * style.pitch_mm, relief)
-    return [
-        np.round(symbol_triangles(symbols, label), DIGITS).ravel().tolist()
-        for label in range(len(strokes))
-    ]
 
 
 def arrays_json(lab: Lab) -> list[dict[str, Any]]:
@@ -142,6 +126,121 @@ def map_json(connection: Connection, encoding: EmbossedArray) -> dict[str, Any]:
     }
 
 
+def object_svg(held: RegisteredObject) -> str:
+    """Return a small picture of an object as SVG: faces by their distance, symbols as dots."""
+    look = VIEW / np.linalg.norm(VIEW)
+    right = np.cross([0.0, 0.0, 1.0], look)
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, -np.cross(look, right), look], axis=1)  # x right, y down, z near
+    seen = [
+        (float(depth), text, corners)
+        for number in drawn_faces(held)
+        for depth, text, corners in _drawings(held, held.faces[number], number, axes)
+    ]
+    corners = np.concatenate([np.zeros((1, 2)), *(each for _, _, each in seen)])[1:]
+    low, high = (
+        (corners.min(axis=0), corners.max(axis=0)) if len(corners) else (np.zeros(2), np.ones(2))
+    )
+    x, y = low - 1.0
+    w, h = high - low + 2.0
+    body = "".join(text for _, text, _ in sorted(seen, key=lambda one: one[0]))
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{x:.1f} {y:.1f} {w:.1f} {h:.1f}" '
+        f'stroke-linejoin="round" stroke-linecap="round">{body}</svg>'
+    )
+
+
+def drawn_faces(held: RegisteredObject) -> list[int]:
+    """Return the faces that are drawn, by number: of a round face's facets the carrier alone."""
+    facets = {facet for face in held.faces if face.round is not None
+              for facet in face.round.surface.facets}  # fmt: skip
+    return [n for n, face in enumerate(held.faces) if n not in facets or face.round is not None]
+
+
+def symbol_poses(face: RegisteredFace, centres_mm: Array) -> Array:
+    """Return T_object_symbol of every symbol of a face, (S, 4, 4); none where it is blank."""
+    if face.placement is None:
+        return np.zeros((0, 4, 4))
+    c, s = math.cos(-face.placement.rotation_rad), math.sin(-face.placement.rotation_rad)
+    T_plane_symbol = np.tile(np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]),
+                             (len(centres_mm), 1, 1))  # fmt: skip
+    T_plane_symbol[:, :2, 3] = centres_mm
+    if face.round is None:
+        return np.asarray(face.T_object_face @ T_plane_symbol)
+    tangents = np.array([face.round.tangent(x, y) for x, y in centres_mm.tolist()])
+    return np.asarray(tangents.reshape(-1, 4, 4) @ T_plane_symbol)
+
+
+def face_sheets(face: RegisteredFace) -> Iterator[list[Array]]:
+    """Yield the flat sheets of a face as loops (k, 3), object frame: of a round face its facets."""
+    if face.round is None:
+        yield [_seated(face.T_object_face, loop) for loop in face.polygon_mm]
+        return
+    d = face.round.development
+    for T, low, high in zip(
+        d.T_object_flat, np.stack([d.low[:-1], d.low[1:]], axis=1),
+        np.stack([d.high[1:], d.high[:-1]], axis=1), strict=True,
+    ):  # fmt: skip
+        yield [_seated(T, np.concatenate([low, high]))]
+
+
+def _face(held: RegisteredObject, number: int) -> dict[str, Any]:
+    face, cells = held.faces[number], held.layout.faces[number]
+    loops = face.polygon_mm if face.round is None else (face.round.outline_mm,)
+    return {
+        "name": face.name,
+        "loops": [_rounded(loop) for loop in loops],
+        "round": face.round is not None,
+        "blank": face.placement is None,
+        "labels": cells.labels.tolist(),
+        "centres": _rounded(cells.centres_mm),
+        "stands": [_rounded(pose[:3].ravel(), 6) for pose in symbol_poses(face, cells.centres_mm)],
+        **_mesh_json(held, face),
+    }
+
+
+def _mesh_json(held: RegisteredObject, face: RegisteredFace) -> dict[str, Any]:
+    """Return a face's triangles and outlines.
+
+    `corners`: 9 numbers a triangle, object frame; `places`: 6 numbers a triangle, face frame or
+    unrolled plane; `outlines`: lines of points, object frame, closed on a flat face.
+    """
+    if face.round is None:
+        points = np.concatenate(face.polygon_mm)
+        places = points[triangulate(face.polygon_mm)]
+        corners = _seated(face.T_object_face, places)
+        outlines = [_seated(face.T_object_face, loop) for loop in face.polygon_mm]
+    else:
+        d = face.round.development
+        low, high = d.low, d.high
+        places = np.stack(
+            [np.stack([low[:-1], low[1:], high[1:]], axis=1),
+             np.stack([low[:-1], high[1:], high[:-1]], axis=1)], axis=1
+        )  # fmt: skip
+        corners = np.stack(
+            [_seated(T, two) for T, two in zip(d.T_object_flat, places, strict=True)]
+        )
+        outlines = [held.polyhedron.vertices[ends] for ends in d.vertices.T]
+    return {
+        "corners": _rounded(corners.ravel()),
+        "places": _rounded(places.ravel()),
+        "outlines": [_rounded(loop) for loop in outlines],
+    }
+
+
+def _glyphs(held: RegisteredObject) -> list[list[float]]:
+    """Return the triangles of every label's symbol, corner after corner."""
+    style = held.style
+    relief = Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
+    glyphs = held.alphabet["glyphs"]
+    strokes = tuple(tuple((tuple(a), tuple(b)) for a, b in glyph["strokes"]) for glyph in glyphs)
+    symbols = emboss(strokes, held.alphabet["reach"] * style.pitch_mm, relief)
+    return [
+        np.round(symbol_triangles(symbols, label), DIGITS).ravel().tolist()
+        for label in range(len(strokes))
+    ]
+
+
 def _face_names(connection: Connection) -> dict[int, dict[int, str]]:
     found: dict[int, dict[int, str]] = defaultdict(dict)
     faces = tables.faces.c
@@ -150,3 +249,52 @@ def _face_names(connection: Connection) -> dict[int, dict[int, str]]:
     ):
         found[object_id][face_id] = name
     return found
+
+
+def _drawings(
+    held: RegisteredObject, face: RegisteredFace, number: int, axes: Array
+) -> Iterator[tuple[float, str, Array]]:
+    """Yield depth, drawing and corners of the sheets of a face that are seen, then its symbols."""
+    nearest = -np.inf
+    for sheet in face_sheets(face):
+        normal = np.cross(sheet[0][1] - sheet[0][0], sheet[0][2] - sheet[0][1])
+        if face.round is None:
+            normal = face.T_object_face[:3, 2]
+        normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
+        if normal @ axes[:, 2] < 1e-6:
+            continue
+        shade = DARK + (LIGHT - DARK) * max(0.0, float(normal @ SUN) / float(np.linalg.norm(SUN)))
+        loops = [loop @ axes for loop in sheet]
+        path = "".join(f"M{_path(loop[:, :2])}z" for loop in loops)
+        fill = f"hsl(210 16% {shade:.0f}%)"
+        edge = fill if face.round is not None else "hsl(210 14% 38%)"
+        depth = float(loops[0][:, 2].mean())
+        nearest = max(nearest, depth)
+        drawing = f'<path d="{path}" fill="{fill}" stroke="{edge}" stroke-width=".5"/>'
+        yield depth, drawing, loops[0][:, :2]
+    poses = symbol_poses(face, held.layout.faces[number].centres_mm)
+    if not len(poses) or nearest == -np.inf:
+        return
+    towards = poses[:, :3, 2] @ axes[:, 2] > 0.05
+    dots = (poses[towards, :3, 3] @ axes)[:, :2]
+    if len(dots):
+        path = "".join(f"M{u:.1f} {v:.1f}h0" for u, v in dots.tolist())
+        size = DOT * held.style.pitch_mm
+        yield (
+            nearest + 1e-3,
+            (f'<path d="{path}" stroke="hsl(210 22% 40%)" stroke-width="{size:.1f}"/>'),
+            dots,
+        )
+
+
+def _path(points: Array) -> str:
+    return "L".join(f"{u:.1f} {v:.1f}" for u, v in points.tolist())
+
+
+def _rounded(values: Array, digits: int = DIGITS) -> Any:
+    """Return numbers as nested lists."""
+    return np.round(values, digits).tolist()
+
+
+def _seated(T: Array, places: Array) -> Array:
+    return np.asarray(places @ T[:3, :2].T + T[:3, 3])

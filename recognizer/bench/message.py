@@ -1,11 +1,11 @@
-"""Frames and mosaics as bytes, little endian.
+"""Frames, through a filter, and mosaics as bytes for the pages, little endian. Thesis 4.3.
 
 frame    "F", unit (0 counts, 1 N), filter (its number), 0, seq u32, device time f64 (s),
          received f64 (ms since 1970, the server's clock), largest f32, sum f32 of the readings
          over their bias; from byte 32 on a value f32 for each tactel, row 0 on top
 mosaic   "M", 0, 0, 0, rows u32, columns u32, touches u32, step f32 (mm), corner x and y f32 (mm,
-         of the upper left cell), largest f32; from byte 32 on rows x columns u8: 0 not felt,
-         1 ... 255 from 0 to the largest
+         of the upper left cell), largest f32; from byte 32 on rows x columns u8: 0 not
+         touched, 1 ... 255 from 0 to the largest
 """
 
 from __future__ import annotations
@@ -17,11 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.bench.images import FILTERS, filter_image
-from recognizer.bench.settings import PAGE
 from recognizer.scan.mosaic.canvas import GlobalImage
+from recognizer.thesis.filters import median, sobel, subtract_bias
+from recognizer.touch.tactile_image import tactile_image
 
 Array = NDArray[np.float64]
+
+FILTERS = ("raw", "bias-free", "median", "sobel")  #: each works on the result of the one before
+MOSAIC_CELLS = 512  #: rows or columns of a mosaic that is sent; beyond, cells are left out
 
 _FRAME = struct.Struct("<cBBBIddff")
 _MOSAIC = struct.Struct("<cBBBIIIffff")
@@ -68,7 +71,7 @@ class MosaicMessage:
 
 def mosaic_message(image: GlobalImage, touches: int) -> MosaicMessage:
     """Return a mosaic's image, thinned where it is large."""
-    thin = max(1, -(-max(image.values.shape, default=0) // PAGE.mosaic))
+    thin = max(1, -(-max(image.values.shape, default=0) // MOSAIC_CELLS))
     values, known = image.values[::thin, ::thin], image.known[::thin, ::thin]
     top = float(values.max(initial=0.0))
     scaled = np.clip(np.rint(values * (254 / top if top > 0 else 0.0)), 0, 254).astype(np.uint8)
@@ -76,3 +79,32 @@ def mosaic_message(image: GlobalImage, touches: int) -> MosaicMessage:
         b"M", 0, 0, 0, *values.shape, touches, image.step_mm * thin, *image.corner_mm, top
     )
     return MosaicMessage(head + np.where(known, scaled + 1, 0).astype(np.uint8).tobytes())
+
+
+def filter_image(
+    readings: Array, sensor: SensorType, filter_name: str, bias: Array | None = None
+) -> Array:
+    """Return an image through a filter.
+
+    Parameters
+    ----------
+    readings
+        (rows, columns) counts or newtons.
+    filter_name
+        One of `FILTERS`.
+    bias
+        (rows, columns) reading at rest; the lowest twentieth of the image if not given.
+
+    Returns
+    -------
+    (rows, columns) in the same unit; Sobel: its slope per mm.
+    """
+    if filter_name == "raw":
+        return readings
+    image = subtract_bias(tactile_image(readings, step_mm=sensor.pitch_mm), bias)
+    if filter_name == "bias-free":
+        return image.values
+    image = median(image)
+    if filter_name == "median":
+        return image.values
+    return np.hypot(*sobel(image))

@@ -21,9 +21,14 @@ from probe.frame import Frame
 from probe.simulate.scene import Scene
 from probe.simulate.sensor import simulated_sensor
 from recognizer.bench.errors import BenchError
-from recognizer.bench.settings import PRESS
 
 Array = NDArray[np.float64]
+
+STEPS = (0.5,)  #: shares of the force on the way down, a frame each
+APART_S = 0.08  #: between two touches
+LOADED_S = 0.1  #: that a load is on before it counts as put on
+UNREAD_S = 5.0  #: longest wait for that
+LARGEST_N = 400.0  #: of a touch; a load may be ten times as large
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,34 +64,32 @@ class PressSequence:
         BenchError
             For a force that no operator would use.
         """
-        if not 0 < touch.force_n <= PRESS.largest_n:
+        if not 0 < touch.force_n <= LARGEST_N:
             raise BenchError(
                 f"a force of {touch.force_n:g} N",
-                fix=f"give more than 0, at most {PRESS.largest_n:g} N",
+                fix=f"give more than 0, at most {LARGEST_N:g} N",
             )
         full = self._sensor.press(scene, touch).forces_n
         held = self._beats(self.manner.hold_s)
-        steps = [(1, share * full) for share in PRESS.steps]
+        steps = [(1, share * full) for share in STEPS]
         self._play([*steps, (held, full), *reversed(steps), (1, self._rest)])
 
     def load(self, newtons: float) -> None:
         """Put an even load on, in newtons; 0 takes it off. It stays.
 
-        Returns when it was felt for `PRESS.loaded_s`, or nobody reads the sensor.
+        Returns when it was felt for `LOADED_S`, or nobody reads the sensor.
 
         Raises
         ------
         BenchError
             For what is no load.
         """
-        if not 0 <= newtons <= 10 * PRESS.largest_n:
-            raise BenchError(
-                f"a load of {newtons:g} N", fix=f"give 0 to {10 * PRESS.largest_n:g} N"
-            )
+        if not 0 <= newtons <= 10 * LARGEST_N:
+            raise BenchError(f"a load of {newtons:g} N", fix=f"give 0 to {10 * LARGEST_N:g} N")
         self._play([(1, np.full(self._rest.shape, newtons / self._rest.size))])
         with self._turn:
-            then = self._felt + self._beats(PRESS.loaded_s)
-            self._turn.wait_for(lambda: self._felt >= then, PRESS.unread_s)
+            then = self._felt + self._beats(LOADED_S)
+            self._turn.wait_for(lambda: self._felt >= then, UNREAD_S)
 
     def lift(self) -> None:
         """Lift at once."""
@@ -103,7 +106,7 @@ class PressSequence:
     def _play(self, coming: list[tuple[int, Array]]) -> None:
         with self._turn:
             if self._now.any() and len(coming) > 1:
-                coming = [(self._beats(PRESS.apart_s), self._rest), *coming]
+                coming = [(self._beats(APART_S), self._rest), *coming]
             self._coming = coming
 
     def _beat(self) -> Array:

@@ -18,7 +18,11 @@ from pathlib import Path
 from probe.frame import Frame
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
-from recognizer.bench.settings import LINE
+
+WAIT_S = 0.005  #: of the probe for its next frame, and so of a command for its answer
+IDLE_S = 0.05  #: where no frames are wanted
+AT_ONCE = 4096  #: bytes read
+LOST = 65536  #: bytes that wait for a reader; more are thrown away, as on a real line
 
 
 class SoftwareLine:
@@ -76,11 +80,11 @@ class SoftwareLine:
                 self._plug()
                 waiting = b""
             with suppress(BlockingIOError):
-                self._probe.write(os.read(self._near, LINE.at_once))
+                self._probe.write(os.read(self._near, AT_ONCE))
             asked = self._probe.streaming
-            waiting += self._probe.read(LINE.wait_s if asked else LINE.idle_s)
+            waiting += self._probe.read(WAIT_S if asked else IDLE_S)
             with suppress(BlockingIOError):
                 waiting = waiting[os.write(self._near, waiting) :] if waiting else b""
-            if len(waiting) > LINE.lost:  # nobody listens: as on a real line
+            if len(waiting) > LOST:  # nobody listens: as on a real line
                 waiting = b""
         self._pull()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import os
 import re
@@ -12,25 +13,28 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from types import FrameType
+from typing import Any
 
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from encoded_objects.base.sensor_type import choose_sensor_type
 from generator.database import DatabaseError
 from generator.database.open import database_exists
 from probe.errors import ProbeError
-from recognizer.bench.app import BenchContext, app_for
+from recognizer.bench.app import application
 from recognizer.bench.broker import Broker
 from recognizer.bench.command import BenchOptions
 from recognizer.bench.errors import BenchError
 from recognizer.bench.guard import RequestGuard, access_rules, is_loopback
-from recognizer.bench.patience import PatientProtocol
 from recognizer.bench.session import Session
-from recognizer.bench.settings import PAGE
 
 SOFTWARE = ("touch:", "Simulated probe: click on the part")
 FIRMWARE = ("touch:?firmware=avr", "Simulated probe, through the firmware")
 PATTERN = ("sim:", "Moving pattern")
+
+CONNECTIONS = 900  #: open at once, below the files that a process may have open
+FIRST_REQUEST_S = 5.0  #: that a connection may take for its first request
 
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{12,200}")
 
@@ -58,16 +62,16 @@ def serve(options: BenchOptions) -> int:
     session = Session(database, options.folder, sensor, broker)
     try:
         _begin(session, options.port)
-        bench = BenchContext(session, broker, options.parts, _ports(options.port))
+        app = application(session, broker, _ports(options.port), options.parts)
         config = uvicorn.Config(
-            RequestGuard(app_for(bench), access_rules(options.host, token)),
+            RequestGuard(app, access_rules(options.host, token)),
             log_level="warning", access_log=False, server_header=False,
             ws_max_size=4096, ws_per_message_deflate=False, ws_ping_interval=20.0,
-            timeout_graceful_shutdown=1, limit_concurrency=PAGE.connections,
-            http=PatientProtocol,
+            timeout_graceful_shutdown=1, limit_concurrency=CONNECTIONS,
+            http=_IdleTimeout,
         )  # fmt: skip
         server = uvicorn.Server(config)
-        server.handle_exit = _ending_first(session, server.handle_exit)
+        server.handle_exit = _mark_ending(session, server.handle_exit)
         sys.stdout.write(_address(options.host, line.getsockname()[1], token) + "\n")
         sys.stdout.flush()
         server.run(sockets=[line])
@@ -80,15 +84,48 @@ def serve(options: BenchOptions) -> int:
     return 0
 
 
+class _IdleTimeout(H11Protocol):  # type: ignore[misc]  # uvicorn has no types
+    """Close connections that send no request within `FIRST_REQUEST_S` (slow loris).
+
+    uvicorn bounds the pauses between requests, but not the wait for the first one.
+    """
+
+    _deadline: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: Any) -> None:
+        """Begin to wait for the first request."""
+        super().connection_made(transport)
+        self._deadline = self.loop.call_later(FIRST_REQUEST_S, self._close_idle)
+
+    def handle_websocket_upgrade(self, event: Any) -> None:
+        """Hand the connection on, without a deadline."""
+        self._cancel()
+        super().handle_websocket_upgrade(event)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        self._cancel()
+        super().connection_lost(exc)
+
+    def _cancel(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
+    def _close_idle(self) -> None:
+        if self.cycle is None and not self.transport.is_closing():
+            self.transport.close()
+
+
 def _end(_number: int, _frame: FrameType | None) -> None:
     """Take a request to end like that of the operator, so that what is open is closed."""
     raise KeyboardInterrupt
 
 
-def _ending_first(
+def _mark_ending(
     session: Session, end: Callable[[int, FrameType | None], None]
 ) -> Callable[[int, FrameType | None], None]:
-    """Return a signal handler that ends what reads a recording, which `end` would wait for."""
+    """Return a signal handler that first ends the reading of a recording, which `end` waits for."""
 
     def handle(number: int, frame: FrameType | None) -> None:
         session.ending = True

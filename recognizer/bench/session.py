@@ -1,10 +1,7 @@
-"""One probe and all that is done with it. Every page sees and works the same session.
-
-What is done with a calibration stands in `calibration_desk`, what is learned of the sensor in
-`sensor_desk`; both work on the session under its lock, `turn`.
+"""One probe and all that is done with it; every page sees and works one session.
 
 A thread takes the frames of the feed and hands them on (`frames`). Requests come from other
-threads, one at a time.
+threads; whoever works on the session holds its lock.
 """
 
 from __future__ import annotations
@@ -23,19 +20,21 @@ from probe.frame import Frame
 from probe.port.url import address_of
 from probe.recording.read import Recording
 from recognizer.bench.broker import Broker
-from recognizer.bench.calibration_desk import CalibrationDesk
-from recognizer.bench.calibration_state import CalibrationState
+from recognizer.bench.calibration import CalibrationState
+from recognizer.bench.controllers import STATE, CalibrationController, SensorController
 from recognizer.bench.errors import BusyError
-from recognizer.bench.feed import Feed, NoFeed, ProbeFeed
+from recognizer.bench.feed import Feed, NoFeed, ProbeFeed, ReplayFeed
 from recognizer.bench.files import find_file, list_files
 from recognizer.bench.frames import FrameHandler
-from recognizer.bench.recognition_thread import RecognitionThread
-from recognizer.bench.replay import ReplayFeed
-from recognizer.bench.sensor_desk import STATE, SensorDesk
-from recognizer.bench.settings import SESSION
+from recognizer.bench.reading import RecognitionThread
 from recognizer.bench.simulated import SCHEME, TouchProbe
 
 Array = NDArray[np.float64]
+
+WAIT_S = 0.05  #: of the thread for a frame
+STATUS_S = 0.25  #: between two reports
+NOTICES = 40  #: that are kept for the page
+IDLE_S = 5.0  #: without page, recording and calibration, after which the port is closed
 
 
 class Session:
@@ -58,14 +57,14 @@ class Session:
         self.recognition = RecognitionThread(database, sensor, broker)
         self.simulation: TouchProbe | None = None
         self._broker = broker
-        self.turn = threading.RLock()
+        self.lock = threading.RLock()
         self.feed: Feed = NoFeed()
         self._url = ""
         self.frames = FrameHandler(sensor, broker, self.recognition, self.note)
-        self._notices: deque[tuple[int, float, str]] = deque(maxlen=SESSION.notices)
+        self._notices: deque[tuple[int, float, str]] = deque(maxlen=NOTICES)
         self._noted = 0
         self._started_ms = time.time() * 1e3
-        self.calibrations, self.desk = CalibrationDesk(self), SensorDesk(self)
+        self.calibrations, self.mounting = CalibrationController(self), SensorController(self)
         self.ending = False  #: set by a signal: what reads a whole recording ends
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
@@ -75,11 +74,9 @@ class Session:
         """End everything in order; a recording is complete."""
         self._stop.set()
         self._thread.join()
-        with self.turn:
+        with self.lock:
             self._leave()
         self.recognition.close()
-
-    # What the page asks for.
 
     def open(self, url: str, sensor: int | None = None) -> None:
         """Read another port.
@@ -89,7 +86,7 @@ class Session:
         BenchError, PortError, RecordingError, SensorTypeError
             When the URL cannot be read, names no recording, or one of another sensor type.
         """
-        with self.turn:
+        with self.lock:
             self._leave()
             if url.startswith(SCHEME):
                 self.simulation = TouchProbe(url, self.database, self.sensor)
@@ -117,7 +114,7 @@ class Session:
         Raises
         ------
         BusyError
-            When none is.
+            None is played.
         """
         feed = self.feed
         if not isinstance(feed, ReplayFeed):
@@ -126,7 +123,7 @@ class Session:
 
     def select(self, sensor: int) -> None:
         """Read another sensor of the board."""
-        with self.turn:
+        with self.lock:
             if not isinstance(self.feed, ProbeFeed):
                 raise BusyError("no probe is connected", fix="choose a port first")
             self.feed.select(sensor)
@@ -150,7 +147,7 @@ class Session:
 
     def use_database(self, database: str) -> None:
         """Read the objects of a database from now on."""
-        with self.turn:
+        with self.lock:
             self.database = self.recognition.database = database
             self.recognition.reload()
             self.note(f"objects are those of {database}")
@@ -179,7 +176,7 @@ class Session:
         BusyError, RecordingError
             When there is nothing to record, or no place for it.
         """
-        with self.turn:
+        with self.lock:
             if not on:
                 self.frames.end_recording()
             elif not isinstance(self.feed, ProbeFeed):
@@ -196,12 +193,12 @@ class Session:
         BusyError
             When none came yet.
         """
-        with self.turn:
+        with self.lock:
             return self.frames.newest()
 
     def as_json(self) -> dict[str, Any]:
         """Return the state for the page."""
-        with self.turn:
+        with self.lock:
             return {
                 "port": self._url,
                 "feed": self.feed.as_json(),
@@ -211,7 +208,7 @@ class Session:
                 "calibrations": [
                     name for name in list_files(self.folder, ".json") if not name.endswith(STATE)
                 ],
-                **self.desk.as_json(),
+                **self.mounting.as_json(),
                 "notices": [
                     {"number": n, "at_ms": at_ms, "text": text} for n, at_ms, text in self._notices
                 ],
@@ -219,28 +216,26 @@ class Session:
                 "started_ms": self._started_ms,
             }  # fmt: skip
 
-    # What follows runs in the thread, or under its lock.
-
     def _run(self) -> None:
         due_s, wanted_s = 0.0, time.monotonic()
         while not self._stop.is_set():
             feed = self.feed
-            frames = feed.take(SESSION.wait_s)
+            frames = feed.take(WAIT_S)
             now_s = time.monotonic()
-            with self.turn:
+            with self.lock:
                 if self._broker.subscribers or self.frames.busy:
                     wanted_s = now_s
-                feed.rest(wanted=now_s - wanted_s < SESSION.idle_s)
+                feed.rest(wanted=now_s - wanted_s < IDLE_S)
                 if feed is self.feed:
                     self.frames.take(frames)
                     for notice in feed.notices():
                         self.note(notice)
                 if now_s >= due_s:
-                    due_s = now_s + SESSION.status_s
+                    due_s = now_s + STATUS_S
                     self.report()
 
     def _leave(self) -> None:
-        """Let go of what is connected."""
+        """Close what is connected."""
         self.frames.leave()
         feed, self.feed = self.feed, NoFeed()
         feed.close()
@@ -258,10 +253,10 @@ class Session:
         return f"{device}/{feed['sensor']}" if device else ""
 
     def note(self, text: str) -> None:
-        """Let the pages know what happened."""
+        """Show the pages a notice."""
         self._noted += 1
         self._notices.append((self._noted, time.time() * 1e3, text))
 
     def report(self) -> None:
-        """Tell the pages the state as it is now."""
+        """Publish the state."""
         self._broker.publish("status", self.as_json())

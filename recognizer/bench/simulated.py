@@ -26,9 +26,10 @@ from probe.simulate.scene import Scene
 from recognizer.bench.errors import BenchError
 from recognizer.bench.press_sequence import PressSequence, SimulationSettings
 from recognizer.bench.serial_line import SoftwareLine
-from recognizer.bench.settings import PRESS
 
 SCHEME = "touch:"
+SCENES = 32  #: surfaces that are kept
+UNPLUGGED_S = 60.0  #: at most
 _OPTIONS = ("firmware", "rate", "noise", "hold", "seed")
 
 
@@ -133,10 +134,8 @@ class TouchProbe:
 
     def unplug(self, seconds: float) -> None:
         """Pull the plug, and put it in again after so many seconds."""
-        if not 0 < seconds <= PRESS.unplugged_s:
-            raise BenchError(
-                f"unplugged for {seconds:g} s", fix=f"give up to {PRESS.unplugged_s:g} s"
-            )
+        if not 0 < seconds <= UNPLUGGED_S:
+            raise BenchError(f"unplugged for {seconds:g} s", fix=f"give up to {UNPLUGGED_S:g} s")
         if self.firmware:
             self._emulator.fault(f"unplug {seconds:g}")
         else:
@@ -156,7 +155,7 @@ class TouchProbe:
         if key not in self._scenes:
             self._scenes[key] = registered_surface(self.database, object_name, face)
         self._scenes.move_to_end(key)
-        while len(self._scenes) > PRESS.scenes:
+        while len(self._scenes) > SCENES:
             self._scenes.popitem(last=False)
         return self._scenes[key]
 

@@ -2,8 +2,7 @@
 
 A touch is felt, read, and answered or refused; while it moves it is `moving`, and when the
 probe leaves it is no longer in `contact`. An answer belongs to its record alone: a new touch
-begins without one. Pages are told the newest record (topic `touch`), and when others were named or
-deleted (topic `touches`); these can be asked for.
+begins without one. Topic `touch`: the newest record. Topic `touches`: others were named or deleted.
 """
 
 from __future__ import annotations
@@ -21,7 +20,9 @@ from numpy.typing import NDArray
 from probe.frame import Frame
 from recognizer.bench.broker import Broker
 from recognizer.bench.errors import BenchError, UnknownError
-from recognizer.bench.settings import TOUCHES
+
+KEPT = 1000  #: newest touches
+NAME_LENGTH = 80  #: characters that a touch's name may have
 
 State = Literal["felt", "reading", "answered", "refused"]
 
@@ -86,11 +87,11 @@ class TouchLog:
         with self._turn:
             self._number += 1
             self._put(TouchRecord(self._number, felt_ms, frame, recording=recording, at_s=at_s))
-            while len(self._records) > TOUCHES.kept:
+            while len(self._records) > KEPT:
                 self._records.popitem(last=False)
 
     def read(self, frame: Frame) -> None:
-        """Take note that a frame is being read."""
+        """Mark the newest touch as being read."""
         self._change(frame=frame, state="reading", moving=False)
 
     def conclude(self, answer: dict[str, Any], *, answered: bool) -> None:
@@ -98,7 +99,7 @@ class TouchLog:
         self._change(answer=answer, state="answered" if answered else "refused", moving=False)
 
     def move(self) -> None:
-        """Take note that what is felt is no longer what was read."""
+        """Mark the newest touch as different from what was read."""
         self._change(moving=True)
 
     def lift(self) -> None:
@@ -144,9 +145,9 @@ class TouchLog:
         BenchError, UnknownError
             The name is too long, or there is no such touch.
         """
-        if len(name) > TOUCHES.name:
+        if len(name) > NAME_LENGTH:
             raise BenchError(f"a name of {len(name)} characters",
-                             fix=f"give at most {TOUCHES.name}")  # fmt: skip
+                             fix=f"give at most {NAME_LENGTH}")  # fmt: skip
         with self._turn:
             record = replace(self._known(number), name=name)
             self._put(record)
@@ -163,7 +164,7 @@ class TouchLog:
         with self._turn:
             self._known(number)
             del self._records[number]
-            self._tell_change()
+            self._publish_change()
 
     def frame(self, number: int) -> Frame:
         """Return the frame of a touch that was read.
@@ -191,8 +192,8 @@ class TouchLog:
             table.writerows(_row(record) for record in self._records.values())
         return text.getvalue()
 
-    def _tell_change(self) -> None:
-        """Tell the pages to ask for the records again: one that is not the newest has changed."""
+    def _publish_change(self) -> None:
+        """Let the pages ask for all records: one that is not the newest has changed."""
         self._changes += 1
         self._broker.publish("touches", {"changes": self._changes})
 
@@ -212,7 +213,7 @@ class TouchLog:
         before = self._records.get(record.number)
         self._records[record.number] = record
         if record.number != self._number:
-            self._tell_change()
+            self._publish_change()
         elif before is None or before.as_json() != record.as_json():
             self._broker.publish("touch", record.as_json())
 

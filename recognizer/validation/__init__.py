@@ -2,17 +2,16 @@
 
 ::
 
-    campaign  how many touches, of which kinds and levels;  encoded_set  what is touched
-    made_kinds  what kinds need beside the set: copies, small objects, other labs
-    draw      number -> touch and counts (surfaces, written)
-    trial     touch -> answer -> verdict;  rows  a touch as a row
-    run       who does which touches (work, workers, cluster), and where they go (shards)
-    results   rows -> shares and errors (lines, worlds, bounds, statistics, precision, extremes,
-              savings)
-    report    results -> page (pictures, precision_pictures, labels, flat_faces)
-    compare   two runs;  join  runs of different worlds (world_pictures);  finished  reads them
-    repeat    one touch again
-    pipeline  all of it in order: `validate`;  result  what it returns;  command  validate-set
+    campaign     how many touches, of which kinds and levels
+    encoded_set  the objects that are touched, and what some kinds need besides
+    touch_plan   the plan of a touch and the scenes of faces;  draw  number -> touch and counts
+    trial        touch -> answer -> verdict -> row
+    run          which touches are left;  workers  who does them;  files  where they go
+    results      rows -> shares and errors (statistics);  studies, extremes  add theirs
+    report       results -> page (pictures, flat_faces);  result  what `validate` returns
+    compare      two runs, or the worlds of several;  repeat  one touch again
+    dataset      touches with their truth, for training;  printing  printed surfaces
+    pipeline     all of it in order: `validate`;  command  validate-set
 """
 
 from __future__ import annotations

@@ -16,16 +16,21 @@ from itertools import accumulate
 
 import numpy as np
 
-from probe.contact.engines import engine_named
+from probe.contact.engines import ENGINES, engine_named
 from probe.simulate.world.levels import LEVELS
 from recognizer.touch.options import DEFAULTS, Effort
 from recognizer.touch.reader import Reader
+from recognizer.validation.draw import FOREIGN
+from recognizer.validation.encoded_set import COPY, NEAR, SAME_PROFILE, SIDE, SMALL
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.made_kinds import COPY, NEAR, SAME_PROFILE, SIDE, SMALL
-from recognizer.validation.policy import ONE
-from recognizer.validation.settings import SHARING
-from recognizer.validation.surfaces import FOREIGN
-from recognizer.validation.touch_plan import TouchPlan
+from recognizer.validation.touch_plan import TouchPlan, sensor_of
+from recognizer.validation.trial import ONE, POLICY_NAMES
+
+SHARD = 1000  #: touches in a file, lost at most with a run
+BATCH = 25  #: touches that a worker takes at once, 1/8 s: calls cost nothing then
+#: Touches of faces that every reader of a study gets: the interval of 99.5 % is then 2 % wide. Six
+#: readers take 1,200, so a run of fewer touches than this has no study unless one is asked for.
+STUDY = 200
 
 TOUCHES = "touches"  #: name of the series that is counted
 BLANK, STRANGE = "blank", "foreign"
@@ -75,7 +80,7 @@ class Campaign:
     sensor_per: str = "touch"  #: or `run`: how long the errors of a sensor stay the same
     policy: str = ONE  #: or `next`: touches follow until one is answered
     study: int = 0  #: touches of every reader of `READERS`; 0: no study
-    shard: int = SHARING.shard  #: touches in a file: at most so many are lost with a run
+    shard: int = SHARD  #: touches in a file: at most so many are lost with a run
 
 
 def touchable(campaign: Campaign, named: bool) -> Campaign:
@@ -156,8 +161,8 @@ def shards_of(series: Series) -> int:
 def batches_of(series: Series, shard: int) -> Iterator[Batch]:
     """Yield the batches of a shard."""
     end = min((shard + 1) * series.shard, series.touches)
-    for first in range(shard * series.shard, end, SHARING.batch):
-        yield Batch(series.name, first, min(first + SHARING.batch, end))
+    for first in range(shard * series.shard, end, BATCH):
+        yield Batch(series.name, first, min(first + BATCH, end))
 
 
 def plan_of(
@@ -248,3 +253,70 @@ def _draw(shares: Shares, rng: np.random.Generator) -> str:
     ends = tuple(accumulate(share for _, share in shares))
     place = bisect_right(ends, rng.random() * ends[-1])
     return shares[min(place, len(shares) - 1)][0]
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignOptions:
+    """Options as they were given; None or empty: as in the run that is resumed, or the default."""
+
+    touches: int | None = None
+    seed: int | None = None
+    kinds: str = ""
+    levels: str = ""
+    sensor_type: str = ""
+    overlay: str = ""
+    surfaces: str = ""
+    print_profile: str = ""
+    faults: str = ""
+    engine: str = ""
+    sensor_per: str = ""
+    policy: str = ""
+    study: int | None = None
+    shard: int | None = None
+
+
+def campaign_of(options: CampaignOptions, known: Campaign | None) -> Campaign:
+    """Return what is record for, options over what was record before over defaults."""
+    for given, allowed, option in (
+        (options.overlay, ("tab", "pad"), "--overlay"),
+        (options.surfaces, SURFACES, "--surfaces"),
+        (options.engine, tuple(ENGINES), "--engine"),
+        (options.sensor_per, ("touch", "run"), "--sensor-per"),
+        (options.policy, POLICY_NAMES, "--policy"),
+    ):
+        if given and given not in allowed:
+            raise ValidationError(
+                f"'{given}' is not known", fix=f"give {' or '.join(allowed)}", place=option
+            )
+    base = known or Campaign()
+    own = sensor_of(options.sensor_type, "").overlay.kind if options.sensor_type else ""
+    touches = base.touches if options.touches is None else options.touches
+    study = base.study if known else (STUDY if touches >= STUDY else 0)
+    campaign = replace(
+        base,
+        touches=touches,
+        seed=base.seed if options.seed is None else options.seed,
+        kinds=kinds_of(options.kinds) if options.kinds else base.kinds,
+        levels=levels_of(options.levels) if options.levels else base.levels,
+        sensor_type=options.sensor_type or base.sensor_type,
+        overlay=options.overlay or own or base.overlay,
+        surfaces=options.surfaces or base.surfaces,
+        print_profile=options.print_profile or base.print_profile,
+        faults=options.faults or base.faults,
+        engine=options.engine or base.engine,
+        sensor_per=options.sensor_per or base.sensor_per,
+        policy=options.policy or base.policy,
+        study=study if options.study is None else options.study,
+        shard=base.shard if options.shard is None else options.shard,
+    )
+    for given, option in (
+        (campaign.print_profile, "--print-profile"),
+        (campaign.faults, "--faults"),
+    ):
+        if given and campaign.surfaces != PRINTED:
+            raise ValidationError(
+                f"{campaign.surfaces} are touched, nothing is printed",
+                fix="add --surfaces printed",
+                place=option,
+            )
+    return touchable(campaign, bool(options.kinds))

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from encoded_objects.base import console, output
 from encoded_objects.base.options import Argument, Json, Option, Options, command
@@ -199,7 +199,7 @@ def touch_set(
 ) -> int:  # fmt: skip
     """Touch a set; `HELP` is what people see."""
     from recognizer.validation.pipeline import validate
-    from recognizer.validation.progress import TouchProgress
+    from recognizer.validation.run import TouchProgress
 
     given = vars(options) | {
         "specs": options.specs or (),
@@ -223,10 +223,9 @@ def compare(
     as_json: Json = False,
 ) -> int:
     """Show two runs side by side: what became better, worse, or is the same within chance."""
-    from recognizer.validation import text
     from recognizer.validation.compare import compare_runs
 
-    text.comparison(compare_runs(first, second, output), output, as_json=as_json)
+    _print_comparison(compare_runs(first, second, output), output, as_json=as_json)
     return console.DONE
 
 
@@ -241,10 +240,9 @@ def worlds(
     as_json: Json = False,
 ) -> int:  # fmt: skip
     """Show runs of different worlds on one page: engines, surfaces, sensors."""
-    from recognizer.validation import text
-    from recognizer.validation.join import join_runs
+    from recognizer.validation.compare import join_runs
 
-    text.worlds(join_runs(folders, output), output, as_json=as_json)
+    _print_worlds(join_runs(folders, output), output, as_json=as_json)
     return console.DONE
 
 
@@ -258,10 +256,9 @@ def repeat(
     as_json: Json = False,
 ) -> int:
     """Do one touch again: surface, counts, fitted symbols, answer and truth."""
-    from recognizer.validation import text
     from recognizer.validation.repeat import repeat_touch
 
-    text.repetition(repeat_touch(folder, number, plot), plot, as_json=as_json)
+    _print_row(repeat_touch(folder, number, plot), plot, as_json=as_json)
     return console.DONE
 
 
@@ -283,6 +280,54 @@ def _report(result: ValidationResult, *, as_json: bool) -> None:
         output.write_json(result.as_json())
     else:
         output.write(f"{result}\nnext: open {result.folder / 'report.html'}")
+
+
+def _print_comparison(found: dict[str, Any], page: Path | None, *, as_json: bool) -> None:
+    """Say what became of what."""
+    if as_json:
+        output.write_json(found)
+        return
+    wide = max(len(line["name"]) for line in found["lines"])
+    output.write(f"{'':{wide}}  {'A':>12}  {'B':>12}")
+    for line in found["lines"]:
+        a, b = (("-" if v is None else f"{v:.6g}") for v in (line["a"], line["b"]))
+        output.write(f"{line['name']:{wide}}  {a:>12}  {b:>12}  {line['word']}")
+    _print_next(page)
+
+
+def _print_worlds(found: dict[str, Any], page: Path | None, *, as_json: bool) -> None:
+    """Say what became of the touches of every world."""
+    if as_json:
+        output.write_json(found)
+        return
+    names = [f"{w['run']}: {w['engine']}, {w['surface']}, {w['sensor']}" for w in found["worlds"]]
+    wide = max(map(len, names), default=0)
+    heads = ("touches", "right", "wrong", "refused", "mm rms", "deg rms", "inside")
+    output.write(f"{'':{wide}}" + "".join(f"{head:>9}" for head in heads))
+    for name, line in zip(names, found["worlds"], strict=True):
+        counts = (line["touches"], line["right"], line["wrong"], line["rejected"])
+        sizes = (
+            ("-" if line[key] is None else f"{line[key]:.3f}") for key in ("rms_mm", "rms_deg")
+        )
+        inside = line["inside_95"]["share"]
+        cells = [f"{n:,}" for n in counts] + [*sizes, "-" if inside is None else f"{inside:.1%}"]
+        output.write(f"{name:{wide}}" + "".join(f"{cell:>9}" for cell in cells))
+    _print_next(page)
+
+
+def _print_row(row: dict[str, Any], plot: Path | None, *, as_json: bool) -> None:
+    """Say what became of one touch."""
+    if as_json:
+        output.write_json(row)
+        return
+    output.pairs({name: "-" if value is None else str(value) for name, value in row.items()})
+    _print_next(plot)
+
+
+def _print_next(page: Path | None) -> None:
+    """Say what to look at now, if there is anything."""
+    if page:
+        output.write(f"next: open {page}")
 
 
 if __name__ == "__main__":

@@ -1,21 +1,69 @@
-"""Two runs side by side: what became better or worse, and what is the same within chance.
+"""Finished runs side by side: two compared, or the worlds of several on one page.
 
-Folders -> lines, and a page. Shares differ if the difference exceeds what two samples of the
-same share show in 95 % of all cases (Newcombe's interval, from the exact ones of both); root mean
-squares, if it exceeds twice its standard error, 1/sqrt(4 n) of each.
+Folders -> lines, and a page. Shares differ if the difference exceeds what two samples of one
+share show in 95 % of all cases (Newcombe's interval, from the exact ones of both); root mean
+squares, if it exceeds twice its standard error, 1/sqrt(4 n) of each. Of worlds nothing is counted
+together: they differ, and so do the numbers of their touches.
 """
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from recognizer.validation.files import write_text
-from recognizer.validation.finished import read_finished
-from recognizer.validation.pictures import accuracy
-from recognizer.validation.report import PAIR, environment
+from recognizer.validation.errors import ValidationError
+from recognizer.validation.files import write_json, write_text
+from recognizer.validation.pictures import accuracy, draw_answers, draw_errors
+from recognizer.validation.report import PAIR, RESULTS, TIMES_FILE, environment, require_report
+from recognizer.validation.results import FORMAT
+
+
+@dataclass(frozen=True, slots=True)
+class FinishedRun:
+    """What a run left."""
+
+    results: dict[str, Any]
+    times: dict[str, Any]
+
+    @property
+    def command(self) -> str:
+        """The command that makes the run again."""
+        return str(self.results["provenance"]["command"])
+
+
+def read_finished(folder: Path) -> FinishedRun:
+    """Return what a run left.
+
+    Raises
+    ------
+    ValidationError
+        The folder holds no run that is done, or its results are of another version.
+    """
+    results, times = _read_json(folder, RESULTS), _read_json(folder, TIMES_FILE)
+    if results.get("format") != FORMAT:
+        raise ValidationError(
+            f"results of format {results.get('format', 1)}, this version reads {FORMAT}",
+            fix=f"make them anew: validate-set report {folder}",
+            place=str(folder),
+        )
+    return FinishedRun(results, times)
+
+
+def _read_json(folder: Path, name: str) -> dict[str, Any]:
+    try:
+        values: dict[str, Any] = json.loads((folder / name).read_text("utf-8"))
+    except (OSError, ValueError) as error:
+        raise ValidationError(
+            f"no {name} of a run that is done",
+            fix="name the folder that -o named; go on with a run by --resume",
+            place=str(folder),
+        ) from error
+    return values
+
 
 SAME, BETTER, WORSE = "same within chance", "better", "worse"
 
@@ -118,3 +166,69 @@ def _differing_settings(a: dict[str, Any], b: dict[str, Any]) -> list[dict[str, 
 
 def _text(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value)
+
+
+PAGE = "worlds.html.j2"
+
+
+def join_runs(folders: Sequence[Path], page: Path | None) -> dict[str, Any]:
+    """Return the worlds of several runs.
+
+    Parameters
+    ----------
+    folders
+        Of runs that are done.
+    page
+        HTML to write; JSON goes beside it under the same name. None: nothing is written.
+
+    Returns
+    -------
+    `runs`: name (a letter), command, versions; `worlds`: a line of `worlds.worlds_of` each, with
+    the run's name and the CPU times of a touch (`drawing_ms`, `reading_ms`).
+
+    Raises
+    ------
+    ValidationError
+        A folder holds no run that is done, or one of another version; or one stands twice.
+    """
+    if not folders:
+        raise ValidationError("no run is named", fix="give the folders that -o named")
+    places = [folder.resolve() for folder in folders]
+    for place in places:
+        if places.count(place) > 1:
+            raise ValidationError("stands twice", fix="name every run once", place=place.name)
+    found = join_finished([read_finished(folder) for folder in folders])
+    if page is not None:
+        require_report("validate-set worlds")
+        pictures = draw_answers(found["worlds"]), draw_errors(found["worlds"])
+        text = environment().get_template(PAGE).render(**found, pictures=pictures)
+        write_text(page, text)
+        write_json(page.with_suffix(".json"), found)
+    return found
+
+
+def join_finished(runs: Sequence[FinishedRun]) -> dict[str, Any]:
+    """Return the worlds of runs, in their order."""
+    told, worlds = [], []
+    for number, run in enumerate(runs):
+        name = run_name(number)
+        provenance = run.results["provenance"]
+        touches = run.results["totals"]["touches"]
+        told.append({"run": name, "command": run.command, "touches": touches,
+                     "versions": provenance["versions"], "set": provenance["set"]})  # fmt: skip
+        for line, spent in zip(run.results["worlds"], run.times["worlds"], strict=True):
+            ms = {f"{part}_ms": value for part, value in spent.items()}
+            worlds.append({"run": name, **line, **ms})
+    return {"runs": told, "worlds": worlds}
+
+
+def run_name(number: int) -> str:
+    """Return A, B ... Z, A2, B2 ...
+
+    Examples
+    --------
+    >>> run_name(0), run_name(25), run_name(26)
+    ('A', 'Z', 'A2')
+    """
+    again, letter = divmod(number, 26)
+    return chr(ord("A") + letter) + (str(again + 1) if again else "")

@@ -1,4 +1,4 @@
-"""What is touched, where, and what the sensor reads. Nothing but its number decides a touch.
+"""What is touched, where, and what the sensor reads: deterministic in (seed, number).
 
 TouchPlan + number -> DrawnTouch. It is drawn from `default_rng([seed, number])`, so any touch
 can be repeated by its number, in any order and on any machine.
@@ -7,6 +7,7 @@ can be repeated by its number, in any order and on any machine.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -14,19 +15,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
+from generator.alphabet import alphabet_named
+from generator.array import FoldedArray, ProductArray, profile
 from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.simulate.scene import Scene, bare_scene
-from probe.simulate.touch import TouchRanges
+from probe.simulate.touch import TouchRanges, random_touches
 from probe.simulate.world.sensor import LevelSensor, SensorInstance, sample_sensor
-from probe.simulate.world.surfaces import AdjacentParts, FramePlace, place_adjacent, worn_scene
+from probe.simulate.world.surfaces import (
+    AdjacentParts,
+    FramePlace,
+    draw_dots,
+    draw_ridges,
+    draw_rough,
+    draw_text,
+    place_adjacent,
+    worn_scene,
+)
+from probe.surface.contract import HeightMap
+from probe.surface.face import endless_face
+from probe.surface.indenters import FlatPlate
+from probe.surface.symbols import Relief
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
+from recognizer.validation.encoded_set import SAME_PROFILE, SIDE
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.made_kinds import SAME_PROFILE, SIDE
-from recognizer.validation.place import draw_anywhere, draw_on_face, inradius_mm
-from recognizer.validation.settings import DRAWING
-from recognizer.validation.surfaces import FOREIGN
 from recognizer.validation.touch_plan import (
     TouchPlan,
     faces_of_kind,
@@ -35,6 +48,120 @@ from recognizer.validation.touch_plan import (
     ranges_of,
     scene_of,
 )
+
+#: A touch inside a face keeps this far from its edges: a sensor of 25 mm then shows most of its
+#: window; nearer ones are of the kind `edge`, or `corner` about a corner.
+INSIDE_MM = 9.0
+#: A touch without a rest is drawn again: words of the cause, and the reason that is counted.
+UNREST = (
+    ("tips", "the plate tips"),
+    ("under the", "nothing bears it"),
+    ("too thin", "strokes too thin"),
+    ("finds no rest", "no rest in the engine"),
+    ("does not settle", "no rest in the engine"),
+)
+
+
+def _random_symbols(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
+    """Return symbols of the lab's alphabet and pitch, drawn at random."""
+    return _embossed_surface(encoding, rng.integers(encoding.array.order, size=(64, 64)))
+
+
+def _other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
+    """Return another array in the lab's alphabet and pitch."""
+    sizes = (encoding.array.rows, encoding.array.columns)
+    names = ("one-touch", "large") if encoding.array.order == 4 else ("thesis",)
+    others = [_array_of(name) for name in names]
+    array = next((a for a in others if (a.rows, a.columns) != sizes), others[0])
+    if (array.rows, array.columns) == sizes or array.order != encoding.array.order:
+        return _random_symbols(encoding, rng)
+    row, column = (int(rng.integers(size)) for size in (array.rows, array.columns))
+    rows, columns = np.indices((64, 64))
+    return _embossed_surface(
+        encoding, array.symbols((rows + row) % array.rows, (columns + column) % array.columns)
+    )
+
+
+def _letters(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
+    """Return letters as high and as thick as the symbols."""
+    letters = alphabet_named("letters-4")
+    strokes = tuple(glyph.strokes for glyph in letters.glyphs)
+    return draw_text(strokes, letters.reach, encoding.style.pitch_mm, _relief(encoding), rng)
+
+
+#: Surfaces that no database knows, `--kinds foreign`, in the style of the lab's symbols.
+FOREIGN: dict[str, Callable[[EmbossedArray, np.random.Generator], HeightMap]] = {
+    "blank": lambda _lab, _rng: FlatPlate(),
+    "ridges": lambda lab, rng: draw_ridges(lab.style.pitch_mm, lab.style.stroke_mm, rng),
+    "dots": lambda lab, rng: draw_dots(lab.style.pitch_mm, rng),
+    "rough": lambda _, rng: draw_rough(rng),
+    "random symbols": _random_symbols,
+    "other lab": _other_lab,
+    "text": _letters,
+}
+
+
+@lru_cache(maxsize=4)
+def _array_of(name: str) -> FoldedArray | ProductArray:
+    return profile(name).array()
+
+
+def _embossed_surface(encoding: EmbossedArray, labels: NDArray[np.int64]) -> HeightMap:
+    style, alphabet = encoding.style, encoding.alphabet
+    return endless_face(
+        labels,
+        tuple(glyph.strokes for glyph in alphabet.glyphs),
+        pitch_mm=style.pitch_mm,
+        unit_mm=alphabet.reach * style.pitch_mm,
+        relief=_relief(encoding),
+    )
+
+
+def _relief(encoding: EmbossedArray) -> Relief:
+    style = encoding.style
+    return Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
+
+
+def draw_on_face(
+    scene: Scene, kind: str, most: float, rng: np.random.Generator, ranges: TouchRanges
+) -> Touch:
+    """Draw a touch of a face; where a face is too small for its kind, anywhere on it."""
+    if kind == "corner":
+        touch = next(random_touches(scene.region, rng, ranges))
+        corner = scene.region.starts[int(rng.integers(len(scene.region.starts)))]
+        towards = np.array([touch.x_mm, touch.y_mm]) - corner
+        by = INSIDE_MM * rng.random() / max(float(np.hypot(*towards)), INSIDE_MM)
+        at = corner + towards * by
+        return replace(touch, x_mm=float(at[0]), y_mm=float(at[1]))
+    if kind == "edge":
+        for touch in random_touches(scene.region, rng, ranges):
+            if scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0] < INSIDE_MM:
+                return touch
+    margin = 0.0 if kind == "anywhere" else min(INSIDE_MM, 0.8 * most)
+    return next(random_touches(scene.region, rng, replace(ranges, margin_mm=margin)))
+
+
+@lru_cache(maxsize=512)
+def inradius_mm(database: str, object_name: str, face: str, files: bool, prints: str = "") -> float:
+    """Return how far the inmost point of a face lies from its edges, mm, nearly."""
+    return scene_of(database, object_name, face, files, prints).inradius_mm()
+
+
+def draw_anywhere(rng: np.random.Generator, ranges: TouchRanges) -> Touch:
+    """Draw a touch of a surface that has no edges near, within 100 mm of its origin."""
+    low, high = ranges.force_n
+    theta, towards = rng.uniform(-math.pi, math.pi, 2)
+    tilt = ranges.tilt_rad * math.sqrt(rng.random())
+    x, y = rng.uniform(0, 100, 2)
+    return Touch(
+        x_mm=float(x),
+        y_mm=float(y),
+        theta_rad=float(theta),
+        force_n=float(rng.uniform(low, high)),
+        tilt_x_rad=tilt * math.cos(towards),
+        tilt_y_rad=tilt * math.sin(towards),
+    )
+
 
 Array = NDArray[np.float64]
 
@@ -94,9 +221,14 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
         try:
             counts = _read(plan, contact.scene, touch, sensor, reader, rng)
         except ContactError as error:
-            resampled.append(DRAWING.why_resampled(error.cause))
+            resampled.append(_reason_of(error.cause))
         else:
             return DrawnTouch(contact, touch, counts, sensor, tuple(resampled))
+
+
+def _reason_of(cause: str) -> str:
+    """Return the reason that is counted for a cause of the contact."""
+    return next((reason for words, reason in UNREST if words in cause), "other")
 
 
 def draw_again(

@@ -1,7 +1,9 @@
 """The set that is validated: made from specs by `encode-object`, or what a database holds.
 
-Specs -> parts and database -> URL and digest. The command runs as a process of its own:
-nothing of the making is known here but its database and its files.
+Specs -> parts and database -> URL and digest. The command runs as a process of its own: only its
+database and its files are used. Some kinds of touches need more: members of their own, in the
+profile and at the pitch of the set's first object, so that they are rivals of all others; and
+databases of other labs, which made their parts with the same profile and keys of their own.
 """
 
 from __future__ import annotations
@@ -10,17 +12,29 @@ import hashlib
 import json
 import subprocess
 import sys
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
+from generator.array.lab_key import lab_key_of
 from generator.database import DatabaseError
 from generator.database.open import database_exists, open_database
 from generator.database.read import list_objects, read_parts
 from generator.database.transaction import read_transaction
-from recognizer.validation.errors import SetError
+from recognizer.validation.errors import SetError, ValidationError
+
+BLOCK_MM = (45.0, 35.0, 28.0)  #: of copies and near ones
+COPIES = 12  #: of one block; as many near ones
+NEAR_MM = 0.5  #: from one near block to the next
+#: Sides of small cubes over the pitch: 22 ... 25.2 mm at 7 mm, less than the sensor's 25.4 mm, with
+#: room for nine symbols; smaller ones have no place that can be recognised, and are refused.
+SMALL_PITCHES = (3.15, 3.3, 3.45, 3.6)
+OTHER_LABS, LAB_OBJECTS = 2, 8  #: that made parts with the same profile; objects of each
+LAB_MM = (35.0, 75.0)  #: their sizes
 
 PARTS, LAB = "parts", "lab.db"
 LAB_KEY = "VA11-DATE-0000-0002"  #: of the sets that are made here and say none
@@ -140,3 +154,137 @@ def _first_problem(stdout: str, stderr: str) -> tuple[str, str, str]:
         return (lines[-1] if lines else "it failed"), "", ""
     where = str(first.get("place") or "")
     return str(first.get("cause", "it failed")), str(first.get("fix") or ""), where
+
+
+COPY, NEAR, SMALL, SIDE = "copy", "near", "small", "side"
+SAME_PROFILE = "same_profile"
+EXTRA = {COPY: "Extra copy", NEAR: "Extra near", SMALL: "Extra small"}
+"""Kinds that are touches of members of their own, and how the names of these begin."""
+LABS = "labs"
+
+
+def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: int) -> None:
+    """Make what kinds need beside the set.
+
+    Parameters
+    ----------
+    folder
+        Of the run.
+    database
+        Of the set, which is made.
+    kinds
+        Of the campaign.
+    seed
+        Of the campaign; draws the objects of other labs.
+
+    Raises
+    ------
+    ValidationError
+        Two objects are to lie side by side and there is one.
+    SetError
+        They cannot be made.
+    """
+    members = members_of(database)
+    if SIDE in kinds and len(members) < 2:
+        raise ValidationError(
+            "two objects side by side need two, the set has one",
+            fix="name a set of two objects or more, or leave out side",
+            place="--kinds",
+        )
+    first = members[0]
+    for kind in EXTRA:  # one after the other: they may be on different arrays
+        if kind in kinds:
+            specs = list(_extra_specs(kind, first.pitch_mm))
+            _make(specs, first, folder / f"extra-{kind}.yaml", folder / PARTS, database)
+    if SAME_PROFILE in kinds:
+        for number in range(OTHER_LABS):
+            lab = folder / LABS / f"lab-{number + 1}"
+            lab.mkdir(parents=True, exist_ok=True)
+            rng = np.random.default_rng([seed, number, 5])
+            specs = list(_random_specs(number, rng))
+            key = lab_key_of(np.random.default_rng([seed, number, 6]).bytes(16))
+            _make(specs, first, lab / "set.yaml", lab / PARTS, str(lab / LAB), lab_key=key)
+
+
+def labs_of(folder: Path, kinds: Collection[str]) -> tuple[str, ...]:
+    """Return the databases of the other labs that a run touches."""
+    if SAME_PROFILE not in kinds:
+        return ()
+    found = range(1, OTHER_LABS + 1)
+    return tuple(str((folder / LABS / f"lab-{number}" / LAB).absolute()) for number in found)
+
+
+def refuse_without_specs(kinds: Collection[str]) -> None:
+    """See to it that no object is registered in a database that is only to be read.
+
+    Raises
+    ------
+    ValidationError
+        A kind needs members of its own.
+    """
+    made = [kind for kind in EXTRA if kind in kinds]
+    if made:
+        raise ValidationError(
+            f"{', '.join(made)} need objects of their own, which would be registered in a database "
+            "that is only named",
+            fix="give the SPEC.yaml files of the set, whose database the run makes",
+            place="--kinds",
+        )
+
+
+def is_extra(name: str, kind: str) -> bool:
+    """Whether an object is one of those that touches of a kind are drawn from."""
+    if kind in EXTRA:
+        return name.startswith(EXTRA[kind])
+    return not name.startswith(tuple(EXTRA.values()))
+
+
+def _extra_specs(kind: str, pitch_mm: float) -> Iterator[dict[str, Any]]:
+    name, (x, y, z) = EXTRA[kind], BLOCK_MM
+    if kind == COPY:
+        yield {"name": name, "shape": {"box": _lengths(x, y, z)}, "copies": COPIES}
+    elif kind == NEAR:
+        for k in range(COPIES):
+            longer = x + k * NEAR_MM
+            yield {"name": f"{name} {longer:g}", "shape": {"box": _lengths(longer, y, z)}}
+    else:
+        for pitches in SMALL_PITCHES:  # of the array that holds so little: auto
+            side = round(pitches * pitch_mm, 1)
+            shape = {"cube": f"{side:g} mm"}
+            yield {"name": f"{name} {side:g}", "shape": shape, "profile": "auto"}
+
+
+def _random_specs(lab: int, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+    """Yield the objects of another lab, of any size."""
+    for k in range(LAB_OBJECTS):
+        x, y, z = (float(round(size, 1)) for size in rng.uniform(*LAB_MM, 3))
+        shape: dict[str, Any] = {"box": _lengths(x, y, z)}
+        if k % 3 == 1:
+            shape = {"triangular_prism": {"side": f"{x:g} mm", "height": f"{y:g} mm"}}
+        if k % 3 == 2:
+            shape = {"cube": f"{x:g} mm"}
+        yield {"name": f"Other {lab + 1}-{k + 1}", "shape": shape}
+
+
+def _make(
+    specs: list[dict[str, Any]],
+    like: Member,
+    file: Path,
+    folder: Path,
+    database: str,
+    lab_key: str = "",
+) -> None:
+    style = {
+        "profile": like.array.rpartition(" ")[0],
+        "symbols": {"pitch": f"{like.pitch_mm:g} mm"},
+    }
+    whole: dict[str, Any] = {"version": 1, "objects": [style | spec for spec in specs]}
+    if lab_key:
+        whole["output"] = {"lab_key": lab_key}
+    text = json.dumps(whole, indent=1)
+    file.write_text(text + "\n", "utf-8")
+    make_parts([file], folder, database)
+
+
+def _lengths(*sizes: float) -> list[str]:
+    return [f"{size:g} mm" for size in sizes]

@@ -1,4 +1,4 @@
-"""Faces drawn flat, side by side, with every touch as a dot: right, refused or wrong.
+"""Faces drawn flat, with every touch as a dot: right, refused or wrong.
 
 Faces + rows -> one SVG for each object. All faces of a run have the same scale; x of a face
 points to the right, y up. Dots are strokes of no length with round ends, so that a hundred
@@ -16,27 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.lab import EncodedFace, Lab
-from recognizer.validation.pictures import COLOURS, WORDS
+from recognizer.validation.pictures import COLOURS, DOTS, WORDS
 from recognizer.validation.trial import REJECTED, RIGHT, WRONG
 
 Array = NDArray[np.float64]
 FACE, BAD, SYMBOL, INK = "#f3f4f6", "#fdf0ee", "#c9ced6", "#1d2126"
 
-
-@dataclass(frozen=True, slots=True)
-class FlatSettings:
-    """Sizes on the page, px."""
-
-    wide: float = 1080.0  #: a row of faces
-    most: float = 230.0  #: the longer side of the largest face
-    gap: float = 18.0
-    title: float = 30.0  #: two lines of letters over a face
-    least: float = 96.0  #: width of a panel: its title must fit
-    dot: float = 5.0
-    right_dots: int = 150  #: of a face, at most; refused and wrong touches are all drawn
-
-
-FLAT = FlatSettings()
+# Sizes on the page, px.
+WIDE = 1080.0  #: a row of faces
+MOST = 230.0  #: the longer side of the largest face
+GAP = 18.0
+TITLE = 30.0  #: two lines of letters over a face
+LEAST = 96.0  #: width of a panel: its title must fit
+DOT = 5.0
+RIGHT_DOTS = 150  #: of a face, at most; refused and wrong touches are all drawn
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,14 +52,7 @@ class FlatFace:
 def flat_objects(lab: Lab, rows: Mapping[str, Any], faces: Sequence[Mapping[str, Any]]) -> Any:
     """Return, for each object that was touched, its name, whether a face is bad, and its picture.
 
-    Parameters
-    ----------
-    lab
-        That holds the objects.
-    rows
-        Columns of `rows.COLUMNS`.
-    faces
-        Lines of the faces, `results.json`'s `objects.faces`.
+    `rows` are columns of `trial.COLUMNS`; `faces` the lines `objects.faces` of `results.json`.
     """
     held: dict[str, list[FlatFace]] = {}
     shapes = {(face.object, face.face): face for face in _faces_of(lab)}
@@ -86,19 +72,19 @@ def flat_objects(lab: Lab, rows: Mapping[str, Any], faces: Sequence[Mapping[str,
     ]
 
 
-def draw_flat(faces: Sequence[FlatFace], scale: float, settings: FlatSettings = FLAT) -> str:
+def draw_flat(faces: Sequence[FlatFace], scale: float) -> str:
     """Return the SVG of an object's faces, `scale` px a mm."""
     parts, left, top, high, right = [], 0.0, 0.0, 0.0, 0.0
     for face in faces:
         low, far = face.box_mm
         across, down = scale * (far - low)
-        panel = max(float(across), settings.least)
-        if left and left + panel > settings.wide:
-            left, top, high = 0.0, top + high + settings.gap, 0.0
-        parts.append(_panel(face, left, top + settings.title, scale, settings))
-        left += panel + settings.gap
-        right, high = max(right, left - settings.gap), max(high, settings.title + float(down))
-    wide, tall = f"{right + 6:.0f}", f"{top + high + settings.dot:.0f}"
+        panel = max(float(across), LEAST)
+        if left and left + panel > WIDE:
+            left, top, high = 0.0, top + high + GAP, 0.0
+        parts.append(_panel(face, left, top + TITLE, scale))
+        left += panel + GAP
+        right, high = max(right, left - GAP), max(high, TITLE + float(down))
+    wide, tall = f"{right + 6:.0f}", f"{top + high + DOT:.0f}"
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-3 0 {wide} {tall}" width="{wide}" '
         f'height="{tall}" font-family="DejaVu Sans, Arial, sans-serif" font-size="11">'
@@ -106,7 +92,7 @@ def draw_flat(faces: Sequence[FlatFace], scale: float, settings: FlatSettings = 
     )
 
 
-def _panel(face: FlatFace, left: float, top: float, scale: float, settings: FlatSettings) -> str:
+def _panel(face: FlatFace, left: float, top: float, scale: float) -> str:
     """Return a face with its title over it."""
     low, far = face.box_mm
 
@@ -125,16 +111,13 @@ def _panel(face: FlatFace, left: float, top: float, scale: float, settings: Flat
         f'<path d="{outline}" fill="{BAD if face.bad else FACE}" fill-rule="evenodd" '
         f'stroke="{colour if face.bad else "#9aa1ab"}"/>'
     )
-    svg += _dots(on_page(face.symbols_mm), SYMBOL, max(1.0, settings.dot * 0.6))
+    svg += _dots(on_page(face.symbols_mm), SYMBOL, max(1.0, DOT * 0.6))
     for verdict in (RIGHT, REJECTED, WRONG):
         at = face.touches_mm.get(verdict, np.zeros((0, 2)))
-        if verdict == RIGHT and len(at) > settings.right_dots:
-            at = at[np.linspace(0, len(at) - 1, settings.right_dots).astype(int)]
-        svg += _dots(on_page(at), DOTS[verdict], settings.dot)
+        if verdict == RIGHT and len(at) > RIGHT_DOTS:
+            at = at[np.linspace(0, len(at) - 1, RIGHT_DOTS).astype(int)]
+        svg += _dots(on_page(at), DOTS[verdict], DOT)
     return svg
-
-
-DOTS = COLOURS | {REJECTED: "#d98c00"}  #: grey would be taken for a symbol
 
 
 def _dots(at: Array, colour: str, size: float) -> str:
@@ -152,10 +135,10 @@ def _path(points: Array) -> str:
     return "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
 
 
-def _scale(faces: Sequence[FlatFace], settings: FlatSettings = FLAT) -> float:
+def _scale(faces: Sequence[FlatFace]) -> float:
     """Return px a mm, so that the largest face is as large as it may be."""
     sides = [float((far - low).max()) for low, far in (face.box_mm for face in faces)]
-    return settings.most / max(sides, default=1.0)
+    return MOST / max(sides, default=1.0)
 
 
 def _faces_of(lab: Lab) -> Iterable[EncodedFace]:

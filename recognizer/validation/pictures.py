@@ -7,21 +7,27 @@ that they can be searched and the page stays small. Axes carry their units.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from recognizer.validation.statistics import chi2_quantile
+from recognizer.validation.results import INSIDE, RMS_DEG, RMS_MM
+from recognizer.validation.statistics import FAILS, HOLDS, chi2_quantile
 from recognizer.validation.trial import REJECTED, RIGHT, WRONG
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
 
 COLOURS = {RIGHT: "#2a7f62", WRONG: "#c0392b", REJECTED: "#8a8f98"}
+DOTS = COLOURS | {REJECTED: "#d98c00"}  #: grey would be taken for a symbol
 WORDS = {RIGHT: "right", WRONG: "wrong", REJECTED: "refused"}  #: as pages say them
 LEVEL_COLOURS = {"low": "#4c9f70", "typical": "#2f6db3", "hard": "#b8860b", "mismatch": "#b0413e"}
 MORE_COLOURS = ("#7b4fa3", "#1f8a99", "#8c564b", "#d17fb0", "#6b7280", "#9aa227")  #: other levels
@@ -44,18 +50,17 @@ _NAMES = {
 }
 
 
-class SvgPicture:
+@dataclass(slots=True)
+class SvgFigure:
     """A figure while it is drawn, and its SVG afterwards."""
 
-    def __init__(self) -> None:
-        self.svg = ""
+    axes: list[Axes]
+    svg: str = ""
 
 
 @contextmanager
-def svg_figure(
-    rows: int, columns: int, size: tuple[float, float], into: SvgPicture
-) -> Iterator[tuple[Figure, list[Axes]]]:
-    """Yield a figure of so many inches and its axes; its SVG is there at the end."""
+def svg_figure(rows: int, columns: int, size: tuple[float, float]) -> Iterator[SvgFigure]:
+    """Yield a figure of some inches; its SVG is there at the end."""
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
@@ -63,12 +68,12 @@ def svg_figure(
     with matplotlib.rc_context(_SETTINGS):
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasSVG(figure)
-        axes = figure.subplots(rows, columns, squeeze=False)
-        yield figure, list(axes.flat)
+        drawn = SvgFigure(list(figure.subplots(rows, columns, squeeze=False).flat))
+        yield drawn
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
-    into.svg = svg[svg.index("<svg") :]
+    drawn.svg = svg[svg.index("<svg") :]
 
 
 @contextmanager
@@ -96,8 +101,9 @@ def confusion(objects: dict[str, Any]) -> str:
         return ""
     matrix = np.array(objects["matrix"], float)
     shares = matrix / np.maximum(matrix.sum(axis=1, keepdims=True), 1)
-    picture, side = SvgPicture(), 0.28 * len(names)
-    with svg_figure(1, 1, (max(5.0, side + 3.2), max(2.6, side + 1.6)), picture) as (_, (axis,)):
+    side = 0.28 * len(names)
+    with svg_figure(1, 1, (max(5.0, side + 3.2), max(2.6, side + 1.6))) as picture:
+        (axis,) = picture.axes
         axis.grid(visible=False)
         axis.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
         axis.set_xticks(range(len(names) + 1), [*names, "refused"], rotation=35, ha="right")
@@ -117,9 +123,9 @@ def pose(rows: dict[str, Any]) -> str:
     right = rows["verdict"] == RIGHT
     if not right.any():
         return ""
-    picture = SvgPicture()
     colours = level_colours(rows["level"])
-    with svg_figure(1, 3, (11.5, 3.2), picture) as (_, axes):
+    with svg_figure(1, 3, (11.5, 3.2)) as picture:
+        axes = picture.axes
         for axis, name, label in (
             (axes[0], "error_mm", "error of the place, mm"),
             (axes[1], "error_deg", "error of the turn, degrees"),
@@ -150,9 +156,9 @@ def pose(rows: dict[str, Any]) -> str:
 
 def accuracy(results: dict[str, Any]) -> str:
     """Return answers and pose error against level, force, tilt, edge distance and symbols."""
-    picture = SvgPicture()
     names = [name for name in _NAMES if results["against"][name]["bins"]]
-    with svg_figure(2, len(names) + 1, (2.6 * len(names) + 2.6, 4.6), picture) as (_, axes):
+    with svg_figure(2, len(names) + 1, (2.6 * len(names) + 2.6, 4.6)) as picture:
+        axes = picture.axes
         above, below = axes[: len(names) + 1], axes[len(names) + 1 :]
         levels = results["levels"]
         places = np.arange(len(levels))
@@ -194,9 +200,9 @@ def margins(rows: dict[str, Any]) -> str:
     """Return how sure right, wrong and refused answers are; "" where nothing was weighed."""
     if not np.isfinite(rows["margin"]).any():
         return ""
-    picture = SvgPicture()
     bins = np.linspace(0, 100, 41)
-    with svg_figure(1, 1, (6.2, 2.6), picture) as (_, (axis,)):
+    with svg_figure(1, 1, (6.2, 2.6)) as picture:
+        (axis,) = picture.axes
         for verdict, colour in COLOURS.items():
             chosen = rows["margin"][rows["verdict"] == verdict]
             chosen = np.clip(chosen[np.isfinite(chosen)], 0, bins[-1] - 1e-6)
@@ -220,3 +226,247 @@ def _share(axis: Axes, at: Any, shares: list[dict[str, Any]], marker: str = ".")
 def number_or_nan(value: float | None) -> float:
     """Return a number, for what is None as well."""
     return np.nan if value is None else value
+
+
+TINTS = {HOLDS: "#2a7f62", FAILS: "#c0392b"}  #: of a state; others are grey
+GREY, REFUSED_STRANGER = "#8a8f98", "#7fae9d"
+
+
+def world_name(line: dict[str, Any]) -> str:
+    """Return a world in a line."""
+    return f"{line['run']}: {line['engine']}, {line['surface']}, {line['sensor']}"
+
+
+def draw_answers(worlds: Sequence[dict[str, Any]]) -> str:
+    """Return a bar for each world: right, refused and wrong touches, % and counts."""
+    with svg_figure(1, 1, (11.0, 1.0 + 0.27 * len(worlds))) as picture:
+        (axis,) = picture.axes
+        places = _rows_of(axis, worlds)
+        left = np.zeros(len(worlds))
+        known = np.array([line["registered"] for line in worlds])
+        for verdict in (RIGHT, REJECTED, WRONG):
+            count = np.array([line[verdict] for line in worlds])
+            wide = 100 * count / np.maximum([line["touches"] for line in worlds], 1)
+            axis.barh(places, wide, left=left, color=DOTS[verdict], label=WORDS[verdict])
+            if verdict == REJECTED and not known.all():
+                axis.barh(places[~known], wide[~known], left=left[~known], color=REFUSED_STRANGER,
+                          label="refused, as what nobody knows must be")  # fmt: skip
+            for y, x, w, n in zip(places, left, wide, count, strict=True):
+                if w >= 5:
+                    axis.text(x + w / 2, y, f"{n:,}", ha="center", va="center", color="white",
+                              fontsize=7.5)  # fmt: skip
+                elif verdict == WRONG and n:
+                    axis.text(101, y, f"{n:,} wrong", va="center", color=DOTS[WRONG], fontsize=7.5)
+            left += wide
+        axis.set_xlim(0, 112)
+        axis.set_xticks(range(0, 101, 20))
+        axis.set_xlabel("touches, %")
+        axis.legend(frameon=False, ncols=4, loc="lower left", bbox_to_anchor=(0, 1))
+    return picture.svg
+
+
+def draw_errors(worlds: Sequence[dict[str, Any]]) -> str:
+    """Return the errors of the right answers with their intervals; empty without any."""
+    shown = [line for line in worlds if line["right"]]
+    if not shown:
+        return ""
+    with svg_figure(1, 3, (11.5, 1.0 + 0.27 * len(shown))) as picture:
+        axes = picture.axes
+        for axis, name, label in (
+            (axes[0], "mm", "place, rms, mm"),
+            (axes[1], "deg", "turn, rms, degrees"),
+        ):
+            places = _rows_of(axis, shown)
+            top = 1.3 * max(line[f"rms_{name}"] for line in shown)
+            for y, line in zip(places, shown, strict=True):
+                low, high = line[f"rms_{name}_95"]
+                ends = low, min(top, np.inf if high is None else high)
+                _interval(axis, y, line[f"rms_{name}"], ends, line["states"][f"rms_{name}"])
+            axis.axvline(RMS_MM if name == "mm" else RMS_DEG, color="black", lw=0.8,
+                         ls="--")  # fmt: skip
+            axis.set_xlim(0, max(top, 1.1 * (RMS_MM if name == "mm" else RMS_DEG)))
+            axis.set_xlabel(label)
+        places = _rows_of(axes[2], shown)
+        for y, line in zip(places, shown, strict=True):
+            share = line["inside_95"]
+            ends = 100 * share["low"], 100 * share["high"]
+            _interval(axes[2], y, 100 * share["share"], ends, line["states"]["inside_95"])
+        axes[2].axvspan(*(100 * end for end in INSIDE), color="#2a7f62", alpha=0.12, lw=0)
+        axes[2].set_xlim(0, 101)
+        axes[2].set_xlabel("inside the 95 % ellipsoid, %")
+        for axis in axes[1:]:
+            axis.set_yticklabels([])
+    return picture.svg
+
+
+def _rows_of(axis: Axes, worlds: Sequence[dict[str, Any]]) -> np.ndarray:
+    """Give every world a row, the first on top; return their places."""
+    places = np.arange(len(worlds))
+    axis.set_yticks(places, [world_name(line) for line in worlds])
+    axis.set_ylim(len(worlds) - 0.4, -0.6)
+    axis.grid(visible=False, axis="y")
+    return places
+
+
+def _interval(axis: Axes, y: float, value: float, ends: tuple[float, float], state: str) -> None:
+    colour = TINTS.get(state, GREY)
+    axis.plot(ends, [y, y], color=colour, lw=1.5)
+    axis.plot([value], [y], "o", color=colour, ms=4)
+
+
+Point = tuple[float, float, str]
+Box = tuple[float, float, float, float]  # left, bottom, right, top; pixels
+
+
+# Labels, sizes in points.
+LETTERS = 7.5
+CLEAR = 1.5  #: around every name: another font's letters are a little wider
+MARKER = 5.0  #: half the side of a point
+AWAY = (5.0, 9.0, 16.0, 25.0, 36.0, 50.0, 66.0)  #: from the point, tried in this order ...
+TURNS = (0, 180, 90, 270, 45, 225, 315, 135)  #: ... and in these directions, degrees
+LINE_FROM = 16.0  #: a name at this distance, or farther, gets a line
+
+
+def label_points(axes: Axes, points: Sequence[Point]) -> list[Annotation]:
+    """Write the names of points that are drawn already; returns them in the order of x.
+
+    None stands over another, over a point or outside the axes, whose limits and scales must stand.
+    Every name tries places around its point, from near to far, and takes the first that is free; a
+    far one gets a thin line to its point. A point that is no finite number gets no name.
+    """
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        return []
+    figure.draw_without_rendering()
+    pixel = figure.dpi / 72
+    shown = sorted(point for point in points if np.isfinite(point[:2]).all())
+    spots = [axes.transData.transform(point[:2]) for point in shown]
+    half = MARKER * pixel
+    taken = [(x - half, y - half, x + half, y + half) for x, y in spots]
+    legend = axes.get_legend()
+    if legend is not None:
+        taken.append(legend.get_window_extent().extents)
+    frame: Box = tuple(axes.get_window_extent().extents)  # type: ignore[assignment]
+    found = []
+    for (x, y, name), spot in zip(shown, spots, strict=True):
+        text = axes.annotate(name, (x, y), (0, 0), textcoords="offset points",
+                             fontsize=LETTERS, ha="center", va="center")  # fmt: skip
+        text.set_in_layout(False)
+        extent = text.get_window_extent()
+        size = extent.width / pixel, extent.height / pixel
+        offset, box = _free_place(spot, size, pixel, taken, frame)
+        text.set_position(offset)
+        if math.hypot(*offset) - size[0] / 2 >= LINE_FROM:
+            axes.annotate("", (x, y), offset, textcoords="offset points", annotation_clip=False,
+                          arrowprops={"arrowstyle": "-", "lw": 0.5, "color": "#8a8f98",
+                                      "shrinkA": 4, "shrinkB": 3}).set_in_layout(False)  # fmt: skip
+        taken.append(box)
+        found.append(text)
+    return found
+
+
+def _free_place(
+    spot: NDArray[np.float64], size: tuple[float, float], pixel: float, taken: Sequence[Box],
+    frame: Box,
+) -> tuple[tuple[float, float], Box]:  # fmt: skip
+    """Return the offset of a name's middle in points, and its box; the last one if none is free."""
+    wide, high = (side / 2 + CLEAR for side in size)
+    offset, box = (0.0, 0.0), frame
+    for away, turn in product(AWAY, TURNS):
+        c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+        offset = (away * c + wide * np.sign(round(c, 6)), away * s + high * np.sign(round(s, 6)))
+        x, y = (spot[k] + offset[k] * pixel for k in (0, 1))
+        box = (x - wide * pixel, y - high * pixel, x + wide * pixel, y + high * pixel)
+        inside = box[0] >= frame[0] and box[1] >= frame[1]
+        inside = inside and box[2] <= frame[2] and box[3] <= frame[3]
+        if inside and not any(boxes_overlap(box, other) for other in taken):
+            break
+    return (float(offset[0]), float(offset[1])), box
+
+
+def boxes_overlap(one: Box, other: Box) -> bool:
+    """Return whether two boxes share an area."""
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+
+
+def work_precision(study: dict[str, Any], times: dict[str, Any], used: str = "") -> str:
+    """Return error against run time for contact models, decoders and readers.
+
+    `study` and `times` are those of `results.json` and `times.json`; `used` is the level of the
+    contact model of this run, which is ringed.
+    """
+    with svg_figure(2, 2, (11.5, 8.0)) as picture:
+        axes = picture.axes
+        draw_work_precision(axes, study, times, used)
+    return picture.svg
+
+
+def draw_work_precision(
+    axes: list[Axes], study: Mapping[str, Any], times: Mapping[str, Any], used: str
+) -> list[Annotation]:
+    """Draw four pictures; return the names beside their points."""
+    panels = [_contact_points(axes[0], study, times, used)]
+    decoders = zip(study["decoders"], times["decoders"], strict=True)
+    panels.append(
+        [
+            (1e3 * ms, 100 * (1 - line["right"] / line["windows"]), line["decoder"])
+            for line, ms in decoders
+        ]
+    )
+    readers = list(zip(study["readers"], times["readers"], strict=True))
+    panels.append(
+        [(ms, 100 * (1 - line["right"] / line["touches"]), line["reader"]) for line, ms in readers]
+    )
+    panels.append([(ms, number_or_nan(line["rms_mm"]), line["reader"]) for line, ms in readers])
+    titles = (
+        ("contact models and engines", "largest error of an image, %", "ms"),
+        ("decoders, 5 % wrong symbols", "windows not answered right, %", "µs"),
+        ("readers", "touches not answered right, %", "ms"),
+        ("readers", "place, rms, mm", "ms"),
+    )
+    for axis, points, (title, label, unit) in zip(axes, panels, titles, strict=True):
+        if axis is not axes[0]:
+            _scatter(axis, points)
+        axis.set_title(title)
+        axis.set_ylabel(label)
+        axis.set_xlabel(f"CPU time of one, {unit}")
+        axis.margins(x=0.3, y=0.2)
+    for axis in axes[1:]:
+        top = max(axis.get_ylim()[1], 1e-3)
+        axis.set_ylim(-0.12 * top, 1.15 * top)
+    names = []
+    for axis, points in zip(axes, panels, strict=True):
+        names += label_points(axis, points)
+    return names
+
+
+def _contact_points(
+    axis: Axes, study: Mapping[str, Any], times: Mapping[str, Any], used: str
+) -> list[Point]:
+    """Draw a line for each overlay and each engine; return their points."""
+    lines = list(zip(study["contact"], times["contact"], strict=True))
+    found: list[Point] = []
+    for number, name in enumerate(dict.fromkeys(line["series"] for line, _ in lines)):
+        points = [(ms, 100 * line["error"], line["level"])
+                  for line, ms in lines if line["series"] == name]  # fmt: skip
+        x, y, _levels = zip(*points, strict=True)
+        axis.loglog(x, y, "os^vD"[number % 5] + "-", lw=1, label=name, mfc="none")
+        for ms, error, level in points:
+            if level == used:
+                axis.plot(
+                    [ms], [error], "o", ms=10, mfc="none", mec="black", ls="", label="this run"
+                )
+        found += points
+    axis.legend(frameon=False, loc="lower left")
+    return found
+
+
+def _scatter(axis: Axes, points: list[Point]) -> None:
+    """Draw points over a logarithm of the time."""
+    from matplotlib.ticker import FuncFormatter, LogLocator
+
+    x, y, _names = zip(*points, strict=True)
+    axis.semilogx(x, y, "o", color="black", mfc="none")
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.xaxis.set_minor_formatter("")

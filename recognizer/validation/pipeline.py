@@ -12,18 +12,26 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
-from recognizer.validation.campaign import PRINTED, series_of, shards_of
+from recognizer.validation.campaign import (
+    PRINTED,
+    CampaignOptions,
+    campaign_of,
+    series_of,
+    shards_of,
+)
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.files import write_json
-from recognizer.validation.finish import export_touches, write_results
-from recognizer.validation.options import CampaignOptions, campaign_of
-from recognizer.validation.progress import TouchProgress
+from recognizer.validation.files import done_shards, write_json
 from recognizer.validation.provenance import circumstances
-from recognizer.validation.record import RECORD, read_record
-from recognizer.validation.report import require_report
+from recognizer.validation.report import export_touches, require_report, write_results
 from recognizer.validation.result import ValidationResult, result_from
-from recognizer.validation.run import lock_folder, prepare_run, touch_all
-from recognizer.validation.shards import done_shards
+from recognizer.validation.run import (
+    RECORD,
+    TouchProgress,
+    lock_folder,
+    prepare_run,
+    read_record,
+    touch_all,
+)
 from recognizer.validation.workers import workers_of
 
 EXPORTS = ("npz", "lerobot")

@@ -25,10 +25,9 @@ from probe.simulate.registered import registered_object, registered_objects
 from recognizer.validation.campaign import Campaign
 from recognizer.validation.errors import ValidationError, WorkersError
 from recognizer.validation.files import write_text
-from recognizer.validation.progress import TouchProgress
-from recognizer.validation.record import PRINTS, RunRecord, absolute_database
+from recognizer.validation.run import PRINTS, RunRecord, TouchProgress, absolute_database
+from recognizer.validation.touch_plan import check_file, stl_part
 from recognizer.validation.workers import run_pool
-from recognizer.validation.written import check_file, stl_part
 
 FOLDER = "printed"  #: of the run, for surfaces and G-code
 

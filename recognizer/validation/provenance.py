@@ -19,10 +19,11 @@ from probe.contact.engines import engine_named
 from probe.contact.press import level_for
 from probe.simulate.world.levels import LEVELS
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
+from recognizer.validation.draw import INSIDE_MM
 from recognizer.validation.encoded_set import members_of
-from recognizer.validation.record import RunRecord
-from recognizer.validation.settings import DRAWING, JUDGING
-from recognizer.validation.touch_plan import TouchPlan, sensor_of
+from recognizer.validation.run import RunRecord
+from recognizer.validation.touch_plan import WORN, TouchPlan, sensor_of
+from recognizer.validation.trial import ENOUGH, NEAR_MM
 
 LIBRARIES = ("numpy", "scipy", "pyarrow", "matplotlib")
 
@@ -71,10 +72,10 @@ def contact_level(campaign: Campaign) -> str:
 def judging_limits() -> dict[str, float]:
     """Return the limits by which touches are judged."""
     return {
-        "enough": JUDGING.enough,
-        "near_mm": JUDGING.near_mm,
-        "inside_mm": DRAWING.inside_mm,
-        "worn": DRAWING.worn,
+        "enough": ENOUGH,
+        "near_mm": NEAR_MM,
+        "inside_mm": INSIDE_MM,
+        "worn": WORN,
     }
 
 

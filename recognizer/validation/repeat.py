@@ -22,10 +22,9 @@ from recognizer.validation.campaign import plan_of, series_of
 from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.pictures import figure_on
-from recognizer.validation.record import read_record
-from recognizer.validation.rows import find_face, row_of, symbols_in_view
-from recognizer.validation.trial import judge
-from recognizer.validation.work import prepare_reader
+from recognizer.validation.run import read_record
+from recognizer.validation.trial import find_face, judge, row_of, symbols_in_view
+from recognizer.validation.workers import prepare_reader
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from encoded_objects.base.console import DONE, FAILED
-from recognizer.validation.bounds import HOLDS
+from recognizer.validation.statistics import HOLDS
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,32 +16,181 @@ Folder of a run::
 from __future__ import annotations
 
 import fcntl
+import json
 import os
+import time
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from datetime import timedelta
 from pathlib import Path
 
+from encoded_objects.base.output import ProgressBar
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
-from recognizer.validation.campaign import Campaign, batches_of, series_of, shards_of
-from recognizer.validation.encoded_set import LAB, PARTS, make_parts, set_digest
-from recognizer.validation.errors import ValidationError
-from recognizer.validation.files import write_text
-from recognizer.validation.made_kinds import make_for_kinds, refuse_without_specs
-from recognizer.validation.progress import TouchProgress
-from recognizer.validation.record import (
-    RECORD,
-    RunRecord,
-    absolute_database,
-    check_same,
-    read_record,
-    relative_database,
-    write_record,
+from generator.database.open import normal_url
+from recognizer.validation.campaign import PRINTED, Campaign, batches_of, series_of, shards_of
+from recognizer.validation.encoded_set import (
+    LAB,
+    PARTS,
+    labs_of,
+    make_for_kinds,
+    make_parts,
+    refuse_without_specs,
+    set_digest,
 )
-from recognizer.validation.rows import CpuTime, Row
-from recognizer.validation.shards import done_shards, write_shard
+from recognizer.validation.errors import ValidationError
+from recognizer.validation.files import done_shards, write_json, write_shard, write_text
 from recognizer.validation.touch_plan import sensor_of
-from recognizer.validation.work import Workers, code_digest
+from recognizer.validation.trial import REJECTED, RIGHT, WRONG, CpuTime, Row
+from recognizer.validation.workers import Work, Workers, code_digest
+
+RECORD = "asked.json"
+PRINTS = "printed.json"  #: which surface of the folder of prints is which face
+FORMAT = 2  #: of the record; another one is refused
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """A run as its folder remembers it."""
+
+    campaign: Campaign
+    database: str  #: a SQLite file from the folder of the run, or a URL
+    set_digest: str
+    code_digest: str
+    specs: tuple[str, ...] = ()  #: as they were named
+
+    def work(self, folder: Path) -> Work:
+        """Return what the workers get."""
+        url = absolute_database(self.database, folder)
+        labs = labs_of(folder, [kind for kind, _ in self.campaign.kinds])
+        prints = str(folder.absolute() / PRINTS) if self.campaign.surfaces == PRINTED else ""
+        return Work(self.campaign, url, self.set_digest, self.code_digest, labs, prints)
+
+    def work_now(self, folder: Path) -> Work:
+        """Return the same for this version, which may be another than that of the touches."""
+        return replace(self.work(folder), code_digest=code_digest())
+
+
+def read_record(folder: Path) -> RunRecord:
+    """Return the record of a folder's run.
+
+    Raises
+    ------
+    ValidationError
+        The folder holds no run, or one of another version.
+    """
+    path = folder / RECORD
+    try:
+        values = json.loads(path.read_text("utf-8"))
+        if values["format"] != FORMAT:
+            raise ValidationError(
+                f"a run of format {values['format']}, this version reads {FORMAT}",
+                fix="start anew in another folder",
+                place=str(path),
+            )
+        given = values["campaign"]
+        for name in ("kinds", "levels"):
+            given[name] = tuple((key, float(share)) for key, share in given[name])
+        return RunRecord(
+            campaign=Campaign(**given),
+            database=values["database"],
+            set_digest=values["set"],
+            code_digest=values["code"],
+            specs=tuple(values["specs"]),
+        )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ValidationError(
+            "no run of validate-set", fix="name the folder that -o named", place=str(folder)
+        ) from error
+
+
+def write_record(record: RunRecord, folder: Path) -> None:
+    """Remember a run."""
+    values = {
+        "format": FORMAT,
+        "campaign": asdict(record.campaign),
+        "database": record.database,
+        "set": record.set_digest,
+        "code": record.code_digest,
+        "specs": list(record.specs),
+    }
+    write_json(folder / RECORD, values)
+
+
+def check_same(before: RunRecord, now: RunRecord, folder: Path) -> None:
+    """See to it that a run goes on as it began.
+
+    Raises
+    ------
+    ValidationError
+        Options, specs, the set or this software have changed.
+    """
+    old, new = asdict(before.campaign), asdict(now.campaign)
+    differ = [f"{name} {old[name]}, now {new[name]}" for name in new if old[name] != new[name]]
+    if before.specs != now.specs:
+        differ.append(f"specs {', '.join(before.specs)}, now {', '.join(now.specs)}")
+    if before.set_digest != now.set_digest:
+        differ.append("another set")
+    if before.code_digest != now.code_digest:
+        differ.append("another version of this software")
+    if differ:
+        raise ValidationError(
+            f"the run began otherwise: {'; '.join(differ)}",
+            fix="give the same options, or start anew in another folder with -o",
+            place=str(folder),
+        )
+
+
+def absolute_database(database: str, folder: Path) -> str:
+    """Return where the database of a record is."""
+    if "://" in database:
+        return database
+    return str(Path(os.path.normpath(folder.absolute() / database)))
+
+
+def relative_database(database: str, folder: Path) -> str:
+    """Return how a record names a database: a file from the folder, a server by its URL."""
+    url = normal_url(database)
+    if url.get_backend_name() != "sqlite" or url.database is None:
+        return database
+    return Path(os.path.relpath(Path(url.database).absolute(), folder.absolute())).as_posix()
+
+
+class TouchProgress:
+    """Moves a bar by touches; without a bar it counts in silence."""
+
+    def __init__(self, bar: ProgressBar | None = None) -> None:
+        self._bar = bar or ProgressBar(None, None)
+        self.begin("", 0, 0)
+
+    def begin(self, stage: str, touches: int, done: int) -> None:
+        """Begin a stage; touches done before count for the bar, not for the rate."""
+        self._touches, self._before, self._new = touches, done, 0
+        self._counts = dict.fromkeys((RIGHT, WRONG, REJECTED), 0)
+        self._start = time.monotonic()
+        self._bar.begin(stage, touches or None, done)
+
+    def step(self, what: str) -> None:
+        """Take note of one more thing that is done in a stage without touches."""
+        self._new += 1
+        done = self._before + self._new
+        rate = self._new / max(time.monotonic() - self._start, 1e-3)
+        left = timedelta(seconds=round((self._touches - done) / max(rate, 1e-9)))
+        self._bar.show(done, f"{done:,}/{self._touches:,} {what}, {left} left")
+
+    def add(self, rows: Iterable[Row]) -> None:
+        """Take note of some more touches."""
+        for row in rows:
+            self._counts[row["verdict"]] += 1
+            self._new += 1
+        done = self._before + self._new
+        rate = self._new / max(time.monotonic() - self._start, 1e-3)
+        left = timedelta(seconds=round((self._touches - done) / max(rate, 1e-9)))
+        counts = ", ".join(f"{number:,} {name}" for name, number in self._counts.items())
+        text = f"{done:,}/{self._touches:,}  {rate:.1f} touches/s, {left} left; {counts}"
+        self._bar.show(done, text)
+
 
 SENSOR = "sensor.yaml"
 

@@ -1,40 +1,61 @@
-"""What a campaign touches: the plan of its touches, and the faces and sensor that it names."""
+"""The plan of a campaign's touches, and the faces and scenes that it names.
+
+A face is touched as the database has it, as it was printed, or as it was written: the STL file
+that the database registers, checked by its sha256, in the frame of the face. The part is touched
+alone: beyond the edges of a panel there is nothing. Thesis 6.3.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
+
+from sqlalchemy import Engine
 
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, force_share
-from probe.simulate.registered import registered_object, registered_objects, scene_of_face
+from generator.database.open import normal_url, open_database, part_path
+from generator.database.read import read_object
+from generator.database.registered import RegisteredObject, RegisteredPart
+from generator.database.transaction import read_transaction
+from probe.simulate.registered import (
+    registered_object,
+    registered_objects,
+    scene_of_face,
+    scene_of_part,
+)
 from probe.simulate.scene import Scene
 from probe.simulate.touch import TouchRanges
 from probe.simulate.world.levels import LEVELS, Level
 from recognizer.touch.lab import EmbossedArray
-from recognizer.validation.made_kinds import SIDE, is_extra
-from recognizer.validation.settings import DRAWING
-from recognizer.validation.written import object_of_run, written_surface
+from recognizer.validation.encoded_set import SIDE, is_extra
+from recognizer.validation.errors import SetError
+
+FORCE_N = (20.0, 120.0)  #: as a hand or an arm presses
+TILT_RAD = math.radians(2.0)  #: at most, of the wrist
+WORN = 0.2  #: probability that a symbol of a worn face is gone
 
 
 @dataclass(frozen=True, slots=True)
 class TouchPlan:
     """What is drawn.
 
-    `kind` is `face` (the sensor's centre at least `inside_mm` from the edges), `edge` (nearer
-    than that), `corner` (within `inside_mm` of a corner), `worn` (a face with a share of its
-    symbols gone), `copy`, `near` or `small` (inside faces of these members, `made_kinds`), `side`
-    (near an edge beside which another object lies), `same_profile` (a part of another lab),
-    `anywhere` (all places of a face are alike likely), or one of the surfaces of
-    `surfaces.FOREIGN`.
+    `kind` is `face` (the sensor's centre at least `draw.INSIDE_MM` from the edges), `edge` (nearer
+    than that), `corner` (that near a corner), `worn` (a face with a share of its symbols gone),
+    `copy`, `near` or `small` (inside faces of these members, `encoded_set`), `side` (near an edge
+    next to another object), `same_profile` (a part of another lab), `anywhere` (uniform over a
+    face), or one of the surfaces of `draw.FOREIGN`.
     """
 
     database: str
     seed: int = 1
     level: str = "typical"
     kind: str = "face"
-    force_n: tuple[float, float] = DRAWING.force_n
-    tilt_rad: float = DRAWING.tilt_rad
-    worn: float = DRAWING.worn
+    force_n: tuple[float, float] = FORCE_N
+    tilt_rad: float = TILT_RAD
+    worn: float = WORN
     files: bool = False  #: touch the written STL files, not what the database says of them
     prints: str = ""  #: listing of the printed surfaces that are touched instead; empty: none
     engine: str = "own"  #: of contact, `probe.contact.engines`
@@ -45,7 +66,7 @@ class TouchPlan:
 
 
 def level_of(plan: TouchPlan) -> Level:
-    """Return what is wrong with the sensor; a printed surface brings the print's faults itself."""
+    """Return the faults of the sensor; a printed surface brings the print's faults itself."""
     level = LEVELS[plan.level]
     return replace(level, wider_mm=0.0, scale=0.0) if plan.prints else level
 
@@ -72,9 +93,8 @@ def faces_of_kind(
 ) -> list[int]:
     """Return the faces that a kind touches, in the order of their objects' names.
 
-    With prints, those that were printed alone; with a face named, that one.
-
-    Their numbers follow the order of registration, which a set made in parallel leaves to chance.
+    With prints, those that were printed; with `only`, that face. The order is by name because the
+    order of registration is random in a set made in parallel.
     """
     faces, names = encoding.faces.tolist(), encoding.names
     found = sorted(range(len(faces)), key=lambda n: (names[faces[n][0]], faces[n][1]))
@@ -106,7 +126,7 @@ def faces_of_lab(database: str) -> list[tuple[str, str]]:
 
 @lru_cache(maxsize=512)
 def scene_of(database: str, object_name: str, face: str, files: bool, prints: str = "") -> Scene:
-    """Return a face as it was printed, as it was written, or as the database says that it is."""
+    """Return a face as it was printed, as it was written, or as the database has it."""
     if prints:
         from probe.simulate.printed import printed_scene
 
@@ -114,3 +134,62 @@ def scene_of(database: str, object_name: str, face: str, files: bool, prints: st
     if files:
         return written_surface(database, object_name, face)
     return scene_of_face(database, object_of_run(database, object_name), face)
+
+
+def written_surface(database: str, object_name: str, face: str) -> Scene:
+    """Return a registered face as it was written.
+
+    Raises
+    ------
+    SetError
+        The object has no STL part that bears the face, the file is not there, or its bytes
+        are not those that were registered.
+    DatabaseError
+        The database cannot be read, or does not hold the object.
+    """
+    held = object_of_run(database, object_name)
+    part = stl_part(held, face)
+    path = part_path(normal_url(database), part.file)
+    check_file(path, part)
+    return scene_of_part(path, held, part, face)
+
+
+@lru_cache(maxsize=64)
+def object_of_run(database: str, object_name: str) -> RegisteredObject:
+    """Return an object of a set, which stays as it is while it is touched (`set_digest`)."""
+    with read_transaction(_database_of_run(database)) as connection:
+        return read_object(connection, object_name)
+
+
+@lru_cache(maxsize=4)
+def _database_of_run(database: str) -> Engine:
+    """Return a database that stays open, so that each query is compiled once."""
+    return open_database(database, writable=False)
+
+
+def stl_part(held: RegisteredObject, face: str) -> RegisteredPart:
+    """Return the STL part that bears a face: its panel, or the whole body; else `SetError`."""
+    known = [part for part in held.parts if part.format == "stl"]
+    for part in known:
+        if part.name.endswith(f"-{face}"):
+            return part
+    if len(known) == 1:
+        return known[0]
+    raise SetError(
+        f"'{held.entry.name}' has no STL part that bears {face}",
+        fix="make it again with --format stl, or touch what the database says: --surfaces database",
+        place=held.entry.name,
+    )
+
+
+def check_file(path: Path, part: RegisteredPart) -> None:
+    """Raise `SetError` unless a file is there and holds the bytes that were registered."""
+    fix = "make it again with encode-object"
+    try:
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        cause = f"cannot read the part: {error.strerror}"
+        raise SetError(cause, fix=fix, place=str(path)) from error
+    if digest != part.sha256:
+        cause = "the file is not the one that the database registers"
+        raise SetError(cause, fix=fix, place=str(path))

@@ -1,26 +1,60 @@
-"""One trial: draw a touch, simulate it, read it, compare.
+"""One trial: draw a touch, simulate it, read it, compare; a touch as a row of the results.
 
-TouchPlan + number -> Trial. The reader gets the counts alone; of a plan whose policy is `next` also
-the steps between touches, and what became of the trial is what the last touch said.
+TouchPlan + number -> Trial -> Row. The reader gets the counts alone. Of a plan whose policy is
+`next`, touches follow where the one before proposes, on the same surface and by the same sensor,
+a step away that the arm makes not quite as planned; the reader gets the step alone, and reads all
+touches so far as one belief (`recognizer.scan`). Where the plate finds no rest, it reads zeros.
+
+Numbers of a row are kept to the digits that mean something (`COLUMNS`), so that two machines whose
+libraries differ in the last bit of a sum write the same bytes. CPU times are in rows of their own,
+because no two runs agree in them.
 """
 
 from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType
+from probe.contact.contract import Touch
+from probe.errors import ContactError
+from probe.scan.places import surface_to_sensor
+from recognizer.scan.session import Scan
+from recognizer.touch.lab import EncodedFace, Lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
-from recognizer.touch.recognition import Recognition
-from recognizer.validation.draw import DrawnTouch, draw_touch
-from recognizer.validation.policy import NEXT, touch_until_answered
-from recognizer.validation.settings import JUDGING, POLICIES
+from recognizer.touch.recognition import NextTouch, Recognition
+from recognizer.validation.draw import DrawnTouch, draw_again, draw_tilt, draw_touch
 from recognizer.validation.touch_plan import TouchPlan
 
+#: An answer farther from the truth is wrong: under half of the finest pitch (4.5 mm), so that the
+#: next cell is never taken for the true one.
+NEAR_MM = 2.0
+#: An answer turned farther is wrong: a mounting a quarter turn off, or a symbol that looks alike
+#: when turned; right ones are within 3 degrees.
+NEAR_DEG = 10.0
+#: Symbols in view over those of a window, from which an answer is expected: as many as a window has
+#: need not stand as a window.
+ENOUGH = 1.5
+MOST = 3  #: touches until one is answered
+STEP_OFF_MM = 0.3  #: standard deviation of an arm's step, along x and along y
+TURN_OFF_RAD = math.radians(0.2)  #: of its turn
+FORCE_OFF = 0.1  #: of the logarithm of the force
+TRIES = 4  #: tilts of the wrist that are drawn until the plate finds a rest
+STREAM = 7  #: of random numbers, apart from those that draw the first touch
+
 RIGHT, WRONG, REJECTED = "right", "wrong", "rejected"
+ONE, NEXT = POLICY_NAMES = ("one", "next")
+
+Row = dict[str, Any]
+
+#: Says where to touch after an answer that is none; `rng` is the trial's.
+Proposal = Callable[[Recognition, np.random.Generator], NextTouch | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +96,8 @@ def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
 
 
 def _trial_of_several(plan: TouchPlan, number: int, reader: Reader) -> Trial:
-    """Return what became of touches until one was answered: the first one's place, the last's fate.
-
-    A touch that is not answered is of the place of the first.
-    """
-    made = list(touch_until_answered(plan, number, reader, POLICIES.most))
+    """Return the outcome of touches until one was answered: first place, last answer."""
+    made = list(touch_until_answered(plan, number, reader, MOST))
     spent = sum(one.seconds for one in made)
     first, last = (judge(plan, number, one.found, one.answer, spent) for one in (made[0], made[-1]))
     return replace(
@@ -74,6 +105,57 @@ def _trial_of_several(plan: TouchPlan, number: int, reader: Reader) -> Trial:
         error_mm=last.error_mm, error_deg=last.error_deg, chi2=last.chi2, margin=last.margin,
         noise=last.noise, touches=len(made),
     )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PolicyTouch:
+    """A touch of a trial and what all touches so far say."""
+
+    found: DrawnTouch
+    answer: Recognition
+    seconds: float  #: CPU, of reading
+
+
+def touch_until_answered(
+    plan: TouchPlan,
+    number: int,
+    reader: Reader,
+    most: int,
+    proposal: Proposal = lambda answer, _: answer.next,
+) -> Iterator[PolicyTouch]:
+    """Yield the touches of a trial, the last one answered unless `most` were made."""
+    rng = np.random.default_rng([plan.seed, number, STREAM])
+    found = draw_touch(plan, number, reader)
+    scan, pose, made = Scan(reader), np.eye(4), 0
+    while True:
+        start = time.process_time()
+        answer = scan.add(found.counts.astype(np.float64), pose, seq=number)
+        made += 1
+        yield PolicyTouch(found, answer, time.process_time() - start)
+        step = None if answer else proposal(answer, rng)
+        if step is None or made == most:
+            return
+        pose = pose @ surface_to_sensor(step.dx_mm, step.dy_mm, math.radians(step.turn_deg))
+        found = _touch_at(plan, found, step, reader, rng)
+
+
+def _touch_at(
+    plan: TouchPlan, before: DrawnTouch, step: NextTouch, reader: Reader, rng: np.random.Generator
+) -> DrawnTouch:
+    """Return the touch after a step as the arm makes it."""
+    at, off = before.touch, rng.standard_normal(4)
+    dx, dy = step.dx_mm + STEP_OFF_MM * off[0], step.dy_mm + STEP_OFF_MM * off[1]
+    x, y = at.on_surface(np.array([dx, dy])).tolist()
+    turn = math.radians(step.turn_deg) + TURN_OFF_RAD * off[2]
+    force = step.force_n * math.exp(FORCE_OFF * off[3])
+    moved = replace(at, x_mm=x, y_mm=y, theta_rad=at.theta_rad + turn, force_n=force)
+    for _ in range(TRIES):
+        touch: Touch = draw_tilt(plan, moved, rng)
+        try:
+            return draw_again(plan, before, touch, reader, rng)
+        except ContactError:
+            continue
+    return replace(before, touch=moved, counts=np.zeros_like(before.counts))
 
 
 def judge(
@@ -84,11 +166,12 @@ def judge(
     error, degrees, chi2, verdict = math.nan, math.nan, math.nan, REJECTED
     if answer:
         verdict = WRONG
-        same = scene is not None and (answer.object, answer.face) == (
-            scene.object_name,
-            scene.face,
-        )
-        if same and answer.T_face_probe is not None and answer.covariance is not None:
+        touched = scene and (scene.object_name, scene.face)
+        if (
+            (answer.object, answer.face) == touched
+            and answer.T_face_probe is not None
+            and answer.covariance is not None
+        ):
             T = answer.T_face_probe
             turn = math.atan2(T[1, 0], T[0, 0]) - touch.theta_rad
             away = np.array(
@@ -96,7 +179,7 @@ def judge(
             )
             error, degrees = math.hypot(away[0], away[1]), math.degrees(away[2])
             chi2 = float(away @ np.linalg.solve(answer.covariance, away))
-            near = error < JUDGING.near_mm and abs(degrees) < JUDGING.near_deg
+            near = error < NEAR_MM and abs(degrees) < NEAR_DEG
             verdict = RIGHT if near else WRONG
     edge = math.nan
     if scene is not None:
@@ -124,3 +207,94 @@ def judge(
         seconds=seconds,
         drawn_anew=" | ".join(found.resampled),
     )
+
+
+#: Names and kinds: text, whole, truth, or decimals after the point.
+COLUMNS: dict[str, str | int] = {
+    "number": "whole",
+    "kind": "text",  #: as `campaign.KINDS` names it
+    "surface": "text",  #: the kind, or which foreign surface
+    "level": "text",
+    "object": "text",  #: touched; empty for a foreign surface
+    "face": "text",
+    "x_mm": 6,
+    "y_mm": 6,
+    "theta_deg": 6,
+    "force_n": 6,
+    "tilt_deg": 6,
+    "edge_mm": 6,
+    "symbols": "whole",  #: registered ones whose centre lies under the sensor
+    "enough": "truth",  #: whether that is enough (`JudgeSettings`)
+    "verdict": "text",
+    "reason": "text",
+    "answer": "text",
+    "error_mm": 6,
+    "error_deg": 6,
+    "chi2": 4,
+    "margin": 4,
+    "noise": 6,
+    "touches": "whole",  #: until one was answered, or all that were made
+    "drawn_anew": "text",  #: why touches before it were none, ` | ` between; usually empty
+}
+
+
+@dataclass(frozen=True, slots=True)
+class CpuTime:
+    """CPU seconds of a touch."""
+
+    number: int
+    drawing: float  #: surface, contact and reading of the sensor
+    reading: float  #: by the recognizer
+
+
+@dataclass(frozen=True, slots=True)
+class SymbolsInView:
+    """What of a face is under the sensor."""
+
+    symbols: int
+    enough: bool
+
+
+def row_of(trial: Trial, kind: str, seen: SymbolsInView) -> Row:
+    """Return the row of a trial, its numbers as they are kept."""
+    row: Row = {}
+    given: Row = {
+        "kind": kind,
+        "surface": trial.kind,
+        "symbols": seen.symbols,
+        "enough": seen.enough,
+    }
+    for name, what in COLUMNS.items():
+        value = given[name] if name in given else getattr(trial, name)
+        row[name] = round(float(value), what) + 0.0 if isinstance(what, int) else value
+    return row
+
+
+def symbols_in_view(lab: Lab, sensor: SensorType, trial: Trial) -> SymbolsInView:
+    """Return how many symbols a touch had in view, and whether they were enough.
+
+    Enough is `JudgeSettings.enough` times the cells of the array's window, on a face that is
+    not worn.
+    """
+    found = find_face(lab, trial.object, trial.face)
+    if found is None:
+        return SymbolsInView(0, enough=False)
+    face, window = found
+    angle = np.radians(trial.theta_deg)
+    c, s = np.cos(angle), np.sin(angle)
+    own = (face.centres_mm - (trial.x_mm, trial.y_mm)) @ np.array([[c, -s], [s, c]])
+    symbols = int((np.abs(own) < sensor.half_mm).all(axis=1).sum())
+    return SymbolsInView(symbols, enough=trial.kind != "worn" and symbols >= ENOUGH * window)
+
+
+def find_face(lab: Lab, object_name: str, face: str) -> tuple[EncodedFace, int] | None:
+    """Return a face of the lab, and the cells of its array's window; None if it is foreign."""
+    for encoding in lab.arrays:
+        for object_id, name in encoding.names.items():
+            if name != object_name:
+                continue
+            for number in np.flatnonzero(encoding.faces[:, 0] == object_id).tolist():
+                held = encoding.face(number)
+                if held.face == face:
+                    return held, encoding.array.window[0] * encoding.array.window[1]
+    return None

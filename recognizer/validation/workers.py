@@ -1,27 +1,124 @@
-"""Who does the work: this process, or several on this machine.
+"""Who does the work: this process, several on this machine, or a dask cluster.
 
-A pool that loses a process (out of memory, killed) is made anew and given what is not done,
-at most `SharingSettings.losses` times without a batch done between. Workers leave interrupts to the
-process that started them, and end when it is gone. `concurrent.futures` gives up when a
-process is lost, and dask, which does not, is an extra (`cluster`).
+Work + Batch -> BatchResult: touch, read, compare, the same anywhere. A worker prepares its reader
+once and keeps it; it refuses when it runs other code or sees another set (a shared folder, or
+PostgreSQL). A pool that loses a process (out of memory, killed) is made again and given what is not
+done; a lost worker of a cluster loses only its batches. Workers leave interrupts to the process
+that started them, and end when it is gone. `concurrent.futures` gives up when a process is lost;
+dask does not, and is an extra (`cluster`).
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from functools import partial
+from dataclasses import dataclass
+from functools import lru_cache, partial
 from multiprocessing import active_children, connection, get_context, parent_process
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from recognizer.validation.campaign import Batch
+from encoded_objects.base.errors import require
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import Reader
+from recognizer.validation.campaign import Batch, Campaign, plan_of, reader_with, series_of
+from recognizer.validation.encoded_set import set_digest
 from recognizer.validation.errors import WorkersError
-from recognizer.validation.settings import SHARING
-from recognizer.validation.work import BatchResult, Work, Workers, touch
+from recognizer.validation.touch_plan import sensor_of
+from recognizer.validation.trial import CpuTime, Row, row_of, symbols_in_view, trial
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+LOSSES = 3  #: pools in a row that break before they have done anything
+CLUSTER_WAIT_S = 20.0  #: for the scheduler, and for its first worker
+
+PACKAGES = ("generator", "decoder", "probe", "recognizer")
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What all batches share."""
+
+    campaign: Campaign
+    database: str  #: as the workers find it
+    set_digest: str
+    code_digest: str
+    labs: tuple[str, ...] = ()  #: databases of other labs, as the workers find them
+    prints: str = ""  #: listing of the printed surfaces, as the workers find it; empty: none
+
+
+@dataclass(frozen=True, slots=True)
+class BatchResult:
+    """A batch that is done."""
+
+    batch: Batch
+    rows: tuple[Row, ...]
+    times: tuple[CpuTime, ...]
+
+
+#: Takes work and batches, yields what is done in any order. `workers`, `cluster`.
+Workers = Callable[[Work, Iterable[Batch]], Iterator[BatchResult]]
+
+
+def touch(work: Work, batch: Batch) -> BatchResult:
+    """Return what became of the touches of a batch.
+
+    Raises
+    ------
+    WorkersError
+        The code or the set is not the one that was asked for.
+    """
+    reader = prepare_reader(work)
+    series = next(s for s in series_of(work.campaign) if s.name == batch.series)
+    reading = reader_with(reader, series.reader)
+    rows, times = [], []
+    for number in range(batch.first, batch.last):
+        kind, plan = plan_of(work.campaign, series, work.database, number, work.labs, work.prints)
+        start = time.process_time()
+        found = trial(plan, number, reading)
+        spent = time.process_time() - start
+        seen = symbols_in_view(reader.lab, reader.sensor, found)
+        rows.append(row_of(found, kind, seen))
+        times.append(CpuTime(number, round(spent - found.seconds, 6), round(found.seconds, 6)))
+    return BatchResult(batch, tuple(rows), tuple(times))
+
+
+@lru_cache(maxsize=1)
+def prepare_reader(work: Work) -> Reader:
+    """Return the reader of a campaign; checks that it is of the same code and set."""
+    if work.code_digest != code_digest():
+        raise WorkersError(
+            "a worker runs another version of this software",
+            fix="install the same version on all machines",
+        )
+    if work.set_digest != set_digest(work.database):
+        raise WorkersError(
+            f"a worker sees another set under {work.database}",
+            fix="let all machines share the folder, or give a PostgreSQL database",
+        )
+    return Reader(
+        open_lab(work.database), sensor_of(work.campaign.sensor_type, work.campaign.overlay)
+    )
+
+
+@lru_cache(maxsize=1)
+def code_digest() -> str:
+    """Return the sha256 of the source of all packages."""
+    digest = hashlib.sha256()
+    root = Path(__file__).parents[2]
+    for package in PACKAGES:
+        for path in sorted((root / package).rglob("*.py")):
+            digest.update(path.relative_to(root).as_posix().encode() + b"\0")
+            digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
 
 Result = TypeVar("Result")
 
@@ -29,8 +126,6 @@ Result = TypeVar("Result")
 def workers_of(processes: int, cluster: str = "") -> Workers:
     """Return who does the work: a cluster, several processes, or this one."""
     if cluster:
-        from recognizer.validation.cluster import on_cluster
-
         return partial(on_cluster, cluster)
     return in_this_process if processes == 1 else partial(in_processes, processes)
 
@@ -59,9 +154,9 @@ def in_processes(processes: int, work: Work, batches: Iterable[Batch]) -> Iterat
                 yield done
         except BrokenProcessPool as error:
             lost = lost + 1 if len(left) == before else 1
-            if lost > SHARING.losses:
+            if lost > LOSSES:
                 raise WorkersError(
-                    f"processes are lost, {SHARING.losses + 1} times in a row",
+                    f"processes are lost, {LOSSES + 1} times in a row",
                     fix="see whether the memory suffices, take a smaller -j, go on with --resume",
                 ) from error
 
@@ -112,3 +207,71 @@ def _end_with(sentinel: int) -> None:
     """Leave as soon as the process that started this one is gone."""
     connection.wait([sentinel])
     os._exit(1)
+
+
+def on_cluster(address: str, work: Work, batches: Iterable[Batch]) -> Iterator[BatchResult]:
+    """Do batches on the workers of a scheduler.
+
+    Parameters
+    ----------
+    address
+        Of the scheduler, `tcp://host:8786`.
+    work, batches
+        What is to be done.
+
+    Raises
+    ------
+    WorkersError
+        There is no scheduler or no worker, or they see other code or another set.
+    """
+    client = connect(address)
+    futures: list[Any] = []
+    try:
+        from distributed import as_completed
+
+        futures += [client.submit(touch, work, batch, pure=False) for batch in batches]
+        for future in as_completed(futures, loop=client.loop):
+            error = future.exception()
+            if error is not None:
+                raise _failure(error) from error
+            yield future.result()
+            future.release()
+    finally:
+        client.cancel(futures)
+        client.close()
+
+
+def connect(address: str) -> Client:
+    """Return a client of a scheduler that has a worker.
+
+    Raises
+    ------
+    WorkersError
+        Nobody answers.
+    MissingExtraError
+        dask is not installed.
+    """
+    require("distributed", extra="cluster", purpose="--cluster")
+    from distributed import Client
+
+    fix = f"start one: dask scheduler, and dask worker {address} on every machine"
+    try:
+        client = Client(address, timeout=CLUSTER_WAIT_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise WorkersError("no scheduler answers", fix=fix, place=address) from error
+    try:
+        client.wait_for_workers(1, timeout=CLUSTER_WAIT_S)
+    except TimeoutError as error:
+        client.close()
+        raise WorkersError("the scheduler has no worker", fix=fix, place=address) from error
+    return client
+
+
+def _failure(error: Any) -> Exception:
+    """Return what a worker raised; what became of a batch that outlived its workers."""
+    if type(error).__name__ == "KilledWorker":
+        return WorkersError(
+            "several workers were lost at the same touches",
+            fix="see the workers' logs and memory, go on with --resume",
+        )
+    return error if isinstance(error, Exception) else WorkersError(str(error))

@@ -6,7 +6,7 @@
 Objects of `fixtures/specs` (80 mm cube, prism, tetrahedron, box; of the product profile the
 cube) are scanned face by face, a touch every 4.25 tactels: in lines there and back from one end
 of the face (`face`; `worn`: with 20 % of its symbols gone), or round its first corner, 5 mm
-from the edges (`corner`); or another surface of `recognizer.validation.surfaces` is scanned, and
+from the edges (`corner`); or another surface of `recognizer.validation.draw` is scanned, and
 any answer is wrong. Places are those of an arm whose joints have noise and backlash (`arm`), or
 they err by so many tactels; 20-120 N, up to 2 degrees of tilt. A scan is felt by one sensor,
 drawn from a level of `recognizer.validation`, with the same noise in every touch. Ways:
@@ -55,8 +55,8 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
+from recognizer.validation.draw import FOREIGN
 from recognizer.validation.statistics import chi2_quantile
-from recognizer.validation.surfaces import FOREIGN
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
 SHAPES = {"thesis": ("cube", "prism", "tetrahedron", "box"), "product": ("cube",),

@@ -55,8 +55,9 @@ from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.touch.recognition import Recognition  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
-from recognizer.validation.settings import DRAWING, JUDGING  # noqa: E402
+from recognizer.validation.draw import INSIDE_MM  # noqa: E402
 from recognizer.validation.statistics import chi2_quantile  # noqa: E402
+from recognizer.validation.trial import NEAR_MM  # noqa: E402
 
 SHAPES = {
     "R20": "{cylinder: {diameter: 40 mm, height: 70 mm}}",
@@ -104,7 +105,7 @@ def reader(database: str) -> Reader:
 
 
 def touches(touched: RoundPart, rng: np.random.Generator) -> Iterator[Touch]:
-    return random_touches(touched.region, rng, TouchRanges(margin_mm=DRAWING.inside_mm))
+    return random_touches(touched.region, rng, TouchRanges(margin_mm=INSIDE_MM))
 
 
 def truth(touched: RoundPart, touch: Touch, height_mm: float) -> np.ndarray:
@@ -132,7 +133,7 @@ def judged(touched: RoundPart, touch: Touch, answer: Recognition) -> Outcome:
     away[:2] = T[:2, 3] - (touch.x_mm, touch.y_mm)
     away[2] = math.remainder(math.atan2(T[1, 0], T[0, 0]) - touch.theta_rad, 2 * math.pi)
     named = (answer.object, answer.face) == (touched.object_name, touched.face.name)
-    if not named or math.hypot(*away[:2]) > JUDGING.near_mm:
+    if not named or math.hypot(*away[:2]) > NEAR_MM:
         return Outcome("wrong")
     meant = truth(touched, touch, T[2, 3])
     turn = np.linalg.inv(meant[:3, :3]) @ answer.T_object_probe[:3, :3]
@@ -169,9 +170,7 @@ def one_scan(job: tuple[str, str, str, int]) -> Outcome:
     scan, outcome, first, start = begin_scan(reader(database)), Outcome("refused"), math.nan, 0.0
     for k in range(MOST):
         at = np.array([[touch.x_mm, touch.y_mm]])
-        inside = (
-            touched.region.contains(at)[0] and touched.region.distance_mm(at)[0] > DRAWING.inside_mm
-        )
+        inside = touched.region.contains(at)[0] and touched.region.distance_mm(at)[0] > INSIDE_MM
         if inside:
             try:
                 sensor = LevelSensor(SensorType(), LEVELS[level])
@@ -237,7 +236,7 @@ def strips(options: argparse.Namespace, databases: dict[str, str]) -> None:
         for force in FORCES_N:
             rng, found = np.random.default_rng(1), []
             for _ in range(min(options.touches, 12)):
-                ranges = TouchRanges((force, force), 0.0, DRAWING.inside_mm)
+                ranges = TouchRanges((force, force), 0.0, INSIDE_MM)
                 drawn = next(random_touches(touched.region, rng, ranges))
                 worse = LevelSensor(sensor, LEVELS["low"])
                 contact = worse.read(touched.scene(), drawn, rng).contact

@@ -21,7 +21,7 @@ from database_scale import array_of, blocks, fill
 from generator.database.open import open_database
 from recognizer.validation.campaign import Batch, Campaign
 from recognizer.validation.encoded_set import set_digest
-from recognizer.validation.work import Work, code_digest, prepare_reader, touch
+from recognizer.validation.workers import Work, code_digest, prepare_reader, touch
 
 
 def main() -> None:

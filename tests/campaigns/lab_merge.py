@@ -24,7 +24,7 @@ from generator.database.read import list_objects, read_array, read_object
 from generator.database.transaction import read_transaction
 from generator.pipeline import encode
 from generator.spec import read_specs
-from generator.spec.script import tree_from
+from generator.spec.read import tree_from
 
 BLOCK = {"box": ["45 mm", "35 mm", "28 mm"]}
 

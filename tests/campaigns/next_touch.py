@@ -22,8 +22,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NextTouch, Recognition
 from recognizer.validation.campaign import Campaign, kinds_of, levels_of, plan_of, series_of
-from recognizer.validation.policy import Proposal, as_told, touch_until_answered
-from recognizer.validation.trial import judge
+from recognizer.validation.trial import Proposal, judge, touch_until_answered
 
 
 def walk(_answer: Recognition, rng: np.random.Generator) -> NextTouch:
@@ -49,7 +48,7 @@ def main() -> None:
     )  # fmt: skip
     series = series_of(campaign)[0]
     reader = Reader(open_lab(options.database), sensor_type_named(options.sensor_type))
-    policies: dict[str, Proposal] = {"next": as_told, "walk": walk}
+    policies: dict[str, Proposal] = {"next": lambda answer, _: answer.next, "walk": walk}
     found: dict[tuple[str, str], Counter[tuple[str, int]]] = {}
     end, number = time.monotonic() + options.seconds, options.first
     while number < options.first + options.touches and time.monotonic() < end:

@@ -47,9 +47,8 @@ from generator.layout.recognition_rate import (
 )
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.validation.policy import NEXT, touch_until_answered
 from recognizer.validation.touch_plan import TouchPlan
-from recognizer.validation.trial import judge
+from recognizer.validation.trial import NEXT, judge, touch_until_answered
 
 Points = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ import runner
 
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.draw import FOREIGN
 from recognizer.validation.touch_plan import TouchPlan, sensor_of
 from recognizer.validation.trial import Trial, trial
 

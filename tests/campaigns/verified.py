@@ -34,7 +34,7 @@ from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
 from generator.polyhedron import Polyhedron
 from generator.solid import prove_closed, triangles
-from generator.spec import LocatedSpec, read_specs
+from generator.spec import ObjectSpec, read_specs
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from random_shapes import random_convex, random_nonconvex
@@ -85,8 +85,8 @@ def checked(path: Path) -> list[Outcome]:
         return [Outcome(path.stem, 0, 0, 0.0, 0.0, error.cause, "")]
 
 
-def outcome(located: LocatedSpec) -> Outcome:
-    name = located.spec.name
+def outcome(located: ObjectSpec) -> Outcome:
+    name = located.name
     try:
         plan = plan_object(located)
         layout = lay_out_object(plan, NO_CELLS)
@@ -111,7 +111,7 @@ def outcome(located: LocatedSpec) -> Outcome:
             step_error = max(step_error, abs(step_read.volume_error))
             mesh_error = max(mesh_error, abs(stl_read.volume_error))
         try:
-            fit = verify_fit(panels, located.spec.gap_mm) if len(panels) > 1 else None
+            fit = verify_fit(panels, located.gap_mm) if len(panels) > 1 else None
         except GeneratorError as error:
             return Outcome(name, len(parts), symbols, step_error, mesh_error, "", str(error))
     if fit is None:

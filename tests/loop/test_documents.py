@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 BLOCKS = {
     f"{document.name}:{number}": code
-    for document in (ROOT / "README.md", ROOT / "CONTRIBUTING.md")
+    for document in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs/apriltag.md")
     for number, code in enumerate(
         re.findall(r"^```python\n(.*?)^```", document.read_text(), re.MULTILINE | re.DOTALL), 1
     )

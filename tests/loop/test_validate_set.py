@@ -20,8 +20,7 @@ from recognizer.touch.reader import Reader
 from recognizer.validation.command import run
 from recognizer.validation.draw import draw_touch
 from recognizer.validation.errors import SetError
-from recognizer.validation.touch_plan import TouchPlan, sensor_of
-from recognizer.validation.written import written_surface
+from recognizer.validation.touch_plan import TouchPlan, sensor_of, written_surface
 
 TOUCHES, SHARD = 18, 6
 COMMAND = [sys.executable, "-m", "recognizer.validation.command"]

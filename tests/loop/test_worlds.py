@@ -2,8 +2,8 @@
 
 from recognizer.validation import validate
 from recognizer.validation.campaign import Campaign, series_of
-from recognizer.validation.made_kinds import is_extra
-from recognizer.validation.shards import columns_of, read_series
+from recognizer.validation.encoded_set import is_extra
+from recognizer.validation.files import columns_of, read_series
 
 KINDS = ("copy", "near", "small", "side", "same_profile")
 SET = """objects:

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from encoded_objects.base.settings import MILLIMETRES, length_mm
-from generator.spec import LocatedSpec, SpecError, read_specs
+from generator.spec import ObjectSpec, SpecError, read_specs
 
 MUTATIONS = int(os.environ.get("SPEC_MUTATIONS", "300"))
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -77,8 +77,8 @@ def check(data):
             shown.encode("utf-8")
         else:
             assert found
-            assert all(isinstance(one, LocatedSpec) for one in found)
-            assert all(0 < one.spec.style.pitch_mm < 1e4 for one in found)
+            assert all(isinstance(one, ObjectSpec) for one in found)
+            assert all(0 < one.style.pitch_mm < 1e4 for one in found)
         assert sorted(os.listdir()) == ["c.yaml"]
 
 
@@ -164,13 +164,13 @@ def test_hash_is_independent_of_order_comments_and_units(lines, between):
     text = "\n".join(line for pair in zip(between, lines, strict=True) for line in pair) + "\n"
     with spec_file(text.encode()) as file:
         (one,) = read_specs([file])
-    assert one.spec.meaning == REFERENCE_MEANING
+    assert one.meaning == REFERENCE_MEANING
 
 
 def _reference_hash():
     text = "name: C\nshape: {cube: 60}\nsymbols: {pitch: 8}\nprint: {wall: 4, parts: whole}\n"
     with spec_file(f"{text}layout: net\n".encode()) as file:
-        return read_specs([file])[0].spec.meaning
+        return read_specs([file])[0].meaning
 
 
 REFERENCE_MEANING = _reference_hash()

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from generator.command.next_step import next_step
+from generator.command.made_report import next_step
 from generator.errors import PrintError
 from generator.pipeline.encode import encode
 from generator.polyhedron import SHAPES

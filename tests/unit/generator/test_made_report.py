@@ -5,15 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 
 from generator.command.made_report import print_made
+from generator.layout.placement import Layout
 from generator.layout.recognition_rate import RecognitionRate
 from generator.pipeline import Encoded, MadeObject
 from generator.pipeline.faces import FaceReport
+
+LAYOUT = Layout("faces", 7.0, ())
 
 
 def copy(number: int, name: str = "Cube", symbols: int = 384) -> MadeObject:
     folder = Path("out") / f"{name}-{number}"
     files = tuple(folder / f"{name}-{number}-F{face}.step" for face in (1, 2))
-    return MadeObject(f"{name}-{number}", 6, symbols, 200, 6, files, (), False)
+    return MadeObject(f"{name}-{number}", 6, symbols, 200, 6, files, (), False, LAYOUT)
 
 
 def said(objects, capsys, set_files=()):
@@ -51,7 +54,7 @@ def test_faces_of_which_the_same_is_to_be_said_share_a_line(capsys):
         )
 
     faces = tuple(face(k, 40.0 if k in (1, 4) else 60.0) for k in range(1, 13))
-    made = MadeObject("Block", 12, 700, 200, 12, (), (), False, face_reports=faces)
+    made = MadeObject("Block", 12, 700, 200, 12, (), (), False, LAYOUT, face_reports=faces)
     text = said([made], capsys)
     assert (
         "  F1, F4:           40 x 50 mm, 63 symbols, 70% answered at once, 99% within three, "

@@ -13,9 +13,7 @@ from generator.database.open import open_if_there
 from generator.database.transaction import read_transaction
 from generator.layout.layout import lay_out
 from generator.pipeline import encode, place
-from generator.pipeline.choose import choose_array
-from generator.pipeline.lab import lab_of
-from generator.pipeline.plan import plan_object
+from generator.pipeline.choose import choose_array, lab_of
 from generator.spec import SpecError, read_specs
 
 DATABASES = Path(__file__).parents[3] / "fixtures" / "database"
@@ -39,21 +37,21 @@ def choice(folder: Path, text: str):
 
 
 def profiles(found) -> set[str]:
-    return {one.spec.profile for one in found.specs}
+    return {one.spec.profile for one in found.plans}
 
 
 def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
     text = "name: A\nprofile: auto\nshape: {cube: 60 mm}\ncopies: "
     smallest = choice(tmp_path, text + "36")
     assert (profiles(smallest), smallest.notes) == ({"large"}, ())
-    assert {one.spec.style.pitch_mm for one in smallest.specs} == {5.0}
+    assert {one.spec.style.pitch_mm for one in smallest.plans} == {5.0}
     larger = choice(tmp_path, text + "37")  # 36 leave room for as many
     assert profiles(larger) == {"large-511x513"}
-    assert plan_object(larger.specs[0]).array.rows == 511
+    assert larger.plans[0].array.rows == 511
     (note,) = larger.notes
     assert note.startswith("profile large-511x513 is taken (window 3x3 in place of 4x2): ")
     assert note.endswith("26862 cells are needed, and large 51x1285 has room for 26214")
-    assert larger.specs[36].spec.name == "A-37"
+    assert larger.plans[36].spec.name == "A-37"
 
 
 @pytest.mark.parametrize("profile", ["auto", "one-touch"])
@@ -103,10 +101,10 @@ def test_a_database_goes_on_with_the_arrays_that_it_has(tmp_path):
         assert same.reused
     beside = choice(tmp_path, f"objects:\n- {{{brick[:11]}, shape: {{box: [40, 30, 20]}}}}\n"
                     "- {name: Beside, shape: {cube: 30 mm}}\n")  # fmt: skip
-    assert [one.spec.style.pitch_mm for one in beside.specs] == [7.0, 7.0]
+    assert [one.spec.style.pitch_mm for one in beside.plans] == [7.0, 7.0]
     many = choice(tmp_path, new.format("Many", "auto") + "copies: 120\n")
     assert profiles(many) == {"large"}
-    assert many.specs[0].spec.encoding["rows"] == 255
+    assert many.plans[0].spec.encoding["rows"] == 255
     assert dry(tmp_path, new.format("Other", "one-touch")).rows == 63
 
 
@@ -114,7 +112,7 @@ def test_auto_takes_finer_symbols_on_a_printer_that_makes_them(tmp_path):
     text = "name: A\nshape: {box: [60, 15, 15]}\n"
     found = choice(tmp_path, text)
     assert profiles(found) == {"large"}
-    assert found.specs[0].spec.style.pitch_mm == 4.5
+    assert found.plans[0].spec.style.pitch_mm == 4.5
     (note,) = found.notes
     assert note.startswith("pitch 4.5 mm is taken: it shows places on 2 of the 2 faces")
     for box, settings, pitch in (
@@ -124,15 +122,15 @@ def test_auto_takes_finer_symbols_on_a_printer_that_makes_them(tmp_path):
         ("[60, 17, 17]", "", 5.0),
     ):
         found = choice(tmp_path, f"name: A\nshape: {{box: {box}}}\n{settings}")
-        assert found.specs[0].spec.style.pitch_mm == pitch
+        assert found.plans[0].spec.style.pitch_mm == pitch
         assert bool(found.notes) == (pitch < 5)
 
 
 def test_round_objects_are_embossed_as_flat_ones(tmp_path):
     can = "name: A\nshape: {cylinder: {diameter: 60 mm, height: 50 mm}}\n"
-    assert choice(tmp_path, can).specs[0].spec.style.pitch_mm == 5.0
+    assert choice(tmp_path, can).plans[0].spec.style.pitch_mm == 5.0
     asked = choice(tmp_path, can + "symbols: {pitch: 6 mm}\n")
-    assert asked.specs[0].spec.style.pitch_mm == 6.0
+    assert asked.plans[0].spec.style.pitch_mm == 6.0
 
 
 def test_auto_follows_a_profile_that_the_set_names(tmp_path):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from generator.command.promise_report import face_values, promise_lines
+from generator.command.made_report import face_values, rate_lines
 from generator.layout.recognition_rate import LOW
 from generator.pipeline import encode
 from generator.pipeline.faces import face_reports
@@ -49,7 +49,7 @@ def test_a_bracket_of_narrow_legs_is_not_readable_and_says_so():
         assert by_name[name].promise.at_once < 0.25
     assert by_name["F4"].symbols == 0
     assert by_name["F4"].promise.at_once == 0.0
-    text = "\n".join(promise_lines(faces))
+    text = "\n".join(rate_lines(faces))
     assert (
         "F4, the 12 x 12 mm face at x = 70 (and F7, as narrow): not readable: it is blank" in text
     )
@@ -76,7 +76,7 @@ def test_a_large_cube_promises_more_than_a_small_one_and_names_no_face():
         assert len(promised) == 6
         shares.append(promised[0].at_once)
         if side > 20:
-            (line,) = promise_lines(faces)
+            (line,) = rate_lines(faces)
             assert line.startswith(f"  {shares[-1]:.0%} of touches".replace("%", " %"))
             assert line.endswith(" of touches are answered at once, over 99 % within three")
             assert promised[0].within_three > 0.99
@@ -119,7 +119,7 @@ def test_round_faces_and_scans_promise_nothing():
     assert kinds["plane"].at_once > 0.5
     scan = reports("name: Cube\nshape: {cube: 100 mm}\n", "thesis")
     assert {face.promise for face in scan} == {None}
-    assert promise_lines(scan) == []
+    assert rate_lines(scan) == []
     assert face_values(scan[0])["promise"] is None
 
 

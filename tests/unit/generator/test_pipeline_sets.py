@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from generator.layout import occupancy
 from generator.layout.occupancy import tiles_of
 from generator.pipeline import encode
 from generator.pipeline.files import parts_of
-from generator.pipeline.make import Order, Rehearsal, make_at, make_under_lock
+from generator.pipeline.make import MakeJob, make_at, make_under_lock
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.place import place_object
 from generator.pipeline.plan import plan_object
@@ -182,62 +183,61 @@ def test_the_overview_is_a_pdf_without_a_date(once):
     assert pages == 1 + len({row["plate"] for row in rows(once[0])})
 
 
-def test_who_loses_his_cells_to_another_writer_places_anew(tmp_path):
-    located = specs(tmp_path)
-    url = f"sqlite:///{tmp_path / 'lab.db'}"
-    engine = open_database(url)
-    orders = [Order(plan_object(one), tmp_path / one.spec.name, ("stl",)) for one in located[:2]]
+def cells_held(engine):
+    """Every cell of A and B, as the database has them."""
     with read_transaction(engine) as connection:
-        chosen = [place_object(connection, order.plan, replace=False) for order in orders]
-    first = make_at(engine, orders[0], chosen[0])
-    second = make_at(engine, orders[1], chosen[1])  # both chose the same corner
-    assert first.placed is chosen[0]
-    assert second.placed is not chosen[1]
-    cells = []
-    with read_transaction(engine) as connection:
-        for name in "AB":
-            for face in read_layout(connection, name).faces:
-                cells += zip(face.rows.tolist(), face.columns.tolist(), strict=True)
-    assert len(set(cells)) == len(cells) == first.made.symbols + second.made.symbols
+        return [
+            cell
+            for name in "AB"
+            for face in read_layout(connection, name).faces
+            for cell in zip(face.rows.tolist(), face.columns.tolist(), strict=True)
+        ]
 
 
-def test_a_rehearsal_counts_while_the_array_is_empty(tmp_path):
-    located = specs(tmp_path)
+def test_an_object_whose_cells_another_writer_took_is_placed_again(tmp_path):
     engine = open_database(f"sqlite:///{tmp_path / 'lab.db'}")
-    orders = []
-    for one in located[:2]:
-        plan = plan_object(one)
-        place = place_object(None, plan, replace=False)
-        rehearsal = Rehearsal(place, parts_of(plan, place.layout))
-        orders.append(Order(plan, tmp_path / one.spec.name, (), rehearsal=rehearsal))
-    first, second = (make_under_lock(engine, order) for order in orders)
-    again = make_under_lock(engine, orders[0])
-    assert first.placed is orders[0].rehearsal.place
-    assert second.placed is not orders[1].rehearsal.place  # the first one's cells were free then
-    assert again.placed is not orders[0].rehearsal.place  # registered: its own cells
-    assert again.placed.reused
+    jobs = [MakeJob(plan_object(one), tmp_path / one.name, ("stl",)) for one in specs(tmp_path)[:2]]
     with read_transaction(engine) as connection:
-        held = [read_layout(connection, name).faces for name in "AB"]
-    cells = [
-        cell
-        for faces in held
-        for face in faces
-        for cell in zip(face.rows.tolist(), face.columns.tolist(), strict=True)
-    ]
-    assert len(set(cells)) == len(cells) == first.made.symbols + second.made.symbols
+        chosen = [place_object(connection, job.plan, replace=False) for job in jobs]
+    first = make_at(engine, jobs[0], chosen[0])
+    second = make_at(engine, jobs[1], chosen[1])  # both chose the same corner
+    assert first.layout is chosen[0].layout
+    assert second.layout is not chosen[1].layout
+    cells = cells_held(engine)
+    assert len(set(cells)) == len(cells) == first.symbols + second.symbols
+
+
+def test_a_dry_build_counts_while_the_array_is_empty(tmp_path):
+    engine = open_database(f"sqlite:///{tmp_path / 'lab.db'}")
+    jobs, dry = [], []
+    for one in specs(tmp_path)[:2]:
+        plan = plan_object(one)
+        placed = place_object(None, plan, replace=False)
+        jobs.append(MakeJob(plan, tmp_path / one.name, ()))
+        dry.append(replace(placed, built=parts_of(plan, placed.layout)))
+    first, second = (
+        make_under_lock(engine, job, dry_build=placed)
+        for job, placed in zip(jobs, dry, strict=True)
+    )
+    again = make_under_lock(engine, jobs[0], dry_build=dry[0])
+    assert first.layout is dry[0].layout
+    assert second.layout is not dry[1].layout  # the first one's cells were free then
+    assert again.layout is not dry[0].layout  # registered: its own cells
+    assert again.reused
+    cells = cells_held(engine)
+    assert len(set(cells)) == len(cells) == first.symbols + second.symbols
 
 
 def test_an_object_that_another_writer_made_meanwhile_keeps_its_cells(tmp_path):
-    located = specs(tmp_path)
     engine = open_database(f"sqlite:///{tmp_path / 'lab.db'}")
-    orders = [Order(plan_object(one), tmp_path / one.spec.name, ("stl",)) for one in located[:2]]
-    make_under_lock(engine, orders[1])  # moves what is free
+    jobs = [MakeJob(plan_object(one), tmp_path / one.name, ("stl",)) for one in specs(tmp_path)[:2]]
+    make_under_lock(engine, jobs[1])  # moves what is free
     with read_transaction(engine) as connection:
-        chosen = place_object(connection, orders[0].plan, replace=False)
-    other = make_under_lock(engine, orders[0])
-    mine = make_at(engine, orders[0], chosen)
-    assert mine.made.reused
-    assert mine.made.symbols == other.made.symbols
+        chosen = place_object(connection, jobs[0].plan, replace=False)
+    other = make_under_lock(engine, jobs[0])
+    mine = make_at(engine, jobs[0], chosen)
+    assert mine.reused
+    assert mine.symbols == other.symbols
 
 
 def test_errors_come_back_from_other_processes(tmp_path):

@@ -5,10 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from generator.pipeline.files import parts_of
+from generator.pipeline.files import outer_size_mm, parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
-from generator.pipeline.size import outer_size_mm
 from generator.spec import read_specs
 
 CAN = "shape: {cylinder: {diameter: 60 mm, height: 80 mm}}\nsymbols: {pitch: 14 mm}\n"

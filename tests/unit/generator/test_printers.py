@@ -22,7 +22,7 @@ CUBE = "name: Cube\nshape: {cube: 60 mm}\n"
 def spec_of(folder: Path, text: str) -> ObjectSpec:
     path = folder / "c.yaml"
     path.write_text(CUBE + text)
-    return read_specs([path])[0].spec
+    return read_specs([path])[0]
 
 
 def test_machines_have_beds_and_the_limits_of_their_nozzles() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from generator.command import run as encode_object
 from generator.spec import SpecError, read_specs
-from generator.spec.script import tree_from
+from generator.spec.read import tree_from
 
 CUBE = {"name": "Cube", "shape": {"cube": "60 mm"}}
 MINE = "name: mine\nrows: 16\ncolumns: 16\npitch: 2.54 mm\n"
@@ -16,7 +16,7 @@ MINE = "name: mine\nrows: 16\ncolumns: 16\npitch: 2.54 mm\n"
 
 def pitch_of(**settings):
     (located,) = read_specs([tree_from(CUBE | settings)])
-    return located.spec.style.pitch_mm
+    return located.style.pitch_mm
 
 
 def test_auto_takes_the_pitch_that_the_sensor_proposes():
@@ -30,7 +30,7 @@ def test_auto_takes_the_pitch_that_the_sensor_proposes():
 
 def test_what_touches_an_object_is_no_part_of_what_it_is():
     plain, same, finer = (
-        read_specs([tree_from(CUBE | given)])[0].spec
+        read_specs([tree_from(CUBE | given)])[0]
         for given in (
             {},
             {"sensor_type": "gel-24x32", "symbols": {"pitch": "5 mm"}},
@@ -46,10 +46,10 @@ def test_a_file_stands_beside_the_spec_and_the_option_beside_the_caller(tmp_path
     (place / "mine.yaml").write_text(MINE)
     (place / "cube.yaml").write_text("name: Cube\nshape: {cube: 60 mm}\nsensor_type: mine.yaml\n")
     (located,) = read_specs([place / "cube.yaml"])
-    assert located.spec.style.pitch_mm == 8.0  # 3.15 of 2.54 mm
-    assert located.spec.sensor.half_mm == pytest.approx((20.32, 20.32))
+    assert located.style.pitch_mm == 8.0  # 3.15 of 2.54 mm
+    assert located.sensor.half_mm == pytest.approx((20.32, 20.32))
     (other,) = read_specs([place / "cube.yaml"], sensor_type="fsr-8x8")
-    assert other.spec.style.pitch_mm == 7.0
+    assert other.style.pitch_mm == 7.0
 
 
 def test_an_unknown_type_is_told_at_its_line(tmp_path):

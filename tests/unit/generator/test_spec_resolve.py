@@ -14,7 +14,8 @@ from generator.alphabet.printable import check_printable
 from generator.array.profiles import PROFILES
 from generator.errors import DatabaseError, LayoutError, ShapeError
 from generator.polyhedron.shapes import SHAPES
-from generator.spec import SpecError, error_at, locate, read_specs
+from generator.spec import SpecError, read_specs
+from generator.spec.problem import error_location, mark_of
 
 FIXTURES = Path(__file__).parents[3] / "fixtures"
 CUBE = "name: Cube\nshape: {cube: 60 mm}\n"
@@ -32,14 +33,18 @@ def located(text, name="c.yaml"):
     return read_specs([name])
 
 
+def place_of(one, path):
+    return str(mark_of(one.source, path))
+
+
 def spec(text):
     (one,) = located(text)
-    return one.spec
+    return one
 
 
 def test_smallest_spec():
     (found,) = read_specs([FIXTURES / "cube.yaml"])
-    cube = found.spec
+    cube = found
     assert (cube.name, cube.shape.kind, cube.shape.parameters) == ("Cube", "cube", {"side": 60.0})
     assert (cube.profile, cube.alphabet, cube.printer.name) == ("auto", "dense-4", "fdm-0.4")
     assert cube.style == SymbolStyle(5.0, 1.0, 1.0, pytest.approx(math.radians(7.5)), 0.0)
@@ -150,13 +155,13 @@ def test_files_are_relative_to_the_spec_and_count_by_content():
     Path("parts/a.stl").write_bytes(b"one")
     Path("parts/b.stl").write_bytes(b"one")
     a, b = (
-        located(f"name: {name}\nshape: {{file: {name}.stl}}\n", f"parts/{name}.yaml")[0].spec
+        located(f"name: {name}\nshape: {{file: {name}.stl}}\n", f"parts/{name}.yaml")[0]
         for name in "ab"
     )
     assert a.shape.file == Path("parts/a.stl")
     assert a.meaning == b.meaning
     Path("parts/b.stl").write_bytes(b"two")
-    assert read_specs(["parts/b.yaml"])[0].spec.meaning != a.meaning
+    assert read_specs(["parts/b.yaml"])[0].meaning != a.meaning
 
 
 def test_scale_of_a_file_counts_unless_it_is_one():
@@ -204,8 +209,8 @@ def test_other_meaning_other_hash(other):
 
 def test_copies_have_names_of_their_own():
     made = located(CUBE + "copies: 3\n")
-    assert [one.spec.name for one in made] == ["Cube-1", "Cube-2", "Cube-3"]
-    assert [one.spec.meaning for one in made] == [spec(CUBE).meaning] * len(made)
+    assert [one.name for one in made] == ["Cube-1", "Cube-2", "Cube-3"]
+    assert [one.meaning for one in made] == [spec(CUBE).meaning] * len(made)
 
 
 def test_set_shares_its_defaults():
@@ -220,7 +225,7 @@ def test_set_shares_its_defaults():
         "  - {name: B, shape: {cube: 70}, symbols: {pitch: 9 mm}, print: {parts: whole}}\n"
         "  - ball.yaml\n"
     )
-    specs = {one.spec.name: one.spec for one in made}
+    specs = {one.name: one for one in made}
     assert list(specs) == ["A-1", "A-2", "B", "Ball"]
     styles = {name: (s.style.pitch_mm, s.style.height_mm) for name, s in specs.items()}
     assert styles == {"A-1": (8, 1.2), "A-2": (8, 1.2), "B": (9, 1.2), "Ball": (8, 0.8)}
@@ -229,11 +234,11 @@ def test_set_shares_its_defaults():
     assert {(s.profile, s.database, s.formats) for s in specs.values()} == {
         ("large", "sqlite:///lab2.db", ("stl",))
     }
-    by_name = {one.spec.name: one for one in made}
-    assert locate(by_name["B"], "symbols.pitch") == "c.yaml:7:51"
-    assert locate(by_name["B"], "symbols.height") == "c.yaml:2:32"
-    assert locate(by_name["Ball"], "symbols.height") == "ball.yaml:3:19"
-    assert locate(by_name["Ball"], "print.wall") == "c.yaml:3:15"
+    by_name = {one.name: one for one in made}
+    assert place_of(by_name["B"], "symbols.pitch") == "c.yaml:7:51"
+    assert place_of(by_name["B"], "symbols.height") == "c.yaml:2:32"
+    assert place_of(by_name["Ball"], "symbols.height") == "ball.yaml:3:19"
+    assert place_of(by_name["Ball"], "print.wall") == "c.yaml:3:15"
 
 
 def test_fixtures():
@@ -241,8 +246,8 @@ def test_fixtures():
     assert len(files) == 14
     for file in files:
         for one in read_specs([file]):
-            SHAPES[one.spec.shape.kind](**one.spec.shape.parameters)
-    names = [one.spec.name for one in read_specs([FIXTURES / "specs/thesis-four.yaml"])]
+            SHAPES[one.shape.kind](**one.shape.parameters)
+    names = [one.name for one in read_specs([FIXTURES / "specs/thesis-four.yaml"])]
     assert names == ["Cube", "Box", "Triangular prism", "Tetrahedron"]
 
 
@@ -254,7 +259,7 @@ def test_full_fixture_names_every_setting():
     missing = {name for block in blocks for name in block.model_fields if f"{name}:" not in text}
     assert missing == set()
     one_touch = PROFILES["one-touch"].array().definition()
-    assert read_specs([FIXTURES / "specs/full.yaml"])[0].spec.encoding == one_touch
+    assert read_specs([FIXTURES / "specs/full.yaml"])[0].encoding == one_touch
 
 
 def test_several_databases_are_fine_when_one_is_given():
@@ -284,17 +289,24 @@ SEVERAL = "name: C\nshape:\n  cube: 60 mm\nprint: {wall: 4 mm}\n"
 )
 def test_locate(path, place):
     (one,) = located(SEVERAL)
-    assert locate(one, path) == place
+    assert place_of(one, path) == place
 
 
-def test_blame():
+def error_at(one, error, path):
+    """The error that leaves a stage in which `error` was raised."""
+    with pytest.raises(type(error).__mro__[1]) as caught, error_location(one.source, path):
+        raise error
+    return caught.value
+
+
+def test_errors_of_a_stage_get_the_place_of_a_setting():
     (one,) = located(SEVERAL)
-    blame = error_at(one, ShapeError("not closed", fix="close it", place="face F1"), "shape")
-    assert str(blame) == (
+    found = error_at(one, ShapeError("not closed", fix="close it", place="face F1"), "shape")
+    assert str(found) == (
         "c.yaml:2:1: error: face F1: not closed\n    2 | shape:\n      | ^\n  fix: close it"
     )
-    assert isinstance(blame, SpecError)
-    assert error_at(one, blame, "print") is blame
+    assert isinstance(found, SpecError)
+    assert error_at(one, found, "print") is found
     database = DatabaseError("cannot be opened")
     assert error_at(one, database, "output.database") is database
     several = error_at(one, LayoutError("two faces:\n  face F1\n  face F2"), "print.wall")
@@ -309,9 +321,9 @@ def test_a_set_has_a_name_and_folders_of_their_own(tmp_path):
     path = tmp_path / "c.yaml"
     one = "{name: Cube A, shape: {cube: 60 mm}}"
     path.write_text(f"name: Course\nobjects:\n- {one}\n")
-    assert [located.origin for located in read_specs([path])] == ["Course"]
+    assert [one.origin for one in read_specs([path])] == ["Course"]
     path.write_text(f"objects:\n- {one}\n")
-    assert [located.origin for located in read_specs([path])] == ["c"]
+    assert [one.origin for one in read_specs([path])] == ["c"]
     for other in ("cube a", "Cube-a", "CUBE  A"):
         path.write_text(f"objects:\n- {one}\n- {one.replace('Cube A', other)}\n")
         with pytest.raises(SpecError, match="only by case, spaces or dashes"):

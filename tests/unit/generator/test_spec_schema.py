@@ -67,7 +67,7 @@ def test_starters_can_be_made_as_they_are(shape, tmp_path):
     file = tmp_path / "c.yaml"
     file.write_text(starter(shape))
     (one,) = read_specs([file])
-    assert one.spec.shape.kind == shape
+    assert one.shape.kind == shape
 
 
 def test_starter_shows_the_values_that_hold_without_it(tmp_path):
@@ -75,7 +75,7 @@ def test_starter_shows_the_values_that_hold_without_it(tmp_path):
     file.write_text(re.sub(r"(?m)^# ( *[a-z_]+:)", r"\1", starter("cube")))
     (one,) = read_specs([file])
     (smallest,) = read_specs([CUBE])
-    assert one.spec == smallest.spec
+    assert one == smallest
     written = set(re.findall(r"([a-z_]+):", file.read_text()))
     assert set(ObjectSettings.model_fields) - {"encoding"} <= written
 

@@ -15,8 +15,7 @@ from probe.frame import frame_from
 from probe.recording.read import Recording
 from recognizer.bench.broker import Broker
 from recognizer.bench.frames import FrameHandler
-from recognizer.bench.recognition_thread import PendingFrame, RecognitionThread
-from recognizer.bench.scan_mode import ScanMode
+from recognizer.bench.reading import PendingFrame, RecognitionThread, ScanMode
 from recognizer.sensor.wiring import wiring_named
 
 
@@ -71,7 +70,7 @@ def frame(value, seq=0):
 
 def test_a_load_that_is_still_on_when_the_calibration_ends_is_no_touch(thread):
     def look(value, *, load=False):
-        thread._look(PendingFrame(frame(value), None, 0.0, load))
+        thread._read(PendingFrame(frame(value), None, 0.0, load))
         return [one["contact"] for one in thread.touches.all()]
 
     assert look(900, load=True) == []
@@ -83,7 +82,7 @@ def test_a_load_that_is_still_on_when_the_calibration_ends_is_no_touch(thread):
 
 
 def test_a_touch_of_a_recording_tells_when_in_it(thread):
-    thread._look(PendingFrame(frame(900), None, 5.0, False, "mine.h5", 1.25))
+    thread._read(PendingFrame(frame(900), None, 5.0, False, "mine.h5", 1.25))
     (record,) = thread.touches.all()
     assert (record["recording"], record["at_s"]) == ("mine.h5", 1.25)
 

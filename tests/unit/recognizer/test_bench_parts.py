@@ -26,23 +26,21 @@ from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker, Subscriber
-from recognizer.bench.calibration_guide import page_guide
+from recognizer.bench.calibration import page_guide
 from recognizer.bench.errors import BenchError, BusyError, UnknownError
-from recognizer.bench.feed import ProbeFeed
+from recognizer.bench.feed import ProbeFeed, ReplayFeed
 from recognizer.bench.files import (
+    Uploads,
     checked_name,
     find_file,
+    folder_bytes,
     list_files,
     part_to_send,
 )
-from recognizer.bench.images import FILTERS, filter_image
-from recognizer.bench.message import FrameMessage, mosaic_message
-from recognizer.bench.read_trigger import ReadTrigger
-from recognizer.bench.replay import ReplayFeed
-from recognizer.bench.settings import TRIGGER, TouchLogSettings, UploadSettings
+from recognizer.bench.message import FILTERS, FrameMessage, filter_image, mosaic_message
+from recognizer.bench.reading import AGAIN_S, RESTLESS_S, ReadTrigger
 from recognizer.bench.simulated import parse_simulation
 from recognizer.bench.touch_log import TouchLog
-from recognizer.bench.uploads import Uploads, folder_bytes
 from recognizer.scan.mosaic.canvas import GlobalImage
 from recognizer.touch.lab import Lab
 from recognizer.touch.recognition import EDGE, NO_LOAD, Cause, refusal
@@ -160,8 +158,8 @@ def test_recordings_that_are_sent_in_have_a_quota_a_number_and_a_time(tmp_path, 
     kept = tmp_path / "kept"
     taken_in(Uploads(kept), "a.h5", content)
     assert folder_bytes(kept) == len(content)
-    room = UploadSettings(at_once=1, silent_s=0.05, quota=2 * len(content) - 1)
-    monkeypatch.setattr("recognizer.bench.uploads.UPLOAD", room)
+    for name, value in (("AT_ONCE", 1), ("SILENT_S", 0.05), ("QUOTA", 2 * len(content) - 1)):
+        monkeypatch.setattr(f"recognizer.bench.files.{name}", value)
     with pytest.raises(BenchError, match="GB already"):
         taken_in(Uploads(kept), "b.h5", content)
 
@@ -178,7 +176,7 @@ def test_recordings_that_are_sent_in_have_a_quota_a_number_and_a_time(tmp_path, 
             await uploads.take("d.h5", pieces(content))
         with pytest.raises(BenchError, match="nothing came"):
             await first
-        monkeypatch.setattr("recognizer.bench.uploads.UPLOAD", replace(room, quota=10**9))
+        monkeypatch.setattr("recognizer.bench.files.QUOTA", 10**9)
         return await uploads.take("d.h5", pieces(content))
 
     assert asyncio.run(two_at_once()) == 2
@@ -229,12 +227,12 @@ def test_restless_and_unanswered_touches_are_read_all_the_same():
     watch, now_s = ReadTrigger(), 0.0
     while watch.phase(rng.random((16, 16)), contact=True, now_s=now_s) != "read":
         now_s += 0.01
-    assert now_s == pytest.approx(TRIGGER.restless_s, abs=0.02)
+    assert now_s == pytest.approx(RESTLESS_S, abs=0.02)
     touch = rng.random((16, 16))
     watch.read(touch, answered=False, now_s=now_s)
     watch.phase(touch, contact=True, now_s=now_s)
-    assert watch.phase(touch, contact=True, now_s=now_s + 0.9 * TRIGGER.again_s) == "held"
-    assert watch.phase(touch, contact=True, now_s=now_s + 1.1 * TRIGGER.again_s) == "again"
+    assert watch.phase(touch, contact=True, now_s=now_s + 0.9 * AGAIN_S) == "held"
+    assert watch.phase(touch, contact=True, now_s=now_s + 1.1 * AGAIN_S) == "again"
 
 
 # -- the touches of a session
@@ -326,7 +324,7 @@ def test_pages_are_told_when_an_older_touch_changes():
 
 
 def test_the_oldest_touches_are_forgotten(monkeypatch):
-    monkeypatch.setattr("recognizer.bench.touch_log.TOUCHES", TouchLogSettings(kept=3))
+    monkeypatch.setattr("recognizer.bench.touch_log.KEPT", 3)
     log = TouchLog(Broker())
     for value in range(5):
         log.begin(frame_of(value), 1e3)

@@ -13,8 +13,7 @@ from generator.database.read import read_object
 from generator.database.transaction import read_transaction
 from generator.pipeline import encode
 from generator.spec import read_specs
-from recognizer.bench.face_mesh import drawn_faces, face_sheets, stand_poses, stands_json
-from recognizer.bench.picture import object_svg
+from recognizer.bench.lab_json import drawn_faces, face_sheets, object_svg, symbol_poses
 
 SHAPES = {"Cube": "{cube: 30 mm}", "Can": "{cylinder: {diameter: 40 mm, height: 30 mm}}"}
 
@@ -66,10 +65,7 @@ def test_sheets_close_a_surface_and_symbols_stand_on_it(held, name):
     for number in drawn_faces(held[name]):
         face = held[name].faces[number]
         centres = held[name].layout.faces[number].centres_mm
-        poses = stand_poses(face, centres)
-        assert np.allclose(
-            np.array(stands_json(face, centres)).reshape(-1, 3, 4), poses[:, :3], atol=1e-5
-        )
+        poses = symbol_poses(face, centres)
         normals = poses[:, :3, 2]
         assert np.allclose(np.linalg.norm(normals, axis=1), 1.0)
         for loops in face_sheets(face):

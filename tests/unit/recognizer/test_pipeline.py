@@ -30,9 +30,7 @@ from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import psi, template_of
 from recognizer.touch.verdict import MANY_INLIERS, is_encoded
 from recognizer.touch.verify import verify_hypotheses
-from recognizer.validation.draw import draw_touch
-from recognizer.validation.settings import DRAWING
-from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.draw import FOREIGN, INSIDE_MM, draw_touch
 from recognizer.validation.touch_plan import TouchPlan, sensor_of
 from recognizer.validation.trial import trial
 
@@ -160,7 +158,7 @@ def test_hard_touches_are_never_wrong(url, reader, kind):
     found = [trial(plan, number, reader) for number in range(10)]
     assert all(t.verdict != "wrong" for t in found)
     if kind == "edge":
-        assert all(t.edge_mm < DRAWING.inside_mm for t in found)
+        assert all(t.edge_mm < INSIDE_MM for t in found)
         assert any(t.verdict == "right" for t in found)
 
 

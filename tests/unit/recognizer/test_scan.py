@@ -24,7 +24,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
 from recognizer.touch.signal import signal_of
-from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.draw import FOREIGN
 
 SENSOR = SensorType()
 SPREAD = (0.4, 0.4, 0.004)

@@ -3,9 +3,14 @@
 import pytest
 
 from recognizer.validation.campaign import KIND_NAMES, kinds_of
+from recognizer.validation.encoded_set import (
+    EXTRA,
+    OTHER_LABS,
+    is_extra,
+    labs_of,
+    refuse_without_specs,
+)
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.made_kinds import EXTRA, is_extra, labs_of, refuse_without_specs
-from recognizer.validation.settings import MAKING
 
 
 def test_every_kind_can_be_named():
@@ -30,5 +35,5 @@ def test_nothing_is_registered_in_a_database_that_is_only_named():
 def test_other_labs_are_touched_by_their_kind_alone(tmp_path):
     assert labs_of(tmp_path, ["face", "copy"]) == ()
     labs = labs_of(tmp_path, ["same_profile"])
-    assert len(set(labs)) == MAKING.labs
+    assert len(set(labs)) == OTHER_LABS
     assert all(lab.startswith(str(tmp_path)) for lab in labs)

@@ -12,9 +12,8 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NextTouch
 from recognizer.validation.draw import draw_again, draw_touch
-from recognizer.validation.policy import NEXT, touch_until_answered
 from recognizer.validation.touch_plan import TouchPlan
-from recognizer.validation.trial import trial
+from recognizer.validation.trial import NEXT, touch_until_answered, trial
 
 PLAN = TouchPlan("", 5, "typical", "corner", policy=NEXT)
 

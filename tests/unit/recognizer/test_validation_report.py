@@ -10,21 +10,21 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from probe.contact.engines import ENGINES, engine_table
-from recognizer.validation.bounds import Interval, state_within
+from recognizer.validation.campaign import CampaignOptions, campaign_of
 from recognizer.validation.command import run
-from recognizer.validation.finished import FinishedRun
+from recognizer.validation.compare import FinishedRun, join_finished
 from recognizer.validation.flat_faces import FlatFace, draw_flat
-from recognizer.validation.join import join_finished
-from recognizer.validation.labels import boxes_overlap, label_points
-from recognizer.validation.precision import contact_study
-from recognizer.validation.precision_pictures import draw_work_precision
+from recognizer.validation.pictures import (
+    boxes_overlap,
+    draw_answers,
+    draw_errors,
+    draw_work_precision,
+    label_points,
+)
 from recognizer.validation.report import environment
-from recognizer.validation.results import FORMAT
-from recognizer.validation.savings import engine_lines
-from recognizer.validation.settings import STUDIES
-from recognizer.validation.statistics import share_of
-from recognizer.validation.world_pictures import draw_answers, draw_errors
-from recognizer.validation.worlds import surface_name
+from recognizer.validation.results import FORMAT, surface_name
+from recognizer.validation.statistics import Interval, share_of, state_within
+from recognizer.validation.studies import contact_study, engine_lines
 
 
 def figure_of(rows, columns, size):
@@ -132,7 +132,8 @@ def test_many_right_touches_are_thinned_and_no_refused_one():
 
 
 def test_a_study_has_two_hundred_touches_or_none():
-    assert [STUDIES.touches_of(touches) for touches in (4, 199, 200, 100_000)] == [0, 0, 200, 200]
+    chosen = [campaign_of(CampaignOptions(touches), None) for touches in (4, 199, 200, 100_000)]
+    assert [one.study for one in chosen] == [0, 0, 200, 200]
 
 
 @pytest.mark.parametrize(

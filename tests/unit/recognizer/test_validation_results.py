@@ -14,11 +14,7 @@ from recognizer.validation.campaign import Campaign, series_of
 from recognizer.validation.command import run
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.extremes import press_scenes
-from recognizer.validation.lines import line_of
-from recognizer.validation.result import ValidationResult, bound_from, result_from
-from recognizer.validation.results import results_of
-from recognizer.validation.rows import CpuTime
-from recognizer.validation.shards import (
+from recognizer.validation.files import (
     ADDED,
     columns_of,
     done_shards,
@@ -27,7 +23,9 @@ from recognizer.validation.shards import (
     shard_file,
     write_shard,
 )
-from recognizer.validation.worlds import world_times
+from recognizer.validation.result import ValidationResult, bound_from, result_from
+from recognizer.validation.results import line_of, results_of, world_times
+from recognizer.validation.trial import CpuTime
 
 NAN = float("nan")
 

@@ -1,29 +1,138 @@
-"""What a touch did not need, and what leaving it out saved; what the engines leave out.
+"""Error against run time, and what the reader leaves out.
 
-Each line says in plain words what one touch looks at, out of how much, and the CPU time of
-both. Counts go to the results, times to the times.
+Counts go to the results, CPU times to the times: `counted` holds the lines, `spent` their CPU
+times, ms, in order. Contact models and engines were measured against finer references by
+`tests/bench/contact_precision.py` and `contact_engines.py`; decoders read damaged windows of the
+set's own array; readers that spend more or less read the same touches.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from decoder import Decodings, Likelihood, decode_exact, decode_good_tuple
+from generator.array import FoldedArray
 from generator.database.open import open_database
 from generator.database.read import object_names, read_object
 from generator.database.transaction import read_transaction
 from probe.contact.engines import ENGINES, engine_named, engine_table
 from probe.contact.press import LEVELS, level_for, table
 from probe.contact.tips import Tips, tip_points
+from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
+from recognizer.validation.campaign import Campaign, series_of, settings_of
 from recognizer.validation.draw import draw_touch
-from recognizer.validation.precision import Study
-from recognizer.validation.settings import STUDIES
+from recognizer.validation.files import TIMES, columns_of, read_series
+from recognizer.validation.results import line_of
 from recognizer.validation.touch_plan import TouchPlan
+
+WINDOWS = 200  #: damaged ones for each decoder
+WRONG_SYMBOLS = 0.05  #: of these windows
+BEYOND = 2  #: rows and columns of a view beyond the window, so that errors show
+LARGEST_SERIAL = 1 << 13  #: places up to which the serial method ends in time
+OBJECTS = 20  #: read to know what reading all would take
+REPEATS = 5  #: of what is timed; the median counts
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(slots=True)
+class Study:
+    """Lines of a picture, and what each took."""
+
+    counted: list[dict[str, Any]] = field(default_factory=list)
+    spent: list[float] = field(default_factory=list)  #: ms CPU
+
+
+def contact_study() -> Study:
+    """Return error and time of every contact level and engine, as they were measured once."""
+    study = Study()
+    found = [
+        (f"{kind}, own engine", line.level, line.error, line.ms)
+        for kind, lines in table().items()
+        for line in lines
+    ]
+    found += [(f"tab, {each.engine}", each.level, each.error, each.ms) for each in engine_table()]
+    for series, level, error, ms in found:
+        study.counted.append({"series": series, "level": level, "error": error})
+        study.spent.append(ms)
+    return study
+
+
+def reader_study(folder: Path, campaign: Campaign) -> Study:
+    """Return what readers that spend more or less make of the same touches."""
+    study = Study()
+    for series in series_of(campaign)[1:]:
+        rows = columns_of(read_series(folder, series))
+        line = {"reader": series.reader, "settings": settings_of(series.reader)}
+        study.counted.append(line | line_of(rows, np.ones(len(rows["number"]), bool)))
+        spent = columns_of(read_series(folder, series, TIMES))["reading"]
+        study.spent.append(round(1e3 * float(np.mean(spent)), 3))
+    return study
+
+
+def decoder_study(encoding: EmbossedArray, seed: int) -> Study:
+    """Return what decoders make of damaged windows at registered places of an array."""
+    study, array = Study(), encoding.array
+    shape = (array.window[0] + BEYOND, array.window[1] + BEYOND)
+    rng = np.random.default_rng([seed, 2])
+    keys = encoding.keys[rng.integers(len(encoding.keys), size=WINDOWS)]
+    rows, columns = (part.astype(np.int64) for part in np.divmod(keys, np.uint64(array.columns)))
+    down, along = np.indices(shape)
+    windows = array.symbols(
+        (rows[:, None, None] + down) % array.rows,
+        (columns[:, None, None] + along) % array.columns,
+    )
+    other = (windows + rng.integers(1, array.order, windows.shape)) % array.order
+    windows = np.where(rng.random(windows.shape) < WRONG_SYMBOLS, other, windows)
+    for name, decode in _decoders(encoding):
+        decode(windows[:2])
+        start = time.process_time()
+        found = decode(windows)
+        study.spent.append(round(1e3 * (time.process_time() - start) / WINDOWS, 5))
+        right = (found.rows == rows.astype(np.uint64)) & (
+            found.columns == columns.astype(np.uint64)
+        )
+        study.counted.append(
+            {
+                "decoder": name,
+                "view": list(shape),
+                "wrong_symbols": WRONG_SYMBOLS,
+                "windows": WINDOWS,
+                "right": int((found.answered & right).sum()),
+                "wrong": int((found.answered & ~right).sum()),
+                "rejected": int((~found.answered).sum()),
+            }
+        )
+    return study
+
+
+def _decoders(encoding: EmbossedArray) -> Iterator[tuple[str, Callable[[Ints], Decodings]]]:
+    array = encoding.array
+    places = array.rows * array.columns
+    methods = ["logarithm"]
+    if places <= LARGEST_SERIAL:
+        methods = ["table", "serial", "milestones", *methods]
+    for method in methods:
+        yield method, _exact(array, method)
+    if isinstance(array, FoldedArray):
+        yield "good tuple", lambda windows: decode_good_tuple(array, windows)
+    yield "likelihood", Likelihood(array).decode
+    at = np.divmod(encoding.keys, np.uint64(array.columns))
+    prior = np.stack([part.astype(np.int64) for part in at], axis=1)
+    yield "likelihood, registered cells", Likelihood(array, prior=prior).decode
+
+
+def _exact(array: Any, method: str) -> Callable[[Ints], Decodings]:
+    return lambda windows: decode_exact(array, windows, method)
 
 
 def find_savings(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
@@ -56,9 +165,7 @@ def _objects(study: Study, reader: Reader) -> None:
     """Objects read from the database: that whose cells were met."""
     with read_transaction(open_database(reader.lab.url, writable=False)) as connection:
         names = object_names(connection)
-        spent = [
-            _cpu_ms(partial(read_object, connection, name), 1) for name in names[: STUDIES.objects]
-        ]
+        spent = [_cpu_ms(partial(read_object, connection, name), 1) for name in names[:OBJECTS]]
     one = float(np.median(spent))
     _add(study, "Objects loaded from the database: only the one that is touched", 1, len(names),
          "objects", one, one * len(names))  # fmt: skip
@@ -147,7 +254,7 @@ def _three_digits(ms: float | None) -> Any:
     return None if ms is None else float(f"{ms:.3g}")
 
 
-def _cpu_ms(work: Callable[[], object], repeats: int = STUDIES.repeats) -> float:
+def _cpu_ms(work: Callable[[], object], repeats: int = REPEATS) -> float:
     """Return the median CPU time of something, ms."""
     times = []
     for _ in range(repeats):
