@@ -7,7 +7,6 @@ Each loop has a form in numpy, its reference, in `tests/reference`; tests hold b
 from __future__ import annotations
 
 import ctypes
-import os
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -62,22 +61,6 @@ def load_library(folder: Path, signatures: Signatures, file: Path | None = None)
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
     return library
-
-
-CHOICE = "ENCODED_OBJECTS_KERNELS"  #: variable; goes when nobody calls the two functions below
-
-
-def is_wanted() -> bool:
-    """Return whether compiled loops may be used."""
-    return os.environ.get(CHOICE) != "numpy"
-
-
-def library_made_of(sources: Sequence[Path], file: Path) -> ctypes.CDLL | None:
-    """Return a library; None where there is none, or one of another text."""
-    if not file.is_file():
-        return None
-    library = ctypes.CDLL(str(file))
-    return library if _is_made_of(library, sources) else None
 
 
 def _is_made_of(library: ctypes.CDLL, sources: Sequence[Path]) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,23 +12,20 @@ from numpy.typing import NDArray
 from probe.calibration import Calibration
 from recognizer.as_built.estimate import MeasuredPrint
 from recognizer.errors import AsBuiltError
-from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
-from recognizer.touch.contacts import TouchImage
+from recognizer.touch.evidence import VerifiedHypothesis
 from recognizer.touch.lab import EncodedFace
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise_with_hypothesis
-from recognizer.touch.settings import DEFAULTS, ReaderSettings
+from recognizer.touch.recognise import read_touch
+from recognizer.touch.source import TouchImage
 from recognizer.touch.symbols.stretch import fit_stretch
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def settings_for_prints() -> ReaderSettings:
-    """Return settings of a reader that accepts prints farther off than usual."""
-    refine = DEFAULTS.refine
-    prior = (*refine.prior[:6], 0.04)
-    return replace(DEFAULTS, refine=replace(refine, prior=prior, limits=(*refine.limits[:3], 0.12)))
+#: Of a reader of prints that are farther off than usual.
+WIDE_SCALE = ReaderOptions(scale_sd=0.04, scale_most=0.12)
 
 
 def measure_prints(
@@ -44,7 +40,7 @@ def measure_prints(
     Parameters
     ----------
     reader
-        With settings of `settings_for_prints`, which read prints far off, too.
+        With the options `WIDE_SCALE`, so that a print far off is read too.
     place
         Of the touches, for messages.
 
@@ -58,7 +54,8 @@ def measure_prints(
     reasons: Counter[str] = Counter()
     for touch in touches:
         signal = reader.signal(touch.counts, calibration=calibration)
-        answer, verified = recognise_with_hypothesis(reader, signal, touch.seq)
+        reading = read_touch(reader, signal, touch.seq)
+        answer, verified = reading.answer, reading.best
         if not answer or verified is None:
             reasons[answer.reason] += 1
             continue
@@ -92,13 +89,8 @@ def measure_prints(
 def _fit_print(
     verified: VerifiedHypothesis, face: EncodedFace, T_part_face: Array, seq: int
 ) -> MeasuredPrint:
-    fit, embossed, place = verified.fit, verified.embossed, verified.hypothesis
-    worn = fit.cells[weigh_cells(embossed, fit, place, verified.image.settings.belief).worn]
-
-    def shown(cells: Ints) -> Ints:
-        return unworn_labels_at(embossed, place, worn, cells)
-
-    lattice = fit_stretch(verified.image, verified.template, fit.pose, fit.gain, shown)
+    fit = verified.fit
+    lattice = fit_stretch(verified.image, fit.pose, fit.gain, verified.labels_at)
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
     # the lattice's axes are the face's, turned by `rotation_rad`
     by = np.eye(4)
@@ -114,6 +106,6 @@ def _fit_print(
         part=face.part,
         axes=T_part_face[:2, :2],
         strain=by[:3, :3] @ lattice.strain,
-        stroke_mm=embossed.style.stroke_mm + lattice.wider_mm,
+        stroke_mm=verified.embossed.style.stroke_mm + lattice.wider_mm,
         covariance=by @ lattice.covariance @ by.T,
     )

@@ -19,7 +19,7 @@ from probe.calibration import read_calibration
 from probe.circuit import Electronics
 from probe.recording.files import next_free
 from recognizer.as_built.estimate import ENOUGH_TOUCHES, estimate_parts, keep_prints
-from recognizer.as_built.touches import measure_prints, settings_for_prints
+from recognizer.as_built.touches import WIDE_SCALE, measure_prints
 from recognizer.as_built.verdict import as_built_entry, as_built_sizes
 from recognizer.bench.calibration import PageGuide, page_guide
 from recognizer.bench.errors import BenchError, BusyError
@@ -35,8 +35,8 @@ from recognizer.sensor.wiring import (
     simplify_turns,
     wiring_named,
 )
-from recognizer.touch.contacts import TouchImage
 from recognizer.touch.reader import Reader
+from recognizer.touch.source import TouchImage
 
 if TYPE_CHECKING:
     from recognizer.bench.session import Session
@@ -271,7 +271,7 @@ class PrintController:
         """
         session = self._session
         known = _reader(session)
-        reader = Reader(known.lab, known.sensor, settings_for_prints(), state=known.state)
+        reader = Reader(known.lab, known.sensor, WIDE_SCALE, state=known.state)
         touches = [
             TouchImage(frame.seq, frame.t_ns, 1, frame.counts.astype(float),
                        frame.wrist.astype(float), frame.pose)

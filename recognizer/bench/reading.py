@@ -1,7 +1,7 @@
 """Frames -> answers, mosaics and one belief of a scan, in a thread of its own.
 
 The newest frame wins. It is read as soon as the touch is steady, and again when it has changed:
-the page wants an answer at once, so one steady frame is enough (`recognizer.touch.contacts`
+the page wants an answer at once, so one steady frame is enough (`recognizer.touch.source`
 averages many). A touch that was not answered is read again, and one that never comes to rest is
 read after a while. Its answer is published at once; then the first answered frame of a touch goes
 into the mosaic of its face, the first one read into the scan. Loads of a calibration are no

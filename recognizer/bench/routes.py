@@ -38,7 +38,7 @@ from recognizer.bench.message import FILTERS
 from recognizer.bench.session import Session
 from recognizer.bench.simulated import TOUCH
 from recognizer.bench.touch_log import NAME_LENGTH
-from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.options import DEFAULTS
 
 Ports = tuple[tuple[str, str], ...]
 
@@ -192,7 +192,7 @@ def _add_session_routes(routes: APIRouter, session: Session, ports: Ports) -> No
                 "overlay_mm": sensor.overlay.height_mm,
                 "force_n": usual_force_n(sensor),
             },
-            "margin": (reader.settings if reader else DEFAULTS).belief.margin,
+            "margin": (reader.options if reader else DEFAULTS).margin,
         }
 
     @routes.post("/port")

@@ -13,9 +13,9 @@ from recognizer.touch.recognition import NO_CONTACT
 if TYPE_CHECKING:
     from probe.frame import Frame
     from recognizer.thesis.line import Edge
-    from recognizer.touch.contacts import TouchImage
     from recognizer.touch.recognition import Recognition
     from recognizer.touch.robot import ObjectPose
+    from recognizer.touch.source import TouchImage
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -180,9 +180,10 @@ class RecognizeOptions(Options):
 
 
 def _kernels() -> dict[str, str]:
-    from recognizer.touch.symbols.kernels import kernels_in_use
+    from recognizer.touch.symbols.kernels import kernels
 
-    return {"kernels": kernels_in_use()}
+    kernels()
+    return {"kernels": "compiled"}
 
 
 @command(app, help=HELP, epilog=EPILOG, version_of=NAME, parts=_kernels)

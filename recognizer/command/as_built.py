@@ -13,7 +13,7 @@ from recognizer.command.options import Calibration, Database
 if TYPE_CHECKING:
     from encoded_objects.base.output import ProgressBar
     from recognizer.as_built.estimate import MeasuredPrint
-    from recognizer.touch.contacts import TouchImage
+    from recognizer.touch.source import TouchImage
 
 HELP = """Say how a part came out of the printer: its scale both ways, skew, and stroke width.
 
@@ -88,7 +88,7 @@ def _touched_prints(
     """Return what each touch of a recording says of the print."""
     from encoded_objects.base.output import progress_bar, warning
     from probe.recording.read import Recording
-    from recognizer.as_built.touches import measure_prints, settings_for_prints
+    from recognizer.as_built.touches import WIDE_SCALE, measure_prints
     from recognizer.touch.lab import open_lab
     from recognizer.touch.reader import Reader
     from recognizer.touch.source import source_of
@@ -98,9 +98,9 @@ def _touched_prints(
     source = source_of(opened, sensor_type, overlay=overlay, calibration=calibration)
     if source.notice:
         warning(source.notice)
-    reader = Reader(lab, source.sensor, settings_for_prints())
+    reader = Reader(lab, source.sensor, WIDE_SCALE)
     with progress_bar("reading", source.frames) as bar:
-        touches = _counted(source.touches(opened.frames(), reader.settings), bar)
+        touches = _counted(source.touches(opened.frames(), reader.options), bar)
         return measure_prints(reader, touches, calibration=source.calibration, place=str(recording))
 
 

@@ -12,9 +12,8 @@ from encoded_objects.base.options import Argument, Json, Option, command
 from recognizer.command.options import Database
 
 if TYPE_CHECKING:
-    from recognizer.touch.contacts import TouchImage
     from recognizer.touch.reader import Reader
-    from recognizer.touch.source import TouchSource
+    from recognizer.touch.source import TouchImage, TouchSource
 
 HELP = """Say how the sensor is mounted: as drawn, turned by quarters, mirrored.
 

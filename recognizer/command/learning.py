@@ -12,9 +12,8 @@ from pathlib import Path
 
 from encoded_objects.base.output import message, progress_bar
 from recognizer.errors import SensorStateError
-from recognizer.touch.contacts import TouchImage
 from recognizer.touch.reader import Reader
-from recognizer.touch.source import TouchSource
+from recognizer.touch.source import TouchImage, TouchSource
 
 EVERY = 25  #: touches of a port after which the sensor is learned again
 MOST = 200  #: touches of a recording that are learned from

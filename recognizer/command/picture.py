@@ -28,10 +28,10 @@ from generator.database.transaction import read_transaction
 from probe.plot.canvas import HEAT, in_mm, page
 from probe.plot.touch import MARK
 from probe.surface.body import triangulate
-from recognizer.touch.hypothesis import Hypothesis, labels_at
+from recognizer.touch.hypothesis import Hypothesis, labels_of
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise_with_hypothesis
+from recognizer.touch.recognise import read_touch
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.signal import Signal
 
@@ -113,11 +113,11 @@ def touch_picture(
 
 def winning_lattice(reader: Reader, signal: Signal) -> WinningLattice | None:
     """Return the best reading of a touch; None where no symbol is seen."""
-    _, best = recognise_with_hypothesis(reader, signal)
+    best = read_touch(reader, signal).best
     if best is None:
         return None
     encoding, place, fit = best.embossed, best.hypothesis, best.fit
-    shown = labels_at(encoding, place, fit.cells)
+    shown = labels_of(encoding, place, fit.cells)
     return WinningLattice(
         encoding=encoding,
         place=place,

@@ -40,12 +40,11 @@ from recognizer.command.scanning import (
     refuse_single,
     touches_for,
 )
-from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, Recognition
 from recognizer.touch.robot import ObjectPose
-from recognizer.touch.source import TouchSource, source_of
+from recognizer.touch.source import TouchImage, TouchSource, source_of
 
 TRIED = 6  #: refused touches, none answered, after which the wiring is checked
 
@@ -83,7 +82,7 @@ def recognize_touches(options: RecognizeOptions) -> int:
         learning = learning_for(reader, source, options.learn, options.state)
         if options.recording is not None:
             frames = _rewired(options.flip, source, recording.frames())
-            learning.learn_from(source.touches(frames, learning.reader.settings))
+            learning.learn_from(source.touches(frames, learning.reader.options))
             frames = recording.frames()
         else:
             frames = stack.enter_context(
@@ -178,7 +177,7 @@ def _answers(
     if options.port and not options.follow and most is None and belief is None:
         most = 1
     by_touch = read_joints(options.joints_file) if options.joints_file else ()
-    touches = source.touches(_until(interrupted, frames), reader.settings)
+    touches = source.touches(_until(interrupted, frames), reader.options)
     if belief is not None and options.recording is not None:
         touches = refuse_single(touches, source.place, touches_for(reader))
     warned = ""

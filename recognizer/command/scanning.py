@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from recognizer.thesis.line import Edge
-    from recognizer.touch.contacts import TouchImage
     from recognizer.touch.lab import EmbossedArray
     from recognizer.touch.reader import Reader
     from recognizer.touch.recognition import Recognition
     from recognizer.touch.signal import Signal
+    from recognizer.touch.source import TouchImage
 
 Joints = tuple[tuple[float, ...], ...]
 

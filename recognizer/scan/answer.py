@@ -18,30 +18,26 @@ from numpy.typing import NDArray
 from recognizer.scan.lattice import LatticeEvidence
 from recognizer.scan.path import RegisteredPath
 from recognizer.touch import verdict
-from recognizer.touch.belief import null_log_likelihood, unworn_labels_at, weigh_cells
 from recognizer.touch.chance import expected_matches
-from recognizer.touch.hypothesis import Hypothesis, coincide, log_likelihood, under_centre
+from recognizer.touch.evidence import null_log_likelihood, unworn_labels_at, weigh_cells
+from recognizer.touch.hypothesis import (
+    Hypothesis,
+    coincide,
+    find_hypotheses,
+    find_rivals,
+    log_likelihood,
+    under_centre,
+)
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import find_hypotheses, find_rivals
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at
-from recognizer.touch.recognition import (
-    TOO_FEW,
-    Recognition,
-    RunnerUp,
-    refusal,
-)
-from recognizer.touch.round import bend_at
-from recognizer.touch.settings import HypothesisSettings
-from recognizer.touch.symbols.explained import explained_share
-from recognizer.touch.symbols.fit import Fit, score_cells
-from recognizer.touch.symbols.gain import Image, bend_image
-from recognizer.touch.symbols.posterior import refit_pose
-from recognizer.touch.symbols.refine import refine_lattices
-from recognizer.touch.symbols.template import ResponseTemplate
+from recognizer.touch.recognition import TOO_FEW, Recognition, RunnerUp, refusal
+from recognizer.touch.symbols.fit import Fit, refine_lattices, score_cells
+from recognizer.touch.symbols.image import Image, bend_image
+from recognizer.touch.symbols.posterior import explained_share, refit_pose
+from recognizer.touch.verify import SHARES, bend_at
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LOCATED = 3  #: lattices that are looked up
 STRONGEST = 16  #: cells by which places are listed
@@ -88,10 +84,8 @@ def locate_evidence(
     embossed: EmbossedArray,
     found: Sequence[LatticeEvidence],
     path: RegisteredPath | None,
-    settings: HypothesisSettings,
 ) -> list[ScanHypothesis]:
     """Return the likeliest places of the evidence of one array, best evidence first."""
-    settings = replace(settings, kept=PLACES)
     places: list[ScanHypothesis] = []
     for evidence in found[:LOCATED]:
         fit = evidence.fit
@@ -100,12 +94,12 @@ def locate_evidence(
         listed = replace(
             fit, cells=fit.cells[strongest], scores=fit.scores[strongest], seen=fit.seen[strongest]
         )
-        ones = find_hypotheses(embossed, (listed,), settings)
+        ones = find_hypotheses(embossed, (listed,), PLACES)
         if ones:  # all cells may point to places that the strongest do not
-            best = max(ones, key=lambda one: log_likelihood(embossed, fit, one, settings))
-            ones += find_rivals(embossed, fit, best, 0, settings)
+            best = max(ones, key=lambda one: log_likelihood(embossed, fit, one))
+            ones += find_rivals(embossed, fit, best, 0, PLACES)
         for one in ones:
-            score = log_likelihood(embossed, fit, one, settings)
+            score = log_likelihood(embossed, fit, one)
             hypothesis = replace(one, score=score)
             places.append(ScanHypothesis(embossed, evidence, hypothesis, fit, score, path=path))
     return places
@@ -120,31 +114,26 @@ def distinct_places(found: Sequence[ScanHypothesis]) -> list[ScanHypothesis]:
     return [item for n, item in enumerate(ranked) if n == 0 or not ranked[0].same(item)]
 
 
-def refine_last_pose(
-    reader: Reader, image: Image, template: ResponseTemplate, found: ScanHypothesis
-) -> ScanHypothesis:
+def refine_last_pose(reader: Reader, image: Image, found: ScanHypothesis) -> ScanHypothesis:
     """Return a place with its last touch fitted to the symbols of the database."""
     embossed, hypothesis, fit = found.embossed, found.hypothesis, found.fit
-    worn = fit.cells[weigh_cells(embossed, fit, hypothesis, reader.settings.belief).worn]
-
-    def labels(cells: Ints) -> Ints:
-        return unworn_labels_at(embossed, hypothesis, worn, cells)
-
+    worn = fit.cells[weigh_cells(embossed, fit, hypothesis).worn]
+    labels = unworn_labels_at(embossed, hypothesis, worn)
     bend = bend_at(embossed, hypothesis, fit)
-    shares = (1.0,) if bend is None else reader.settings.round.shares
+    shares = (1.0,) if bend is None else SHARES
     if bend is not None:
         image = bend_image(image, reader.sensor, bend, shares)
     pose, gain = (np.tile(each, (len(shares), 1)) for each in (fit.pose, fit.gain))
-    lattices = refine_lattices(image, template, pose, gain, steps=STEPS, shown=labels)
+    lattices = refine_lattices(image, pose, gain, steps=STEPS, labels_at=labels)
     best = int(np.argmax(lattices.value))
-    again = score_cells(image, template, lattices)[best]
+    again = score_cells(image, lattices)[best]
     if bend is not None:
         image = bend_image(image, reader.sensor, bend, shares[best : best + 1])
     finer = replace(
         again, cells=fit.cells, scores=fit.scores, seen=fit.seen, value=fit.value, with_scale=None
     )
-    share = explained_share(image, template, finer.pose, finer.gain, labels)
-    return replace(found, fit=refit_pose(image, template, finer, labels), explained=share)
+    share = explained_share(image, finer.pose, finer.gain, labels)
+    return replace(found, fit=refit_pose(image, finer, labels), explained=share)
 
 
 def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Recognition:
@@ -164,17 +153,16 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
         margin = min(margin, path.margin)
     by_hand = path is not None and best.evidence.agreement.touches > 1
     reason = verdict.reject_reason(
-        _verdict_evidence(reader, best), margin, reader.settings.belief,
+        _verdict_evidence(best), margin, reader.options,
         least_ratio=RATIO_BY_HAND if by_hand else verdict.RATIO, wrong_share=WRONG,
     )  # fmt: skip
     answer = answer_at(
-        best.embossed, best.fit, best.hypothesis, reader.settings, seq,
+        best.embossed, best.fit, best.hypothesis, reader.options, seq,
         reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
     if not answer:
         return answer
-    arrays, settings = reader.lab.arrays, reader.settings
-    doubt = expected_matches(arrays, best.embossed, best.fit, best.hypothesis, settings)
+    doubt = expected_matches(reader.lab.arrays, best.embossed, best.fit, best.hypothesis)
     if path is not None:
         doubt *= math.exp(path.ambiguity)
     if reason := verdict.reject_chance(doubt, DOUBT):
@@ -182,10 +170,10 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
     return replace(answer, doubt=doubt)
 
 
-def _verdict_evidence(reader: Reader, best: ScanHypothesis) -> verdict.Evidence:
+def _verdict_evidence(best: ScanHypothesis) -> verdict.Evidence:
     """Return the evidence of all touches for a place."""
     fit, agreement = best.fit, best.evidence.agreement
-    cells = weigh_cells(best.embossed, fit, best.hypothesis, reader.settings.belief)
+    cells = weigh_cells(best.embossed, fit, best.hypothesis)
     chance = null_log_likelihood(best.embossed, fit)
     return verdict.Evidence(
         log_likelihood_ratio=best.score - chance,

@@ -48,11 +48,10 @@ from recognizer.scan.views import (
     round_views,
     stack_views,
 )
-from recognizer.touch.belief import VerifiedHypothesis
-from recognizer.touch.felt_area import EarlierTouch
-from recognizer.touch.next_touch import PlaceHypothesis, propose_next
+from recognizer.touch.evidence import VerifiedHypothesis
+from recognizer.touch.next_touch import EarlierTouch, PlaceHypothesis, propose_next
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise_with_rivals
+from recognizer.touch.recognise import read_touch
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     NO_CONTACT,
@@ -61,7 +60,7 @@ from recognizer.touch.recognition import (
     Recognition,
     refusal,
 )
-from recognizer.touch.symbols.gain import Image, image_of_signal
+from recognizer.touch.symbols.image import Image
 from recognizer.touch.verdict import least_explained
 
 Array = NDArray[np.float64]
@@ -262,14 +261,14 @@ def _join_touch(
         pitch, stacked = embossed.style.pitch_mm, stack_views(views[k])
         path, poses = None, touch_poses
         if poses is None:
-            path = follow_path(embossed, views[k], steps, reader.settings.hypotheses)
+            path = follow_path(embossed, views[k], steps)
             poses = path.touch_poses(steps[0].covariance)
             evidence = _evidence_along(stacked, poses, pitch)
         else:
             evidence = _evidence_of(stacked, poses, scan.lattices[k], pitch)
         poses_by_array.append(poses)
         lattices.append(tuple(item.agreement.lattice for item in evidence))
-        found += locate_evidence(embossed, evidence, path, reader.settings.hypotheses)
+        found += locate_evidence(embossed, evidence, path)
     found = distinct_places(found)
     answer, agrees, best_k = refusal(seq, TOO_FEW), False, 0
     if found:
@@ -279,7 +278,7 @@ def _join_touch(
         answer = answer_scan(reader, found, seq)
         agrees = bool(found[0].evidence.agreement.chosen[-1] >= 0)
         if answer:
-            found[0], agrees = _pose_last_touch(reader, best_k, images[best_k], found[0], poses)
+            found[0], agrees = _pose_last_touch(reader, images[best_k], found[0], poses)
             answer = answer_scan(reader, found, seq)
     return _JoinedTouch(views, alone, rivals, poses, tuple(lattices), found, answer, agrees)
 
@@ -292,24 +291,22 @@ def _view_touch(
     The answer is None where the touch matches its prediction.
     """
     reader = scan.reader
-    images = [
-        image_of_signal(reader.sensor, touch.signal, each.style.height_mm, reader.settings)
-        for each in reader.lab.arrays
-    ]
+    images = [reader.image(touch.signal, each) for each in reader.prepared]
     near = [_predicted_poses(each[:PREDICTING], touch_poses) for each in scan.lattices]
     new: list[tuple[LatticeView, ...]] = [() for _ in images]
     if use_prediction and scan.recognition and scan.outlier_run == 0:
-        for k, (_, template, _) in enumerate(reader.prepared):
-            new[k] = predicted_view(images[k], template, reader.settings.first, near[k])
+        for k, image in enumerate(images):
+            new[k] = predicted_view(image, reader.options.first, near[k])
     alone: Recognition | None = None
     rivals: list[VerifiedHypothesis] = []
     if not any(new):
-        alone, rivals = recognise_with_rivals(reader, touch.signal, touch.seq)
-        for k, (embossed, template, bank) in enumerate(reader.prepared):
+        reading = read_touch(reader, touch.signal, touch.seq)
+        alone, rivals = reading.answer, reading.found
+        for k, (embossed, _, bank) in enumerate(reader.prepared):
             own = [one.fit for one in rivals if one.embossed is embossed and one.bend is None]
-            new[k] = flat_views(images[k], template, bank, reader.settings.first, near[k], own)
+            new[k] = flat_views(images[k], bank, reader.options.first, near[k], own)
             if embossed.radii_mm:
-                new[k] += round_views(images[k], template, bank, reader, embossed, near[k])
+                new[k] += round_views(images[k], bank, reader, embossed, near[k])
     views = tuple(
         (*before, tuple(view for view in each if view.fit.noise <= MOST_NOISE))
         for before, each in zip(scan.views, new, strict=True)
@@ -318,11 +315,11 @@ def _view_touch(
 
 
 def _pose_last_touch(
-    reader: Reader, k: int, image: Image, best: ScanHypothesis, touch_poses: TouchPoses
+    reader: Reader, image: Image, best: ScanHypothesis, touch_poses: TouchPoses
 ) -> tuple[ScanHypothesis, bool]:
     """Return a place with the pose of the last touch, and whether that touch agrees with it."""
     if best.evidence.agreement.chosen[-1] >= 0:
-        finer = refine_last_pose(reader, image, reader.prepared[k][1], best)
+        finer = refine_last_pose(reader, image, best)
         least = least_explained(len(best.fit.cells))
         if finer.explained >= least and is_definite(finer.fit.covariance):
             return finer, True

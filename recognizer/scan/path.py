@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -33,10 +33,8 @@ from recognizer.scan.mosaic.planar import (
     wrap_angle,
 )
 from recognizer.scan.views import LatticeView, ScanSettings, TouchPoses
-from recognizer.touch.hypothesis import Hypothesis
+from recognizer.touch.hypothesis import Hypothesis, find_hypotheses
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import find_hypotheses
-from recognizer.touch.settings import HypothesisSettings
 from recognizer.touch.symbols.fit import Fit
 
 Array = NDArray[np.float64]
@@ -67,7 +65,6 @@ def follow_path(
     embossed: EmbossedArray,
     views: Sequence[Sequence[LatticeView]],
     steps: Sequence[PlanarBelief],
-    settings: HypothesisSettings,
 ) -> RegisteredPath:
     """Return the likeliest path; without placed touches where no touch has a place.
 
@@ -78,7 +75,7 @@ def follow_path(
     steps
         To each touch from the one before, by `known_steps`.
     """
-    places = [_places_of_touch(embossed, each, settings) for each in views]
+    places = [_places_of_touch(embossed, each) for each in views]
     trellis = _Trellis([], [])
     for t in range(len(places)):
         _reach_touch(embossed, places, steps, t, trellis)
@@ -217,11 +214,9 @@ def _reach_touch(
     trellis.previous.append(previous)
 
 
-def _places_of_touch(
-    embossed: EmbossedArray, views: Sequence[LatticeView], settings: HypothesisSettings
-) -> _TouchPlaces:
+def _places_of_touch(embossed: EmbossedArray, views: Sequence[LatticeView]) -> _TouchPlaces:
     fits = tuple(view.fit for view in views if not view.predicted)
-    found = find_hypotheses(embossed, fits, replace(settings, kept=MOST_PLACES))[:MOST_PLACES]
+    found = find_hypotheses(embossed, fits, MOST_PLACES)[:MOST_PLACES]
     most = max((fit.value for fit in fits), default=0.0)
     poses = [_pose_in_array(embossed, fits[one.fit], one) for one in found]
     return _TouchPlaces(

@@ -33,13 +33,13 @@ from recognizer.scan.mosaic.planar import (
     planar_pose,
 )
 from recognizer.scan.views import ScanSettings
-from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import Lab
 from recognizer.touch.pose import face_pose, pose_on_object
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, Recognition, RunnerUp
 from recognizer.touch.signal import Signal
+from recognizer.touch.source import TouchImage
 
 Array = NDArray[np.float64]
 
@@ -139,7 +139,7 @@ class Scan:
         ----------
         touch
             Of one object: counts (rows, columns), a signal, or a touch of
-            `recognizer.touch.contacts`. Without poses, touches of a face should lie within 8 mm
+            `recognizer.touch.source`. Without poses, touches of a face should lie within 8 mm
             or so of the one before (`ScanSettings.by_hand`).
         pose
             (4, 4) T_base_sensor, mm, in any fixed frame; with the arm's own covariance if it
@@ -285,14 +285,14 @@ def join_faces(last: _Face, others: Sequence[_Face]) -> Recognition:
     joined.sort(key=lambda item: -item[0])
     (score, best), rest = joined[0], joined[1:]
     margin = math.inf if not rest else score - rest[0][0]
-    settings = belief.reader.settings
+    options = belief.reader.options
     one = _hypothesis_at(best, 0.0, last.T_base_probe)
     contradicted = all(_nats_against(one, each) >= CHANGED_NATS for each in by_face)
-    if margin < settings.belief.margin or contradicted:
+    if margin < options.margin or contradicted:
         return answer
     runner_up = RunnerUp(*rest[0][1].face, rest[0][1].index) if rest else None
     found = answer_at(
-        best.embossed, best.fit, best.hypothesis, settings, answer.seq,
+        best.embossed, best.fit, best.hypothesis, options, answer.seq,
         reason="", margin=margin, runner_up=runner_up,
     )  # fmt: skip
     return replace(found, next=None) if found else answer

@@ -17,14 +17,19 @@ from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
 from recognizer.scan.mosaic.planar import PlacedTouch, pose_difference
 from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.options import Effort
 from recognizer.touch.reader import Reader
-from recognizer.touch.settings import FitSettings
-from recognizer.touch.symbols.bends import guess_bends
-from recognizer.touch.symbols.fit import Fit, fit_lattices, score_cells
-from recognizer.touch.symbols.gain import Image, bend_image, first_gain
-from recognizer.touch.symbols.refine import refine_lattices
+from recognizer.touch.symbols.curvature import guess_bends
+from recognizer.touch.symbols.fit import (
+    Fit,
+    fit_lattices,
+    refine_lattices,
+    score_cells,
+    search_image,
+)
+from recognizer.touch.symbols.image import Image, bend_image, first_gain
 from recognizer.touch.symbols.search import Bank
-from recognizer.touch.symbols.template import ResponseTemplate
+from recognizer.touch.verify import BENDS
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -120,19 +125,16 @@ def position_sd_mm(covariance: Array) -> float:
     return math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
 
 
-def predicted_view(
-    image: Image, template: ResponseTemplate, settings: FitSettings, near: Array
-) -> tuple[LatticeView, ...]:
+def predicted_view(image: Image, effort: Effort, near: Array) -> tuple[LatticeView, ...]:
     """Return the lattice at the first predicted pose (k, 3), if it explains the image alone."""
-    found = _refine_near(image, template, settings, near[:1], ())
+    found = _refine_near(image, effort, near[:1], ())
     return tuple(LatticeView(fit, predicted=True) for fit in found[:1] if fit.noise <= CLEAN_NOISE)
 
 
 def flat_views(
     image: Image,
-    template: ResponseTemplate,
     bank: Bank,
-    settings: FitSettings,
+    effort: Effort,
     near: Array,
     alone: Sequence[Fit],
 ) -> tuple[LatticeView, ...]:
@@ -150,19 +152,18 @@ def flat_views(
     """
     found: list[Fit] = []
     for fit in alone:
-        if not any(_same_as_fit(fit.pose[:3], other, template.pitch_mm) for other in found):
+        if not any(_same_as_fit(fit.pose[:3], other, image.template.pitch_mm) for other in found):
             found.append(fit)
-    fits = tuple(found[:MOST_VIEWS]) or fit_lattices(image, template, bank, settings)
+    fits = tuple(found[:MOST_VIEWS]) or fit_lattices(image, bank, effort)
     views = tuple(LatticeView(fit, predicted=False) for fit in fits)
-    for fit in _refine_near(image, template, settings, near, fits):
-        if not any(_same_as_fit(fit.pose[:3], view.fit, template.pitch_mm) for view in views):
+    for fit in _refine_near(image, effort, near, fits):
+        if not any(_same_as_fit(fit.pose[:3], view.fit, image.template.pitch_mm) for view in views):
             views = (*views, LatticeView(fit, predicted=True))
     return views
 
 
 def round_views(
     image: Image,
-    template: ResponseTemplate,
     bank: Bank,
     reader: Reader,
     embossed: EmbossedArray,
@@ -177,15 +178,12 @@ def round_views(
     near
         (k, 3) as for `flat_views`.
     """
-    settings = reader.settings
-    views: list[LatticeView] = []
-    for guess in guess_bends(
-        image, reader.sensor, embossed.radii_mm, template.ink, settings.round.bends
-    ):
+    effort, views = reader.options.first, list[LatticeView]()
+    for guess in guess_bends(image, reader.sensor, embossed.radii_mm, BENDS):
         under = bend_image(image, reader.sensor, guess.bend)
-        fits = fit_lattices(under, template, bank, settings.first, [guess.gain])
+        fits = fit_lattices(under, bank, effort, search_image(under, bank, [guess.gain]))
         views += [LatticeView(fit, predicted=False) for fit in fits]
-        near_fits = _refine_near(under, template, settings.first, near, fits)
+        near_fits = _refine_near(under, effort, near, fits)
         views += [LatticeView(fit, predicted=True) for fit in near_fits]
     return tuple(views)
 
@@ -220,19 +218,19 @@ def is_definite(covariance: Array) -> bool:
 
 def _refine_near(
     image: Image,
-    template: ResponseTemplate,
-    settings: FitSettings,
+    effort: Effort,
     near: Array,
     found: Sequence[Fit],
 ) -> tuple[Fit, ...]:
     """Return the fits reached from predicted poses (k, 3) that no found fit has."""
-    rest = [p for p in near if not any(_same_as_fit(p, fit, template.pitch_mm) for fit in found)]
-    gain = found[0].gain if found else first_gain(image, template.ink)
+    pitch = image.template.pitch_mm
+    rest = [p for p in near if not any(_same_as_fit(p, fit, pitch) for fit in found)]
+    gain = found[0].gain if found else first_gain(image)
     if gain is None or not rest:
         return ()
     gains = np.repeat(gain[None], len(rest), axis=0)
-    lattices = refine_lattices(image, template, np.array(rest), gains, steps=settings.final_steps)
-    return score_cells(image, template, lattices)
+    lattices = refine_lattices(image, np.array(rest), gains, steps=effort.final_steps)
+    return score_cells(image, lattices)
 
 
 def _same_as_fit(pose: Array, fit: Fit, pitch_mm: float) -> bool:

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.calibration import Calibration
-from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
+from recognizer.touch.evidence import VerifiedHypothesis
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise_with_hypothesis
+from recognizer.touch.recognise import read_touch
 from recognizer.touch.sensor_state import PRIOR, SensorState, invert_floating, unknown_state
-from recognizer.touch.symbols.refine import linearize_image
+from recognizer.touch.symbols.kernels import FIRST_NOISE
+from recognizer.touch.symbols.linearize import linearize_image
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -98,9 +99,10 @@ def learn_sensor(
         under = replace(reader, state=state)
         for number, image in enumerate(inverted):
             signal = under.signal(image, calibration=calibration)
-            answer, verified = recognise_with_hypothesis(under, signal, number)
-            if answer and verified is not None and (answer.margin or 0.0) > MARGIN:
-                evidence.append(evidence_of(verified))
+            reading = read_touch(under, signal, number)
+            answer, best = reading.answer, reading.best
+            if answer and best is not None and (answer.margin or 0.0) > MARGIN:
+                evidence.append(evidence_of(best))
             if done is not None:
                 done((turn + (number + 1) / len(inverted)) / rounds)
         state = refine_tactels(state, evidence, before)
@@ -136,16 +138,10 @@ def answering_of(forces: Array) -> Answering:
 
 def evidence_of(verified: VerifiedHypothesis) -> TactelEvidence:
     """Return the evidence of one recognised touch, under the state that it was read with."""
-    fit, image, place = verified.fit, verified.image, verified.hypothesis
-    embossed = verified.embossed
-    worn = fit.cells[weigh_cells(embossed, fit, place, image.settings.belief).worn]
-
-    def shown(cells: Ints) -> Ints:
-        return unworn_labels_at(embossed, place, worn, cells)
-
-    at = linearize_image(image, verified.template, fit.pose[None], fit.gain[None], shown)
+    fit, image = verified.fit, verified.image
+    at = linearize_image(image, fit.pose[None], fit.gain[None], verified.labels_at)
     own, left = at.jacobian[0], at.left[0]
-    sure = at.sure[0] * (image.settings.noise.first / fit.noise) ** 2
+    sure = at.sure[0] * (FIRST_NOISE / fit.noise) ** 2
     c, s = np.cos(fit.theta_rad), np.sin(fit.theta_rad)
     by_tactel = np.stack(
         [image.forces - left, c * own[:, 0] + s * own[:, 1], c * own[:, 1] - s * own[:, 0]], axis=1

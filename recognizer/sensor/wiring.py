@@ -21,11 +21,11 @@ from numpy.typing import ArrayLike, NDArray
 from probe.calibration import Calibration
 from probe.frame import Frame
 from recognizer.errors import WiringError
-from recognizer.touch.contacts import TouchImage
-from recognizer.touch.exchanged import exchange_image
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.sensor_state import invert_floating
+from recognizer.touch.signal import swap_halves
+from recognizer.touch.source import TouchImage
 
 Array = NDArray[np.float64]
 #: Image (rows, columns) and the highest reading -> image.
@@ -36,8 +36,8 @@ CHANGES: dict[str, Change] = {
     "columns": lambda image, _: image[:, ::-1],
     "rows": lambda image, _: image[::-1],
     "transpose": lambda image, _: image.T,
-    "column-halves": lambda image, _: exchange_image(image, 1),
-    "row-halves": lambda image, _: exchange_image(image, 0),
+    "column-halves": lambda image, _: swap_halves(image, 1),
+    "row-halves": lambda image, _: swap_halves(image, 0),
     "values": lambda image, full: full - np.minimum(image, full),
     "quarter": lambda image, _: np.rot90(image),
 }

@@ -20,9 +20,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.database.as_built import AsBuilt
-from recognizer.touch.settings import DEFAULTS, PrintedSettings
 
 Array = NDArray[np.float64]
+
+# How prints come out that nobody has measured: standard deviations. Printers are off by .3 % as a
+# rule and .6 % at worst, and backlash and shifted layers move symbols by up to .03 mm
+# (`docs/printed.md`).
+SCALE_SD = 0.004  #: of the part that both axes have in common
+APART_SD = 0.002  #: of the difference between the two
+SKEW_SD_RAD = 0.001
+ASIDE_SD_MM = 0.02  #: each way, of the place of symbols, beyond scale and skew
+DIFFERENCE = 1e-6  #: of scales and skew, of the differences that stand for derivatives
 
 
 def print_matrix(as_built: AsBuilt) -> Array:
@@ -48,12 +56,12 @@ def print_of(prints: Sequence[AsBuilt], part: str, printer: str) -> AsBuilt | No
     return alike[0] if len(alike) == 1 else None
 
 
-def usual_print(settings: PrintedSettings = DEFAULTS.printed) -> AsBuilt:
+def usual_print() -> AsBuilt:
     """Return what is known of a part that nobody has measured: as designed, more or less."""
-    common, apart = settings.scale**2, settings.apart**2 / 2
+    common, apart = SCALE_SD**2, APART_SD**2 / 2
     covariance = np.zeros((4, 4))
     covariance[:2, :2] = common
-    covariance[[0, 1, 2], [0, 1, 2]] += apart, apart, settings.skew_rad**2
+    covariance[[0, 1, 2], [0, 1, 2]] += apart, apart, SKEW_SD_RAD**2
     return AsBuilt(
         object_id=None, part=None, printer="", material="", scale_x=1.0, scale_y=1.0, skew_rad=0.0,
         stroke_mm=1.0, covariance=covariance, touches=0,
@@ -98,14 +106,13 @@ class PrintedFace:
         symmetric. The reader fits a turned and scaled lattice to what is turned and stretched,
         which finds the turn against Q, whatever U, and the mean of U's eigenvalues as the scale.
         """
-        settings = DEFAULTS.printed
         print_ = np.array([getattr(self.as_built, name) for name in _PRINT])
         spread = self.as_built.covariance[:3, :3]
         slope, alone = np.zeros(3), covariance
         if felt is not None:
             slope = felt.covariance[:3] / felt.covariance[3]
             alone = covariance - np.outer(slope, felt.covariance[:3])
-            print_, spread = self._with_scale(print_, spread, felt, settings.step)
+            print_, spread = self._with_scale(print_, spread, felt)
 
         def posed(print_: Array) -> Array:
             S = _print_matrix(print_)
@@ -116,25 +123,23 @@ class PrintedFace:
             return self._printed(S, axes, moved)
 
         printed = posed(print_)
-        by_print = _slopes(lambda one: _planar(posed(one)), print_, _planar(printed), settings.step)
+        by_print = _slopes(lambda one: _planar(posed(one)), print_, _planar(printed))
         along = np.eye(3)
         R = self.T_part_face[:3, :3]
         along[:2, :2] = (R.T @ _print_matrix(print_) @ R)[:2, :2]
-        floor = np.diag([settings.aside_mm**2, settings.aside_mm**2, 0.0])
+        floor = np.diag([ASIDE_SD_MM**2, ASIDE_SD_MM**2, 0.0])
         return printed, along @ alone @ along.T + by_print @ spread @ by_print.T + floor
 
-    def _with_scale(
-        self, print_: Array, spread: Array, felt: FeltScale, step: float
-    ) -> tuple[Array, Array]:
+    def _with_scale(self, print_: Array, spread: Array, felt: FeltScale) -> tuple[Array, Array]:
         """Return scales and skew with what a touch says of them, and their covariance (3, 3)."""
         variance = felt.covariance[3]
-        told = 1.0 / variance - 1.0 / felt.expected**2  # by the image alone
-        if not told > 0:
+        precision = 1.0 / variance - 1.0 / felt.expected**2  # by the image alone
+        if not precision > 0:
             return print_, spread
         excess = self._excess(print_)
-        by = _slopes(self._excess, print_, excess, step)[0]
-        gain = spread @ by / (by @ spread @ by + 1.0 / told)
-        away = felt.excess / (variance * told) - float(excess[0])
+        by = _slopes(self._excess, print_, excess)[0]
+        gain = spread @ by / (by @ spread @ by + 1.0 / precision)
+        away = felt.excess / (variance * precision) - float(excess[0])
         return print_ + gain * away, spread - np.outer(gain, by @ spread)
 
     def _excess(self, print_: Array) -> Array:
@@ -173,9 +178,9 @@ def _polar(B: Array) -> tuple[Array, float]:
     return B @ np.array([[b + s, -c], [-c, a + s]]) / (t * s), t / 2.0
 
 
-def _slopes(of: Callable[[Array], Array], at: Array, here: Array, step: float) -> Array:
+def _slopes(of: Callable[[Array], Array], at: Array, here: Array) -> Array:
     """Return the derivatives (m, 3) of a function of a print, which is `here` (m,) at it."""
-    return np.array([(of(at + step * one) - here) / step for one in np.eye(3)]).T
+    return np.array([(of(at + DIFFERENCE * one) - here) / DIFFERENCE for one in np.eye(3)]).T
 
 
 def _moved(T_face_probe: Array, by: Array) -> Array:

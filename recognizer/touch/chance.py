@@ -25,28 +25,70 @@ does not surely press is no border: a bare cell costs others only as far as a sy
 
 The probability is summed over all symbols of all cells at once, on a grid of nats, every score
 rounded up: it is never too small but for what the fit of pose and gain to the symbols that are
-registered there adds to them. Thesis 6.3.
+registered there adds to them.
+
+The border of a face. A plate that lies over the edge of a face tips and comes down on the bare face
+up to its very end: tactels read that face there, and nothing a tip's width farther. Each line of
+the registered outline under the sensor is shifted to and fro, and the readings of the tactels about
+it are compared with those that the bare face would give them that far; the share of shifts that fit
+as well as none at all is how often a border that has nothing to do with the lattice would. Only
+tactels count which the plate surely presses if there is a face: one that a tipped plate does not
+load says nothing of a border. Where no such tactel lies near a line, every shift fits as well and
+the share is 1. Lattices stand in the middle of their faces (`generator.layout`), so that a face of
+unknown size ends anywhere within half a pitch, and opposite borders end as far from the lattice: of
+parallel lines one counts. Sizes are round numbers more often than not, which move a border by half
+a millimetre, and no line says more than `LEAST_SHARE`. Sensor frame and face frame, mm. Thesis 6.3.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.belief import VerifiedHypothesis
-from recognizer.touch.border import points_on_lattice, share_of_borders, surely_pressed
-from recognizer.touch.hypothesis import Hypothesis, bounded_scores, labels_at
-from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.place_scores import count_places
-from recognizer.touch.settings import ReaderSettings
+from recognizer.touch.evidence import VerifiedHypothesis
+from recognizer.touch.hypothesis import (
+    LARGE_LAB,
+    Hypothesis,
+    bounded_scores,
+    count_places,
+    labels_of,
+)
+from recognizer.touch.lab import EmbossedArray, EncodedFace
+from recognizer.touch.pose import face_pose
+from recognizer.touch.signal import mean_of_strongest
 from recognizer.touch.symbols.fit import Fit
+from recognizer.touch.symbols.image import Image
+from recognizer.touch.symbols.template import psi
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+GRAIN = 0.25  #: nats to which scores are rounded
+
+# Of borders. Tuned on touches near edges and corners of the forty objects: own engine, seeds 501
+# and 502, MuJoCo, seeds 900 and 902.
+SIGMAS = 5.0  #: deviations of the noise of readings ...
+PRESSED = 0.08  #: ... and share of the strongest from which the bare face is pressed
+SYMBOL = 0.15  #: and a symbol, for a bare cell to be one
+BARE = 0.1  #: psi of a symbol from which a tactel feels it
+REACH_MM = 3.2  #: from a line within which tactels count
+ENDS_MM = 1.0  #: at the ends of a line that are left out
+APART_MM = 1.5  #: from any other line
+FEW = 3  #: tactels, at least
+SHIFT_MM = 0.1  #: step of shifts
+GAINS = 5  #: factors that the force on the bare face may be off by, evenly spread ...
+GAIN_SD = 0.5  #: ... over 1.5 of this deviation of their logarithm, both ways
+NOISE = 0.12  #: least deviation of psi on a covered tactel ...
+QUIET = 0.8  #: ... and that where nothing is felt, against it
+MOST_NATS = 4.0  #: that one tactel can cost
+SLACK = 0.25  #: nats by which a shift may be less likely that fits as well
+LEAST_SHARE = 0.25  #: that a line leaves at least
+PARALLEL_RAD = 0.2  #: by which parallel lines differ at most
 
 
 def expected_matches(
@@ -54,7 +96,6 @@ def expected_matches(
     embossed: EmbossedArray,
     fit: Fit,
     hypothesis: Hypothesis,
-    settings: ReaderSettings,
     *,
     borders: bool = True,
 ) -> float:
@@ -69,14 +110,13 @@ def expected_matches(
     borders
         Whether those only count whose own borders agree with the bare cells; else all.
     """
-    scores = bounded_scores(fit, settings.hypotheses)
-    held = labels_at(embossed, hypothesis, fit.cells)
+    scores = bounded_scores(fit)
+    held = labels_of(embossed, hypothesis, fit.cells)
     shown = held < embossed.array.order
-    chance = chance_of_match(scores[shown, :-1], held[shown], settings.belief.grain)
+    chance = chance_of_match(scores[shown, :-1], held[shown])
     border = _border_of(fit, scores, held)
-    largest = settings.hypotheses.large
     return chance * sum(
-        _count_places(one, border, largest) if borders else len(one.keys)
+        _count_places(one, border) if borders else len(one.keys)
         for one in arrays
         if (one.alphabet, one.style) == (embossed.alphabet, embossed.style)
     )
@@ -86,7 +126,6 @@ def expected_by_border(
     arrays: Iterable[EmbossedArray],
     found: VerifiedHypothesis,
     tip_mm: float,
-    settings: ReaderSettings,
 ) -> float:
     """Return how many registered places a foreign face matches as well, border and all.
 
@@ -103,31 +142,31 @@ def expected_by_border(
     alike = [
         one for one in arrays if (one.alphabet, one.style) == (embossed.alphabet, embossed.style)
     ]
-    if sum(len(one.keys) for one in alike) > settings.hypotheses.large:
+    if sum(len(one.keys) for one in alike) > LARGE_LAB:
         return math.inf
-    scores = bounded_scores(fit, settings.hypotheses)
-    held = labels_at(embossed, found.hypothesis, fit.cells)
+    scores = bounded_scores(fit)
+    held = labels_of(embossed, found.hypothesis, fit.cells)
     shown = held < embossed.array.order
     ahead = scores[np.arange(len(held)), held][:, None] - scores
-    sure = np.where(shown, 1.0, _pressed_share(found, settings))
+    sure = np.where(shown, 1.0, _pressed_share(found))
     ahead = np.where(ahead > 0, ahead * sure[:, None], ahead)
-    behind = np.floor(ahead / settings.belief.grain).astype(np.int64)
+    behind = np.floor(ahead / GRAIN).astype(np.int64)
     anchor = int(np.argmax(np.where(shown, fit.seen, -1.0)))
     cells = fit.cells - fit.cells[anchor]
     places = sum(_expect_matches(one, cells, behind) for one in alike)
-    return places * share_of_borders(found, tip_mm, settings.border)
+    return places * share_of_borders(found, tip_mm)
 
 
-def _pressed_share(found: VerifiedHypothesis, settings: ReaderSettings) -> Array:
+def _pressed_share(found: VerifiedHypothesis) -> Array:
     """Return of each cell (m,) the share of its tactels that a symbol there would surely press."""
-    image, fit, border = found.image, found.fit, settings.border
-    pressed = surely_pressed(image, fit.gain, border.symbol, border)
-    at = np.floor(points_on_lattice(image, fit) / found.template.pitch_mm).astype(np.int64)
+    image, fit = found.image, found.fit
+    pressed = surely_pressed(image, fit.gain, SYMBOL)
+    at = np.floor(points_on_lattice(image, fit) / image.template.pitch_mm).astype(np.int64)
     on = (at[None] == fit.cells[:, None]).all(axis=2)
     return np.asarray((on & pressed).sum(axis=1) / np.maximum(on.sum(axis=1), 1))
 
 
-def chance_of_match(scores: Array, held: Ints, grain: float) -> float:
+def chance_of_match(scores: Array, held: Ints, grain: float = GRAIN) -> float:
     """Return the probability that random symbols score as well as those that are held.
 
     Parameters
@@ -213,7 +252,7 @@ def _bears(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Border:
-    """What the bare cells of a hypothesis ask of a place."""
+    """The bare cells of a hypothesis, which other places may hold symbols in."""
 
     cells: Ints  #: (n, 2) column and upward row, from a cell that the place holds
     price: Array  #: (n,) nats by which a symbol there falls behind, falling
@@ -230,8 +269,150 @@ def _border_of(fit: Fit, scores: Array, held: Ints) -> _Border:
     return _Border(fit.cells[dear] - fit.cells[anchor], price[dear], slack)
 
 
-def _count_places(embossed: EmbossedArray, border: _Border, largest: int) -> int:
-    """Return how many registered cells can be the held one; all, in a lab larger than `largest`."""
-    if len(embossed.keys) > largest:
+def _count_places(embossed: EmbossedArray, border: _Border) -> int:
+    """Return how many registered cells can be the held one; all, in a large lab."""
+    if len(embossed.keys) > LARGE_LAB:
         return len(embossed.keys)
     return count_places(embossed, border.cells, border.price, border.slack)
+
+
+def share_of_borders(found: VerifiedHypothesis, tip_mm: float) -> float:
+    """Return the share of foreign borders that the image fits as well as the registered one.
+
+    Parameters
+    ----------
+    tip_mm
+        Diameter of a tactel's tip.
+    """
+    face = found.embossed.face(found.hypothesis.face)
+    if face.round is not None or tip_mm <= 0.0:
+        return 1.0
+    pressed, top, bare = _free_tactels(found)
+    points = points_on_face(found, face)
+    readings = psi(found.image.forces / np.maximum(top, 1e-300))
+    pitch, unit = found.embossed.style.pitch_mm, max(NOISE, found.fit.noise)
+    shares: list[tuple[float, float]] = []
+    for inside, away, direction in _lines(face, points):
+        asked = pressed & away
+        if asked.sum() < FEW:
+            continue
+        expected = bare[asked] / np.maximum(top[asked], 1e-300)
+        share = fitting_share(inside[asked], readings[asked], expected, tip_mm, pitch, unit)
+        shares.append((direction, max(share, LEAST_SHARE)))
+    return joint_share(shares)
+
+
+def surely_pressed(image: Image, gain: Array, share: float) -> Flags:
+    """Return which tactels (n,) would plainly read a symbol, if there were one under them.
+
+    Parameters
+    ----------
+    gain
+        (4,) of the plate.
+    share
+        Of the strongest readings, that they would read at least.
+    """
+    depth = image.plane @ gain[1:]
+    force = math.exp(float(gain[0])) * image.pressing.force(depth)
+    return _plain(image, force, share)
+
+
+def _plain(image: Image, force: Array, share: float) -> Flags:
+    strongest = mean_of_strongest(image.forces * image.trust)
+    least = max(share * strongest, SIGMAS * image.noise)
+    return np.asarray((image.trust > 0) & (force > least))
+
+
+def points_on_lattice(image: Image, fit: Fit) -> Array:
+    """Return the tactels (n, 2) in the lattice frame of a fit."""
+    c, s = math.cos(fit.theta_rad), math.sin(fit.theta_rad)
+    x, y = image.points_mm.T * (1.0 + float(fit.nuisance[3]))
+    return np.stack([fit.x_mm + c * x - s * y, fit.y_mm + s * x + c * y], axis=-1)
+
+
+def _free_tactels(found: VerifiedHypothesis) -> tuple[Flags, Array, Array]:
+    """Return which tactels would feel the bare face alone; forces (n,) on symbols and on it."""
+    image, fit = found.image, found.fit
+    template = image.template
+    depth, scale = image.plane @ fit.gain[1:], math.exp(float(fit.gain[0]))
+    top = scale * image.pressing.force(depth)
+    bare = scale * image.pressing.force(depth - image.pressing.symbol)
+    at = points_on_lattice(image, fit)
+    cells = np.floor(at / template.pitch_mm).astype(np.int64)
+    labels = labels_of(found.embossed, found.hypothesis, cells)
+    felt = template.at(at - (cells + 0.5) * template.pitch_mm)[..., 0]
+    held = labels < template.order
+    on_symbol = held & (felt[np.arange(len(at)), labels * held] > BARE)
+    return ~on_symbol & _plain(image, bare, PRESSED), top, bare
+
+
+def points_on_face(found: VerifiedHypothesis, face: EncodedFace) -> Array:
+    """Return the tactels (n, 2) in the face frame, in lengths as they were designed."""
+    T = face_pose(found.embossed, face, found.hypothesis, found.fit)
+    points = found.image.points_mm * (1.0 + float(found.fit.nuisance[3]))
+    return np.asarray(points @ T[:2, :2].T + T[:2, 3])
+
+
+def _lines(face: EncodedFace, points: Array) -> Iterator[tuple[Array, Flags, float]]:
+    """Yield of each line how far inside points lie (n,), which are its own, its direction."""
+    starts = np.concatenate(face.polygon_mm)
+    ends = np.concatenate([np.roll(loop, -1, axis=0) for loop in face.polygon_mm])
+    length = np.linalg.norm(ends - starts, axis=1)
+    along = (ends - starts) / length[:, None]
+    rest = points - starts[:, None]
+    t = (rest * along[:, None]).sum(axis=2)
+    inside = (
+        along[:, :1] * rest[..., 1] - along[:, 1:] * rest[..., 0]
+    )  # outlines run around the left
+    beyond = np.maximum(np.maximum(-t, t - length[:, None]), 0.0)
+    away = np.hypot(inside, beyond)
+    ordered = np.sort(away, axis=0)
+    for n in range(len(starts)):
+        own = (away[n] <= ordered[0]) & (ordered[min(1, len(ordered) - 1)] > APART_MM)
+        own &= (t[n] > ENDS_MM) & (t[n] < length[n] - ENDS_MM)
+        own &= np.abs(inside[n]) < REACH_MM
+        yield inside[n], own, math.atan2(along[n, 1], along[n, 0])
+
+
+def fitting_share(
+    inside: Array, readings: Array, bare: Array, tip_mm: float, pitch: float, unit: float
+) -> float:
+    """Return the share of half a pitch by which a border may be shifted and fit as well.
+
+    Parameters
+    ----------
+    inside, readings, bare
+        (n,) mm from the line, psi of what is read, and what the bare face gives, of a symbol's.
+    """
+    step = SHIFT_MM
+    count = max(1, round(pitch / 2 / step))
+    shifts = step * np.arange(-count, count + 1)
+    share = tip_share((inside + np.append(shifts, shifts[-1] + step)[:, None]) / (tip_mm / 2))
+    factors = np.exp(GAIN_SD * np.linspace(-1.5, 1.5, GAINS))
+    expected = psi(
+        np.minimum(bare * factors[:, None], 1.0)[:, None] * share
+    )  # (gains, shifts + 1, n)
+    slope, expected = np.diff(expected, axis=1) / step, expected[:, :-1]
+    width = unit * np.sqrt(QUIET**2 + expected**2 + slope**2)
+    away = (readings - expected) / width
+    each = -np.minimum(0.5 * away**2, MOST_NATS) - np.log(width)
+    known = 0.5 * (np.log(factors) / GAIN_SD) ** 2
+    likelihood = (each.sum(axis=2) - known[:, None]).max(axis=0)
+    as_well = likelihood >= likelihood[count] - SLACK
+    return min(1.0, float(as_well.sum()) * step / (pitch / 2))
+
+
+def tip_share(inside: Array) -> Array:
+    """Return the share of a round tip on one side of a line that its centre lies radii inside."""
+    x = np.clip(inside, -1.0, 1.0)
+    return np.asarray(0.5 + (x * np.sqrt(1.0 - x * x) + np.arcsin(x)) / math.pi)
+
+
+def joint_share(shares: list[tuple[float, float]]) -> float:
+    """Return the product of shares, of parallel lines the least one."""
+    total, known = 1.0, list[float]()
+    for direction, share in sorted(shares, key=lambda one: one[1]):
+        if all(abs(math.remainder(direction - other, math.pi)) > PARALLEL_RAD for other in known):
+            total *= share
+            known.append(direction)
+    return total

@@ -14,59 +14,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.touch import cause
-from recognizer.touch.around import combine_around, quantile
-from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
-from recognizer.touch.cause import Cause
-from recognizer.touch.first_look import shows_strokes
-from recognizer.touch.prepare import PreparedLab
-from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.explained import explained_share
-from recognizer.touch.symbols.projection import project_symbols
+from recognizer.touch import recognition as cause
+from recognizer.touch.evidence import VerifiedHypothesis
+from recognizer.touch.recognition import Cause
+from recognizer.touch.search_gate import shows_strokes
+from recognizer.touch.signal import Signal, combine_around, quantile
+from recognizer.touch.symbols.linearize import project_symbols
+from recognizer.touch.symbols.posterior import explained_share
 from recognizer.touch.verdict import Evidence
-from recognizer.touch.verify import fit_touch
+from recognizer.touch.verify import TouchImages
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True)
-class CauseSettings:
-    """Chosen on 40 touches of each cause, own engine, `typical`, seed 61 (`docs/recognizer.md`)."""
-
-    top: float = 90.0  #: percentile of the envelope that counts as loaded in full
-    plateau: float = 95.0  #: percentile of the readings that stands for a symbol's
-    part: float = 0.2  #: of the full load, from which a place is loaded
-    sigmas: float = 5.0  #: of the noise, likewise
-    even: float = 0.75  #: variation of the readings (deviation over mean) of a face without relief
-    plain: float = 0.2  #: likewise, of the pressed tactels alone ...
-    filled: float = 0.9  #: ... where these fill so much of the box around them
-    smeared: float = 0.85  #: likewise, below which contours may be smeared ...
-    sharp: float = 0.6  #: ... if they are so much less sharp one way than across
-    soft: float = 16.0  #: signal to noise below which a touch is soft
-    soft_n: float = 0.15  #: plateau below which it is, where readings are newtons
-    falling: float = 0.42  #: share of the load by which it falls from the middle to the rim ...
-    lying: float = 0.65  #: ... of a plate that lies on so much of the sensor: less is an edge
-    narrow_mm: float = 7.5  #: width of one row of symbols
-    longer: float = 1.8  #: times as long as wide
-    loaded: float = 0.85  #: share of the sensor below which it hangs over an edge
-    pressed: float = 0.6  #: psi of a symbol that presses
-    silent: float = 0.15  #: psi below which a tactel reads nothing
-    dead: float = 0.1  #: share of the pressed tactels that read nothing, of a faulty sensor
-    ghosts: float = 0.08  #: share of the free ones that read a symbol, of another pattern
-    known: float = -2.0  #: nats over symbols of no registered place, least where one is right
-    there: float = 20.0  #: likewise, from which its symbols are plainly there; a plain face has 11
-    explained: float = 0.8  #: share of the image that symbols of this size explain, wherever
-    clear: float = 6.0  #: nats by which a symbol is read
-    pattern: float = 0.35  #: share below which they are other ones
-
-
-CAUSES = CauseSettings()
+# Chosen on 40 touches of each cause, own engine, `typical`, seed 61 (`docs/recognizer.md`).
+FULL_LOAD = 90.0  #: percentile of the envelope that counts as loaded in full
+PLATEAU = 95.0  #: percentile of the readings that stands for a symbol's
+PART = 0.2  #: of the full load, from which a place is loaded ...
+SIGMAS = 5.0  #: ... and deviations of the noise
+EVEN = 0.75  #: variation of the readings (deviation over mean) of a face without relief
+PLAIN = 0.2  #: variation of the pressed tactels alone, of a plain face ...
+FILLED = 0.9  #: ... where these fill so much of the box around them
+SMEARED = 0.85  #: variation below which contours may be smeared ...
+SHARP = 0.6  #: ... if they are so much less sharp one way than across
+SOFT = 16.0  #: signal to noise below which a touch is soft
+SOFT_N = 0.15  #: plateau below which it is, where readings are newtons
+FALLING = 0.42  #: share of the load by which it falls from the middle to the rim ...
+LYING = 0.65  #: ... of a plate that lies on so much of the sensor: less is an edge
+NARROW_MM = 7.5  #: width of one row of symbols
+LONGER = 1.8  #: times as long as wide
+LOADED = 0.85  #: share of the sensor below which it hangs over an edge
+PRESSED = 0.6  #: psi of a symbol that presses
+SILENT = 0.15  #: psi below which a tactel reads nothing
+DEAD = 0.1  #: share of the pressed tactels that read nothing, of a faulty sensor
+GHOSTS = 0.08  #: share of the free ones that read a symbol, of another pattern
+KNOWN = -2.0  #: nats over symbols of no registered place, least where one is right
+THERE = 20.0  #: nats from which its symbols are there beyond doubt; a plain face has 11
+EXPLAINED = 0.8  #: share of the image that symbols of this size explain, wherever
+CLEAR = 6.0  #: nats by which a symbol is read
+PATTERN = 0.35  #: share below which they are other ones
 
 
 @dataclass(frozen=True, slots=True)
 class ImageFeatures:
-    """What an image shows before any symbol is read."""
+    """Features of an image before any symbol is read."""
 
     plateau: float  #: reading on a symbol
     signal_to_noise: float
@@ -79,17 +71,15 @@ class ImageFeatures:
     length_mm: float
 
 
-def image_features(
-    sensor: SensorType, signal: Signal, pitch_mm: float, settings: CauseSettings = CAUSES
-) -> ImageFeatures:
-    """Return what an image of symbols of a pitch shows before any of them is read."""
+def image_features(sensor: SensorType, signal: Signal, pitch_mm: float) -> ImageFeatures:
+    """Return the features of an image of symbols of a pitch."""
     good = signal.trust > 0
     forces = np.where(good, signal.forces, 0.0)
     noise = signal.noise
     reach = max(1, round(pitch_mm / max(sensor.step_mm)) // 2)
     envelope = combine_around(forces, reach, np.maximum)
-    top = max(_percentile(envelope, settings.top), 1e-300)
-    plateau = _percentile(forces[good], settings.plateau)
+    top = max(_percentile(envelope, FULL_LOAD), 1e-300)
+    plateau = _percentile(forces[good], PLATEAU)
     points = sensor.centres_mm().reshape(-1, 2)
     basis = np.column_stack([np.ones(len(points)), points / np.array(sensor.half_mm)])
     plane = np.linalg.lstsq(basis, envelope.ravel() / top, rcond=None)[0]
@@ -101,7 +91,7 @@ def image_features(
     return ImageFeatures(
         plateau=plateau,
         signal_to_noise=plateau / max(noise, 1e-300),
-        loaded=float((envelope > max(settings.part * top, settings.sigmas * noise)).mean()),
+        loaded=float((envelope > max(PART * top, SIGMAS * noise)).mean()),
         slope=math.hypot(*plane[1:]),
         variation=float(forces[good].std() / max(forces[good].mean(), 1e-300)),
         sharpness=float(least[0] / max(least[1], 1e-300)),
@@ -115,30 +105,25 @@ def _percentile(values: Array, percent: float) -> float:
     return float(quantile(np.sort(values, axis=None), percent / 100.0))
 
 
-def _is_plain(image: ImageFeatures, signal: Signal, settings: CauseSettings) -> bool:
+def _is_plain(image: ImageFeatures, signal: Signal) -> bool:
     """Whether what is pressed is one area without gaps, pressed evenly, up to an edge or not."""
     good, top = signal.trust > 0, image.plateau
-    pressed = good & (signal.forces > settings.part * top)
+    pressed = good & (signal.forces > PART * top)
     rows, columns = np.flatnonzero(pressed.any(axis=1)), np.flatnonzero(pressed.any(axis=0))
     if not len(rows):
         return False
     inside = np.ix_(range(rows[0], rows[-1] + 1), range(columns[0], columns[-1] + 1))
     filled = float(pressed[inside].sum()) / max(int(good[inside].sum()), 1)
     forces = signal.forces[pressed]
-    return filled > settings.filled and bool(forces.std() < settings.plain * forces.mean())
+    return filled > FILLED and bool(forces.std() < PLAIN * forces.mean())
 
 
-def _is_there(evidence: Evidence | None, settings: CauseSettings) -> bool:
+def _is_there(evidence: Evidence | None) -> bool:
     """Whether the symbols of a place are plainly there: hard pressed ones, not a plain face."""
-    return evidence is not None and evidence.log_likelihood_ratio >= settings.there
+    return evidence is not None and evidence.log_likelihood_ratio >= THERE
 
 
-def diagnose(
-    reader: PreparedLab,
-    signal: Signal,
-    found: list[VerifiedHypothesis],
-    settings: CauseSettings = CAUSES,
-) -> Cause:
+def diagnose(touch: TouchImages, found: list[VerifiedHypothesis]) -> Cause:
     """Return why a touch is not answered.
 
     Parameters
@@ -146,22 +131,23 @@ def diagnose(
     found
         The hypotheses that were judged, best first; none where nothing could be fitted.
     """
+    reader, signal = touch.reader, touch.signal
     if not signal.contact:
         return Cause(cause.NO_LOAD, {})
     pitch = min(each.style.pitch_mm for each in reader.lab.arrays)
-    image = image_features(reader.sensor, signal, pitch, settings)
-    evidence = found[0].evidence() if found else None
-    seen = _by_image(image, signal, settings)
-    if seen is not None and not (seen.code == cause.PLAIN and _is_there(evidence, settings)):
+    image = image_features(reader.sensor, signal, pitch)
+    evidence = found[0].evidence if found else None
+    seen = _by_image(image, signal)
+    if seen is not None and not (seen.code == cause.PLAIN and _is_there(evidence)):
         return seen
     symbols = 0 if evidence is None else evidence.inliers
-    if image.width_mm < settings.narrow_mm and image.length_mm > settings.longer * image.width_mm:
+    if image.width_mm < NARROW_MM and image.length_mm > LONGER * image.width_mm:
         return Cause(cause.ONE_ROW, {"width_mm": image.width_mm, "symbols": float(symbols)})
-    bare = not shows_strokes(reader, signal) or _is_plain(image, signal, settings)
-    if bare and not _is_there(evidence, settings):
+    bare = not shows_strokes(reader, signal) or _is_plain(image, signal)
+    if bare and not _is_there(evidence):
         return Cause(cause.PLAIN, {"variation": image.variation, "plateau": image.plateau})
     if evidence is None:
-        code = cause.EDGE if image.loaded < settings.loaded else cause.UNCLEAR
+        code = cause.EDGE if image.loaded < LOADED else cause.UNCLEAR
         return Cause(code, {"symbols": 0.0, "explained": 0.0, "loaded": image.loaded})
     numbers = {
         "symbols": float(symbols),
@@ -170,84 +156,74 @@ def diagnose(
         "surprise": evidence.log_likelihood_ratio,
         "against": float(evidence.contradictions),
     }
-    silent, ghosts = _disagreement(found[0], settings)
-    placed = evidence.log_likelihood_ratio > settings.known and image.loaded > settings.lying
-    if placed and silent > settings.dead and ghosts < settings.ghosts:
+    silent, ghosts = _disagreement(found[0])
+    placed = evidence.log_likelihood_ratio > KNOWN and image.loaded > LYING
+    if placed and silent > DEAD and ghosts < GHOSTS:
         return Cause(cause.DEAD_TACTELS, {**numbers, "silent": silent})
-    if image.loaded < settings.loaded:
+    if image.loaded < LOADED:
         return Cause(cause.EDGE, numbers)
-    explained, read = _read_anywhere(reader, signal, settings)
+    explained, read = _read_anywhere(touch)
     numbers |= {"explained_anywhere": explained, "symbols_anywhere": float(read)}
-    if evidence.log_likelihood_ratio < settings.known and explained > settings.explained:
+    if evidence.log_likelihood_ratio < KNOWN and explained > EXPLAINED:
         return Cause(cause.NOT_REGISTERED, numbers)
-    if max(evidence.explained, explained) < settings.pattern:
+    if max(evidence.explained, explained) < PATTERN:
         return Cause(cause.OTHER_PATTERN, numbers)
     return Cause(cause.UNCLEAR, numbers)
 
 
-def _by_image(image: ImageFeatures, signal: Signal, settings: CauseSettings) -> Cause | None:
-    """Return what the image shows by itself; None if nothing."""
-    if image.variation < settings.smeared and image.sharpness < settings.sharp:
+def _by_image(image: ImageFeatures, signal: Signal) -> Cause | None:
+    """Return the cause that the image shows by itself; None if none."""
+    if image.variation < SMEARED and image.sharpness < SHARP:
         return Cause(cause.MOVING, {"sharpness": image.sharpness,
                                     "direction_deg": image.direction_deg})  # fmt: skip
-    if image.variation < settings.even:
+    if image.variation < EVEN:
         return Cause(cause.PLAIN, {"variation": image.variation, "plateau": image.plateau})
-    weak = image.plateau < settings.soft_n
-    if weak if signal.newtons else image.signal_to_noise < settings.soft:
+    weak = image.plateau < SOFT_N
+    if weak if signal.newtons else image.signal_to_noise < SOFT:
         return Cause(cause.SOFT, {"plateau": image.plateau, "newtons": float(signal.newtons),
                                   "signal_to_noise": image.signal_to_noise})  # fmt: skip
-    if image.slope > settings.falling and image.loaded > settings.lying:
+    if image.slope > FALLING and image.loaded > LYING:
         return Cause(cause.TILTED, {"slope": image.slope, "loaded": image.loaded})
     return None
 
 
-def _read_anywhere(
-    reader: PreparedLab, signal: Signal, settings: CauseSettings
-) -> tuple[float, int]:
+def _read_anywhere(touch: TouchImages) -> tuple[float, int]:
     """Return the share of the image that symbols explain wherever they stand, and how many do.
 
     Each cell shows what fits it best, whether such a window is registered or not.
     """
     best, read = -math.inf, 0
-    fitted = fit_touch(reader, signal, reader.settings.first)
-    for (_, template, _), (image, fits) in zip(reader.prepared, fitted, strict=True):
-        for fit in fits[:1]:
+    for one in touch.arrays:
+        for fit in one.first_fits[:1]:
             order = fit.scores.shape[1] - 1
-            labels = fit.scores.argmax(axis=1)
-            shows = np.where(labels == order, -1, labels).tolist()
+            likeliest = fit.scores.argmax(axis=1)
+            shows = np.where(likeliest == order, -1, likeliest).tolist()
             held = dict(zip(map(tuple, fit.cells.tolist()), shows, strict=True))
 
-            def shown(cells: Ints, held: dict[tuple[int, ...], int] = held) -> Ints:
+            def labels_at(cells: Ints, held: dict[tuple[int, ...], int] = held) -> Ints:
                 found = [held.get(tuple(cell), -1) for cell in cells.reshape(-1, 2).tolist()]
                 return np.array(found, np.int64).reshape(cells.shape[:-1])
 
-            explained = explained_share(image, template, fit.pose, fit.gain, shown)
+            explained = explained_share(one.image, fit.pose, fit.gain, labels_at)
             if explained > best:
                 ranked = np.sort(fit.scores, axis=1)
-                clear = ranked[:, -1] - ranked[:, -2] > settings.clear
-                best, read = explained, int((clear & (labels < order)).sum())
+                clear = ranked[:, -1] - ranked[:, -2] > CLEAR
+                best, read = explained, int((clear & (likeliest < order)).sum())
     return best if math.isfinite(best) else 0.0, read
 
 
-def _disagreement(best: VerifiedHypothesis, settings: CauseSettings) -> tuple[float, float]:
+def _disagreement(best: VerifiedHypothesis) -> tuple[float, float]:
     """Return the share of pressed tactels that read nothing, and of free ones that read a symbol.
 
-    Pressed and free as the symbols say that are registered at the place.
+    Pressed and free by the symbols that are registered at the place.
     """
-    fit, embossed, place = best.fit, best.embossed, best.hypothesis
-    worn = fit.cells[weigh_cells(embossed, fit, place, best.image.settings.belief).worn]
-
-    def shown(at: Ints) -> Ints:
-        return unworn_labels_at(embossed, place, worn, at)
-
-    under, labels, shows = project_symbols(
-        best.image, best.template, fit.pose[None], fit.gain[None], shown
-    )
+    image, fit = best.image, best.fit
+    under, labels, shows = project_symbols(image, fit.pose[None], fit.gain[None], best.labels_at)
     value, felt = shows[0, :, 0], under.psi[0]
-    known = best.image.trust > 0
-    pressed = known & (labels[0] >= 0) & (value > settings.pressed)
-    free = known & (value < settings.silent)
+    known = image.trust > 0
+    pressed = known & (labels[0] >= 0) & (value > PRESSED)
+    free = known & (value < SILENT)
     return (
-        float((felt[pressed] < settings.silent).sum() / max(pressed.sum(), 1)),
-        float((felt[free] > settings.pressed).sum() / max(free.sum(), 1)),
+        float((felt[pressed] < SILENT).sum() / max(pressed.sum(), 1)),
+        float((felt[free] > PRESSED).sum() / max(free.sum(), 1)),
     )

@@ -11,12 +11,14 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Engine
 
+from encoded_objects.base.compiled import addresses
 from encoded_objects.base.output import count_of
 from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
 from generator.array import FoldedArray, ProductArray, array_from
@@ -32,15 +34,21 @@ from generator.database.registered import (
     RoundFace,
 )
 from generator.database.transaction import read_transaction
+from probe.surface.polygon import FaceRegion, polygon
 from recognizer.errors import LabError
 from recognizer.touch.as_built import PrintedFace, print_of, usual_print
-from recognizer.touch.settings import DEFAULTS, LabSettings
-from recognizer.touch.windows import Windows, index_windows
+from recognizer.touch.symbols.kernels import Held
 
 Ints = NDArray[np.int64]
 
+DENSE_CELLS = 1 << 22  #: arrays of at most so many cells are looked up in a table (16 MB)
+LEAST_RADIUS_MM = 15.0  #: of round faces that are looked for
+MOST_RADIUS_MM = 400.0  #: a larger one falls less than 0.2 mm away at the sensor's rim
+RADIUS_FACTOR = 1.35  #: from one radius to the next
+WINDOW_SHAPES = ((2, 3), (3, 2), (2, 2))  #: rows and columns of a window
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, eq=False)
 class EncodedFace:
     """A face of an object with its symbols."""
 
@@ -58,8 +66,32 @@ class EncodedFace:
     T_part_face: NDArray[np.float64] | None = None  #: (4, 4) to the frame of the part's file
     printed: PrintedFace | None = None  #: None on round faces
 
+    @cached_property
+    def region(self) -> FaceRegion:
+        """Outline, face frame."""
+        return polygon(list(self.polygon_mm))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Windows:
+    """Registered cells, ordered by the labels of the windows of which they are the top left.
+
+    A touch that reads six neighbouring symbols looks them up here, or four; its work does not grow
+    with the number of registered faces, but with how often the same labels occur (array order to
+    the sixth divides them). Works for every kind of array, since only registered cells are listed.
+    """
+
+    shape: tuple[int, int]
+    codes: Ints  #: (n,) rising; labels of the window as digits, row by row
+    cells: NDArray[np.uint32]  #: (n,) places in the keys
+
+    def at(self, code: int) -> NDArray[np.uint32]:
+        """Return where a window's labels stand, as places in the keys."""
+        first, last = np.searchsorted(self.codes, [code, code + 1])
+        return self.cells[first:last]
+
+
+@dataclass(frozen=True, eq=False)
 class EmbossedArray:
     """One array as embossed in one alphabet and style, and who holds its cells."""
 
@@ -74,7 +106,6 @@ class EmbossedArray:
     names: dict[int, str]  #: of the objects, by their numbers
     engine: Engine
     radii_mm: tuple[float, ...] = ()  #: of round faces, nearly, rising; none: all faces are flat
-    indexed: list[Windows] = field(default_factory=list)  #: filled by `windows`
     known: dict[int, EncodedFace] = field(default_factory=dict)
 
     def at(self, rows: Ints, columns: Ints) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
@@ -88,16 +119,36 @@ class EmbossedArray:
         none = np.int32(-1)
         return np.where(held, self.owners[place], none), np.where(held, self.labels[place], none)
 
-    def windows(self) -> list[Windows]:
-        """Return the index of all small windows, made when it is first asked for."""
-        if not self.indexed:
-            self.indexed.extend(
-                index_windows(
-                    self.keys, self.owners[:-1], self.array.rows, self.array.columns,
-                    self.array.order, self.at,
+    @cached_property
+    def windows(self) -> tuple[Windows, ...]:
+        """Index of all small windows."""
+        return tuple(self._index_windows(shape) for shape in WINDOW_SHAPES)
+
+    def _index_windows(self, shape: tuple[int, int]) -> Windows:
+        array, owners = self.array, self.owners[:-1]
+        row, column = (
+            part.astype(np.int64) for part in np.divmod(self.keys, np.uint64(array.columns))
+        )
+        code, whole = np.zeros(len(row), np.int64), np.ones(len(row), np.bool_)
+        for down in range(shape[0]):
+            for right in range(shape[1]):
+                held_by, label = self.at(
+                    (row + down) % array.rows, (column + right) % array.columns
                 )
-            )  # fmt: skip
-        return self.indexed
+                whole &= held_by == owners
+                code = code * array.order + label
+        places = np.flatnonzero(whole)
+        by_code = places[np.argsort(code[places], kind="stable")]
+        return Windows(shape, code[by_code], by_code.astype(np.uint32))
+
+    @cached_property
+    def held(self) -> Held:
+        """What the compiled loops over places are given."""
+        array = self.array
+        return Held(
+            len(self.keys), array.rows, array.columns, array.order,
+            *addresses(self.keys, self.owners, self.labels, self.dense),
+        )  # fmt: skip
 
     def face(self, number: int) -> EncodedFace:
         """Return a face by its number, from memory or from the database."""
@@ -137,15 +188,13 @@ class Lab:
         return f"{self.url}: {', '.join(held)}"
 
 
-def open_lab(database: str | Path, settings: LabSettings = DEFAULTS.lab) -> Lab:
+def open_lab(database: str | Path) -> Lab:
     """Return what a database holds.
 
     Parameters
     ----------
     database
         A file (`lab.db`), `sqlite:///lab.db`, or `postgresql://user@host/name`.
-    settings
-        Which radii of round faces are told apart, and how cells are kept.
 
     Raises
     ------
@@ -164,7 +213,7 @@ def open_lab(database: str | Path, settings: LabSettings = DEFAULTS.lab) -> Lab:
     url = str(database)
     engine = open_database(url, writable=False)
     with read_transaction(engine) as connection:
-        arrays = tuple(_embossed_arrays(connection, engine, settings))
+        arrays = tuple(_embossed_arrays(connection, engine))
     if not arrays:
         raise LabError(
             "the database holds no encoded object",
@@ -174,9 +223,7 @@ def open_lab(database: str | Path, settings: LabSettings = DEFAULTS.lab) -> Lab:
     return Lab(url, arrays)
 
 
-def _embossed_arrays(
-    connection: Connection, engine: Engine, settings: LabSettings
-) -> Iterable[EmbossedArray]:
+def _embossed_arrays(connection: Connection, engine: Engine) -> Iterable[EmbossedArray]:
     styles: dict[tuple[int, str, SymbolStyle], list[RegisteredStyle]] = {}
     for entry in read_styles(connection):
         styles.setdefault((entry.array_id, entry.alphabet, entry.style), []).append(entry)
@@ -193,7 +240,7 @@ def _embossed_arrays(
         faces, owners = np.unique(mine[:, 2:4], axis=0, return_inverse=True)
         keys = cell_keys(array.columns, mine[:, 0], mine[:, 1])
         dense = None
-        if array.rows * array.columns <= settings.dense:
+        if array.rows * array.columns <= DENSE_CELLS:
             dense = np.full(array.rows * array.columns, len(mine), np.int32)
             dense[keys] = np.arange(len(mine))
         yield EmbossedArray(
@@ -208,25 +255,23 @@ def _embossed_arrays(
             names={entry.object_id: entry.name for entry in objects},
             engine=engine,
             radii_mm=radii_of(
-                (one for entry in objects for one in surfaces.get(entry.object_id, ())), settings
+                one for entry in objects for one in surfaces.get(entry.object_id, ())
             ),
         )
 
 
-def radii_of(
-    surfaces: Iterable[Developable], settings: LabSettings = DEFAULTS.lab
-) -> tuple[float, ...]:
+def radii_of(surfaces: Iterable[Developable]) -> tuple[float, ...]:
     """Return radii of which one is near to each at which a plate can touch round faces.
 
     A cone has all radii from its largest down.
     """
-    least, finer = settings.least_mm, settings.finer
+    least, finer = LEAST_RADIUS_MM, RADIUS_FACTOR
     steps: set[int] = set()
     for surface in surfaces:
         if surface.concave:
             continue  # a flat plate feels nothing in a hole
         largest = surface.radius_mm / math.cos(surface.half_angle_rad)
-        last = round(math.log(min(max(largest, least), settings.most_mm) / least) / math.log(finer))
+        last = round(math.log(min(max(largest, least), MOST_RADIUS_MM) / least) / math.log(finer))
         steps |= set(range(last + 1)) if surface.half_angle_rad else {last}
     return tuple(least * finer**step for step in sorted(steps))
 

@@ -7,12 +7,10 @@ face frame where the layout put it; the two frames differ by the placement's tur
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.surface.polygon import FaceRegion, polygon
 from recognizer.touch.as_built import FeltScale
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import EmbossedArray, EncodedFace
@@ -73,12 +71,6 @@ def felt_scale(face: EncodedFace, fit: Fit, expected: float) -> FeltScale | None
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
     covariance = np.array([c * x + s * y, c * y - s * x, turn, variance])
     return FeltScale(float(fit.nuisance[3]), covariance, expected)
-
-
-@lru_cache(maxsize=64)
-def outline_of(face: EncodedFace) -> FaceRegion:
-    """Return the outline of a face, in its frame."""
-    return polygon(list(face.polygon_mm))
 
 
 def inside_mm(face: EncodedFace, x: float, y: float) -> float:

@@ -1,34 +1,63 @@
-"""What is prepared once for a lab, a sensor and settings: templates and banks of lattices."""
+"""What is prepared once for a lab and a sensor: templates, and banks of lattices to search by.
+
+Both depend on alphabet, style and sensor alone, and take longer to compute than a touch to read:
+.1 s for tabs, seconds for a pad. They are kept between runs (`encoded_objects.base.cache`).
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+import generator.alphabet
+import probe.contact
+import recognizer.touch.symbols
+from encoded_objects.base.cache import cached_bytes, content_key
 from encoded_objects.base.sensor_type import SensorType
+from generator.alphabet import Alphabet, SymbolStyle
 from recognizer.touch.lab import EmbossedArray, Lab
-from recognizer.touch.settings import DEFAULTS, ReaderSettings
-from recognizer.touch.symbols.search import Bank
-from recognizer.touch.symbols.template import ResponseTemplate
-from recognizer.touch.template_cache import template_and_bank
+from recognizer.touch.options import DEFAULTS, ReaderOptions
+from recognizer.touch.signal import Signal
+from recognizer.touch.symbols.image import Image, image_of_signal
+from recognizer.touch.symbols.search import Bank, bank_of
+from recognizer.touch.symbols.template import ResponseTemplate, template_of
 
-Prepared = tuple[EmbossedArray, ResponseTemplate, Bank]
+KIND = "templates"  #: of cached files
+CODE = (generator.alphabet, probe.contact, recognizer.touch.symbols)  #: changes what is kept
+
+#: Tactels to a symbol below which numbers of tactels shrink with the square of the share: 8x8 at
+#: 3 mm, 7 mm symbols, 40 typical touches mid-face, 0 wrong: 38 answered, 0 without it.
+COARSE = 8.0
+
+_NUMBERS = np.dtype("<i8")
+
+
+class Prepared(NamedTuple):
+    """One array of a lab as a sensor feels it."""
+
+    embossed: EmbossedArray
+    template: ResponseTemplate
+    bank: Bank
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PreparedLab:
-    """A lab as a sensor feels it, with the numbers that decide; `Reader` is one."""
+    """A lab as a sensor feels it; `Reader` is one."""
 
     lab: Lab
     sensor: SensorType = field(default_factory=SensorType)
-    settings: ReaderSettings = DEFAULTS
+    options: ReaderOptions = DEFAULTS
     prepared: tuple[Prepared, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "settings", settings_for(self.lab, self.sensor, self.settings))
-        settings = self.settings.template, self.settings.search
         made = tuple(
-            (each, *template_and_bank(each.alphabet, each.style, self.sensor, *settings))
+            Prepared(each, *template_and_bank(each.alphabet, each.style, self.sensor))
             for each in self.lab.arrays
         )
         object.__setattr__(self, "prepared", made)
@@ -36,22 +65,82 @@ class PreparedLab:
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.lab}; {self.sensor.name}, {self.sensor.overlay.kind})"
 
+    def image(self, signal: Signal, prepared: Prepared) -> Image:
+        """Return what is fitted of a touch of one array."""
+        height_mm, share = prepared.embossed.style.height_mm, cell_share(self.lab, self.sensor)
+        return image_of_signal(
+            self.sensor, signal, prepared.template, height_mm, self.options, share
+        )
 
-def settings_for(lab: Lab, sensor: SensorType, settings: ReaderSettings) -> ReaderSettings:
-    """Return settings whose numbers of tactels suit a sensor that has few of them on a symbol.
 
-    As they are where the smallest symbols of the lab lie under `BeliefSettings.coarse` tactels or
-    more, as all do on `fsr-16`.
+def cell_share(lab: Lab, sensor: SensorType) -> float:
+    """Return by how much numbers of tactels on a cell shrink, on a sensor with few on a symbol.
+
+    1 where the smallest symbols of the lab lie under `COARSE` tactels or more, as all do on
+    `fsr-16`.
     """
     few = min((each.style.pitch_mm for each in lab.arrays), default=math.inf) / sensor.pitch_mm
-    share = min(1.0, few**2 / settings.belief.coarse) ** 2
-    if share == 1.0:
-        return settings
-    belief, hypotheses = settings.belief, settings.hypotheses
-    return replace(
-        settings,
-        belief=replace(belief, whole=share * belief.whole, coarse=few**2),
-        hypotheses=replace(
-            hypotheses, corner=share * hypotheses.corner, heavy=share * hypotheses.heavy
-        ),
+    return min(1.0, few**2 / COARSE) ** 2
+
+
+@lru_cache(maxsize=16)
+def template_and_bank(
+    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType
+) -> tuple[ResponseTemplate, Bank]:
+    """Return the template of an alphabet as a sensor feels it, and the bank to search by."""
+    key = content_key((alphabet, style, sensor, np.__version__), _sources())
+
+    def made() -> bytes:
+        template = template_of(alphabet, style, sensor)
+        return _packed(template, bank_of(template, sensor))
+
+    return _unpacked(cached_bytes(KIND, key, made))
+
+
+def _sources() -> list[Path]:
+    return [file for package in CODE for file in Path(package.__path__[0]).glob("*.py")]
+
+
+def _packed(template: ResponseTemplate, bank: Bank) -> bytes:
+    """Return both as bytes: every array as its number of axes, its shape, its values."""
+    numbers = (template.pitch_mm, template.half_mm, template.ink, template.step_mm)
+    arrays = (
+        np.array(numbers, "<f8"),
+        np.array((template.order, *bank.shape, bank.reach, bank.rim), _NUMBERS),
+        template.rimmed.astype("<f4"),
+        bank.taps.astype("<i4"),
+        bank.even.astype("<f4"),
+        bank.odd.astype("<f4"),
+        bank.lookups.astype("<i4"),
+        bank.rotations_rad.astype("<f8"),
+        bank.shifts_mm.astype("<f8"),
     )
+    return b"".join(
+        np.array((one.ndim, *one.shape), _NUMBERS).tobytes()
+        + one.tobytes()
+        + bytes(-one.nbytes % 8)
+        for one in arrays
+    )
+
+
+def _unpacked(content: bytes) -> tuple[ResponseTemplate, Bank]:
+    at = 0
+
+    def read(kind: str) -> NDArray[Any]:
+        nonlocal at
+        axes = int(np.frombuffer(content, _NUMBERS, 1, at)[0])
+        shape = np.frombuffer(content, _NUMBERS, axes, at + _NUMBERS.itemsize)
+        at += (1 + axes) * _NUMBERS.itemsize
+        values = np.frombuffer(content, kind, int(shape.prod()), at).reshape(shape)
+        at += values.nbytes + -values.nbytes % 8
+        return values
+
+    numbers, counts = read("<f8").tolist(), read(_NUMBERS.str).tolist()
+    pitch_mm, half_mm, ink, step_mm = numbers
+    order, rows, columns, reach, rim = counts
+    template = ResponseTemplate(pitch_mm, order, half_mm, read("<f4"), ink, step_mm)
+    bank = Bank(
+        (rows, columns), reach, rim, read("<i4"), read("<f4"), read("<f4"), read("<i4"),
+        read("<f8"), read("<f8"),
+    )  # fmt: skip
+    return template, bank

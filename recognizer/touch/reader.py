@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Reader(PreparedLab):
-    """What reads touches; prepared once for a lab and a sensor.
+    """Reads touches; prepared once for a lab and a sensor.
 
     Parameters
     ----------
     lab
         Of `open_lab`.
     sensor
-        That feels; by default `fsr-16` with tabs.
-    settings
-        Every number that decides.
+        By default `fsr-16` with tabs.
+    options
+        How touches are read, and what an answer takes.
     state
-        What is known of that very sensor, as `recognizer.sensor` learns it; None: nothing.
+        Of that very sensor, as `recognizer.sensor` learns it; None: nothing is known.
 
     Examples
     --------
@@ -82,14 +82,14 @@ class Reader(PreparedLab):
         trust: ArrayLike | None = None,
         seq: int = 0,
     ) -> Recognition:
-        """Return what one touch says.
+        """Return the answer of one touch.
 
         Parameters
         ----------
         counts
             (rows, columns) readings that rise with force, as the sensor gives them.
         calibration
-            Of the sensor: what turns counts into newtons.
+            Of the sensor: turns counts into newtons.
         trust
             (rows, columns) 0 for bad tactels, 1 for good ones.
         seq
@@ -109,7 +109,7 @@ class Reader(PreparedLab):
         calibration: Calibration | None = None,
         trust: ArrayLike | None = None,
     ) -> Signal:
-        """Return what of a touch is worth fitting: newtons where there is a calibration."""
+        """Return the signal of a touch: newtons where there is a calibration."""
         values = np.asarray(counts, np.float64)
         known = None if trust is None else np.asarray(trust, np.float64)
         shape, sensor = (self.sensor.rows, self.sensor.columns), self.sensor
@@ -140,7 +140,7 @@ class Reader(PreparedLab):
             values = state.correct(values, newtons=newtons)
             known = np.where(state.masked, 0.0, 1.0) * (1.0 if known is None else known)
         signal = signal_of(
-            values, trust=known, newtons=newtons, sensor=sensor, settings=self.settings.signal
+            values, trust=known, newtons=newtons, sensor=sensor, options=self.options
         )
         if state is None:
             return signal
@@ -153,9 +153,9 @@ class Reader(PreparedLab):
         every: bool = False,
         calibration: str | Path | None = None,
     ) -> Iterator[Recognition]:
-        """Yield what the touches of a recording say, as `recognize-object` does.
+        """Yield the answers of the touches of a recording, as `recognize-object` does.
 
-        A recording that tells which sensor type and overlay felt it is read by that.
+        A recording that names sensor type and overlay is read by those.
 
         Parameters
         ----------
@@ -180,5 +180,5 @@ class Reader(PreparedLab):
         if source.notice:
             warnings.warn(source.notice, stacklevel=2)
         reader = self if source.sensor == self.sensor else replace(self, sensor=source.sensor)
-        for touch in source.touches(opened.frames(), self.settings):
+        for touch in source.touches(opened.frames(), self.options):
             yield reader.read(touch.counts, calibration=source.calibration, seq=touch.seq)

@@ -1,30 +1,29 @@
-"""Frame -> Recognition: the stages of reading, one after another. Thesis 6.
+"""Signal -> Recognition: the stages of reading, one after another. Thesis 6.
 
     signal     forces and trust
     symbols    a few lattices with the scores of all cells
-    locate     the places of the database that they can be
+    hypothesis the places of the database that they can be
     verify     the best of them again, with the symbols that the database says are there
     pose       where the sensor stands on the face and on the object
 
 The answer is given only if no other place explains the image nearly as well, if it explains
 the image better than a surface with symbols of no registered place, if the sensor's centre
-lies on the face, and if symbols drawn at random would hardly match any place as well (`chance`).
+lies on the face, and if symbols drawn at random would hardly match any place as well: `verdict`
+says so. A first search is followed by a wide one where that may change the answer (`search_gate`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from recognizer.touch.belief import VerifiedHypothesis
-from recognizer.touch.cause import EXCHANGED, Cause
-from recognizer.touch.chance import expected_by_border, expected_matches
+from recognizer.touch.chance import expected_by_border, expected_matches, points_on_face
 from recognizer.touch.diagnose import diagnose
-from recognizer.touch.exchanged import exchange_halves, leaves_much
-from recognizer.touch.first_look import may_be_chance, may_tell_more
+from recognizer.touch.evidence import VerifiedHypothesis
 from recognizer.touch.hypothesis import Hypothesis, under_centre
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.next_touch import propose_next
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.pose import (
     face_covariance,
     face_pose,
@@ -35,188 +34,235 @@ from recognizer.touch.pose import (
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import (
     AMBIGUOUS,
+    EXCHANGED,
     NO_CONTACT,
     OUTSIDE,
     TOO_FEW,
+    Cause,
     Recognition,
     RunnerUp,
     refusal,
 )
-from recognizer.touch.settings import ReaderSettings
-from recognizer.touch.signal import Signal
+from recognizer.touch.search_gate import is_nearly_chance, may_find_more
+from recognizer.touch.signal import Signal, mean_of_strongest, swap_halves
 from recognizer.touch.symbols.fit import Fit
+from recognizer.touch.symbols.template import STROKE_UNIT_MM
 from recognizer.touch.verdict import (
-    Evidence,
     may_count_border,
     reject_chance,
     reject_few,
     reject_reason,
 )
-from recognizer.touch.verify import verify_hypotheses
+from recognizer.touch.verify import TouchImages, verify_hypotheses
+
+#: Doubt up to which a wide search confirms an answer that chance nearly allows. A wrong soft one of
+#: 20,000 touches had 8e-5 and 7 nats at first and .006 then; of 1,074 right soft ones (seed 1301)
+#: 72 are looked at, all below 6e-4 then.
+CONFIRMED_DOUBT = 1e-3
+
+# Which answers are read again with the halves of the sensor swapped. Of 286 answers at edges and in
+# corners (own engine, seeds 1701, 1702) no pressed tactel lies so far beyond the face, of those on
+# another part as well (1703) a third have more than `BEYOND`; of 545 at edges and amid faces (1902,
+# 1903) none is explained so poorly, of worn ones a third.
+PRESSED = 0.2  #: share of the strongest readings from which a tactel is pressed
+BEYOND_MM = 1.5  #: from the outline of the face, for a tactel to lie beyond it
+BEYOND = 0.15  #: share of the pressed tactels that do
+POOR_RATIO = 25.0  #: nats over symbols of no registered place, and ...
+POORLY_EXPLAINED = 0.86  #: ... share of the image, below which symbols explain it poorly
+SOFT = 30.0  #: times the noise up to which the strongest are weak, and that is why
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TouchReading:
+    """What one touch shows."""
+
+    answer: Recognition
+    found: list[VerifiedHypothesis]  #: places that it may be, first of them the one that was judged
+    touch: TouchImages
+
+    @property
+    def best(self) -> VerifiedHypothesis | None:
+        """The place that was judged; None where there is none."""
+        return self.found[0] if self.found else None
 
 
 def recognise(reader: PreparedLab, signal: Signal, seq: int = 0) -> Recognition:
-    """Return what one touch says, and where to touch next if that is not enough."""
-    answer, found = recognise_with_rivals(reader, signal, seq)
-    cause = answer.cause if answer or answer.cause else diagnose(reader, signal, found)
-    return replace(answer, next=propose_next(reader, signal, answer, found), cause=cause)
+    """Return the answer of one touch, and where to touch next if that is not enough."""
+    reading = read_touch(reader, signal, seq)
+    answer = reading.answer
+    cause = answer.cause if answer or answer.cause else diagnose(reading.touch, reading.found)
+    step = propose_next(reader, signal, answer, reading.found)
+    return replace(answer, next=step, cause=cause)
 
 
-def recognise_with_hypothesis(
-    reader: PreparedLab, signal: Signal, seq: int = 0
-) -> tuple[Recognition, VerifiedHypothesis | None]:
-    """Return what one touch says, and the hypothesis that was judged; None where there is none."""
-    answer, found = recognise_with_rivals(reader, signal, seq)
-    return answer, found[0] if found else None
+def read_touch(reader: PreparedLab, signal: Signal, seq: int = 0) -> TouchReading:
+    """Return the answer of one touch, and the places that it may be."""
+    touch = TouchImages(reader, signal)
+    answer, found = _search_twice(touch, seq)
+    swapped = _swapped_halves(touch, found[0]) if answer else None
+    if swapped is not None:
+        answer = replace(refusal(seq, AMBIGUOUS, margin=0.0), cause=swapped)
+    return TouchReading(answer, found, touch)
 
 
-def recognise_with_rivals(
-    reader: PreparedLab, signal: Signal, seq: int = 0
-) -> tuple[Recognition, list[VerifiedHypothesis]]:
-    """Return what a touch says, and all hypotheses, first of them the one that was judged."""
-    answer, found = _try_twice(reader, signal, seq)
-    exchanged = _read_exchanged(reader, signal, found[0]) if answer else None
-    if exchanged is not None:
-        return replace(refusal(seq, AMBIGUOUS, margin=0.0), cause=exchanged), found
-    return answer, found
-
-
-def _try_twice(
-    reader: PreparedLab, signal: Signal, seq: int
-) -> tuple[Recognition, list[VerifiedHypothesis]]:
-    """Return what the first try says, or the second where that is not enough."""
-    if not signal.contact:
+def _search_twice(touch: TouchImages, seq: int) -> tuple[Recognition, list[VerifiedHypothesis]]:
+    """Return the answer of a first search, or of a wide one where that may change it."""
+    if not touch.signal.contact:
         return refusal(seq, NO_CONTACT), []
-    settings = reader.settings
-    first = verify_hypotheses(reader, signal, settings.first)
-    answer, evidence = _answer(first, settings, seq)
-    judged = _judge(reader, first, answer, evidence)
-    if not may_tell_more(reader, signal, answer, judged, first[0] if first else None, evidence):
-        if judged and evidence is not None and may_be_chance(reader, judged, evidence):
-            return _look_again(reader, signal, judged, first)
+    options = touch.reader.options
+    first = verify_hypotheses(touch, options.first)
+    answer = _best_answer(first, options, seq)
+    judged = _judge(touch.reader, first, answer)
+    best = first[0] if first else None
+    if not may_find_more(touch.reader, touch.signal, answer, judged, best):
+        if judged and best is not None and is_nearly_chance(judged, best.evidence):
+            return _confirm(touch, judged, first)
         return judged, first
-    # Spend more where it is needed: no answer yet, or one that few cells speak for.
-    second = verify_hypotheses(reader, signal, settings.thorough)
-    final, evidence = _answer(second, settings, seq)
+    second = verify_hypotheses(touch, options.thorough)
+    final = _best_answer(second, options, seq)
     if answer and final and not first[0].coincides(second[0]):
         return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), second
-    return _judge(reader, second, final, evidence), second
+    return _judge(touch.reader, second, final), second
 
 
-def _look_again(
-    reader: PreparedLab, signal: Signal, answer: Recognition, first: list[VerifiedHypothesis]
+def _confirm(
+    touch: TouchImages, answer: Recognition, first: list[VerifiedHypothesis]
 ) -> tuple[Recognition, list[VerifiedHypothesis]]:
-    """Return an answer that chance nearly allows, or the refusal where a wide search takes it back.
+    """Return an answer that chance nearly allows, or a refusal where a wide search says so.
 
     A soft touch may hold the true place too weakly for a first search, and another one whose pose
     and gain happen to fit.
     """
-    second = verify_hypotheses(reader, signal, reader.settings.thorough)
+    second = verify_hypotheses(touch, touch.reader.options.thorough)
     margin, runner_up = answer.margin, answer.runner_up
     if not second or not first[0].coincides(second[0]):
         return refusal(answer.seq, AMBIGUOUS, margin=0.0, runner_up=runner_up), second
-    doubt = _doubt_of(reader, second[0], answer)
-    reason = reject_chance(doubt, reader.settings.belief.doubt_again)
+    doubt = _doubt_of(touch.reader, second[0], _margin_of(answer))
+    reason = reject_chance(doubt, CONFIRMED_DOUBT)
     if not reason:
         return answer, first
     return refusal(answer.seq, reason, margin=margin, runner_up=runner_up, doubt=doubt), second
 
 
-def _read_exchanged(reader: PreparedLab, signal: Signal, best: VerifiedHypothesis) -> Cause | None:
-    """Return which halves of the sensor seem exchanged, as a touch is read better so; None if none.
+def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: int) -> Recognition:
+    """Return the answer of hypotheses, best first, before chance is asked.
 
-    Asked where its answer leaves much of it over; not of a sensor that was learned, which tells.
-    """
-    settings = reader.settings
-    if reader.sensor.overlay.kind != "tab" or signal.state is not None:
-        return None
-    if not leaves_much(best, settings.exchanged):
-        return None
-    for axis in (0, 1):
-        found = verify_hypotheses(reader, exchange_halves(signal, axis), settings.first)
-        answer, evidence = _answer(found, settings, 0)
-        if _judge(reader, found, answer, evidence) and found[0].score > best.score:
-            return Cause(EXCHANGED, {"columns": float(axis)})
-    return None
-
-
-def _answer(
-    found: list[VerifiedHypothesis], settings: ReaderSettings, seq: int
-) -> tuple[Recognition, Evidence | None]:
-    """Return the answer of hypotheses, best first, and the evidence for the best; None of none.
-
-    A place one pitch beside is the same place up to a cell's rounding and tells nothing of the
-    margin, but for one case: it explains the image nearly as well. So it does where fewer cells
-    are seen than the array's window takes (large pitches, product arrays), or next to an edge.
+    A place one pitch off is the same place up to a cell's rounding and says nothing of the margin,
+    but for one case: it explains the image nearly as well. So it does where fewer cells are seen
+    than the array's window takes (large pitches, product arrays), or next to an edge.
     """
     if not found:
-        return refusal(seq, TOO_FEW), None
-    best, limits = found[0], settings.belief
+        return refusal(seq, TOO_FEW)
+    best = found[0]
     other = next((one for one in found[1:] if not best.same_place(one)), None)
     margin = math.inf if other is None else best.score - other.score
     runner_up = None
     if other is not None:
         face = other.embossed.face(other.hypothesis.face)
         runner_up = RunnerUp(face.object, face.face, other.index)
-    evidence = best.evidence()
     adjacent = next((one for one in found[1:] if not best.coincides(one)), None)
     nearest = margin
-    if adjacent is not None and best.score - adjacent.score < limits.margin_by_few:
+    if adjacent is not None and best.score - adjacent.score < options.margin_by_few:
         nearest = min(margin, best.score - adjacent.score)
-    reason = reject_reason(evidence, nearest, limits)
+    reason = reject_reason(best.evidence, nearest, options)
     if reason in ("", AMBIGUOUS):
         margin = nearest
-    answer = answer_at(
-        best.embossed, best.fit if reason else best.last_fit(), best.hypothesis, settings, seq,
+    return answer_at(
+        best.embossed, best.fit if reason else best.last_fit(), best.hypothesis, options, seq,
         reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
-    return answer, evidence
 
 
 def _judge(
-    reader: PreparedLab,
-    found: list[VerifiedHypothesis],
-    answer: Recognition,
-    evidence: Evidence | None,
+    reader: PreparedLab, found: list[VerifiedHypothesis], answer: Recognition
 ) -> Recognition:
     """Return an answer with its doubt, or as refused: for few symbols, or for chance."""
-    if not answer or evidence is None:
+    if not answer:
         return answer
-    settings, best, doubt = reader.settings, found[0], None
-    margin = math.inf if answer.margin is None else answer.margin
+    options, best, doubt, margin = reader.options, found[0], None, _margin_of(answer)
     matches = expected_matches(
-        reader.lab.arrays, best.embossed, best.fit, best.hypothesis, settings, borders=False
+        reader.lab.arrays, best.embossed, best.fit, best.hypothesis, borders=False
     )
-    reason = reject_few(evidence, margin, matches, settings.belief)
+    reason = reject_few(best.evidence, margin, matches, options)
     if not reason:
-        doubt = _doubt_of(reader, best, answer)
-        reason = reject_chance(doubt, settings.belief.doubt)
+        doubt = _doubt_of(reader, best, margin)
+        reason = reject_chance(doubt, options.doubt)
     if not reason:
         return replace(answer, doubt=doubt)
     return refusal(answer.seq, reason, margin=margin, runner_up=answer.runner_up, doubt=doubt)
 
 
-def _doubt_of(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> float:
+def _margin_of(answer: Recognition) -> float:
+    return math.inf if answer.margin is None else answer.margin
+
+
+def _doubt_of(reader: PreparedLab, best: VerifiedHypothesis, margin: float) -> float:
     """Return how many places a foreign surface matches as well, by its border where that counts."""
-    settings, arrays = reader.settings, reader.lab.arrays
-    doubt = expected_matches(arrays, best.embossed, best.fit, best.hypothesis, settings)
-    tabs = reader.sensor.overlay.kind == "tab"  # a pad or a gel hides where a face ends
-    margin = math.inf if answer.margin is None else answer.margin
+    arrays, overlay = reader.lab.arrays, reader.sensor.overlay
+    doubt = expected_matches(arrays, best.embossed, best.fit, best.hypothesis)
+    # a pad or a gel hides where a face ends
     if (
-        tabs
-        and reject_chance(doubt, settings.belief.doubt)
-        and may_count_border(best.evidence(), margin, settings.belief)
+        overlay.kind == "tab"
+        and reject_chance(doubt, reader.options.doubt)
+        and may_count_border(best.evidence, margin, reader.options)
     ):
-        tip_mm = reader.sensor.overlay.tab_diameter_mm
-        doubt = min(doubt, expected_by_border(arrays, best, tip_mm, settings))
+        doubt = min(doubt, expected_by_border(arrays, best, overlay.tab_diameter_mm))
     return doubt
+
+
+def _swapped_halves(touch: TouchImages, best: VerifiedHypothesis) -> Cause | None:
+    """Return which halves of the sensor seem swapped, as the touch is read better so; or None.
+
+    Asked where the answer leaves a large residual; not of a sensor that was learned, whose wiring
+    is known.
+    """
+    reader, signal = touch.reader, touch.signal
+    if reader.sensor.overlay.kind != "tab" or signal.state is not None:
+        return None
+    if not has_residual(best):
+        return None
+    for axis in (0, 1):
+        swapped = replace(
+            signal,
+            forces=swap_halves(signal.forces, axis),
+            trust=swap_halves(signal.trust, axis),
+        )
+        found = verify_hypotheses(TouchImages(reader, swapped), reader.options.first)
+        answer = _judge(reader, found, _best_answer(found, reader.options, 0))
+        if answer and found[0].score > best.score:
+            return Cause(EXCHANGED, {"columns": float(axis)})
+    return None
+
+
+def has_residual(found: VerifiedHypothesis) -> bool:
+    """Return whether a place leaves much of a touch unexplained, and not because it is soft.
+
+    Tactels are pressed where the face has ended, or its symbols explain the image poorly. Another
+    part may stand there, or symbols may be worn; or one half of the sensor shows the readings of
+    the other (`recognizer.sensor.wiring`), and with the halves swapped all of it lies on one face.
+    """
+    evidence, image = found.evidence, found.image
+    forces = image.forces * image.trust
+    strongest = mean_of_strongest(forces)
+    poorly = evidence.log_likelihood_ratio < POOR_RATIO and evidence.explained < POORLY_EXPLAINED
+    if poorly and strongest >= SOFT * image.noise:
+        return True
+    face = found.embossed.face(found.hypothesis.face)
+    if face.round is not None:
+        return False
+    points = points_on_face(found, face)[forces > PRESSED * strongest]
+    outside = points[~face.region.contains(points)]
+    least = BEYOND * len(points)
+    if len(outside) < least:
+        return False
+    return bool((face.region.distance_mm(outside) > BEYOND_MM).sum() >= least)
 
 
 def answer_at(
     embossed: EmbossedArray,
     fit: Fit,
     hypothesis: Hypothesis,
-    settings: ReaderSettings,
+    options: ReaderOptions,
     seq: int,
     *,
     reason: str,
@@ -225,18 +271,18 @@ def answer_at(
 ) -> Recognition:
     """Return the answer at a place, or the refusal where there is a reason or no face.
 
-    The pose is that on the printed part, as far as it is known how that came out.
+    The pose is that on the printed part, as far as its print is known.
     """
     if reason:
         return refusal(seq, reason, margin=margin, runner_up=runner_up)
     face = embossed.face(hypothesis.face)
     pose = face_pose(embossed, face, hypothesis, fit)
     inside = inside_mm(face, float(pose[0, 3]), float(pose[1, 3]))
-    if inside < -settings.belief.rim_mm:
+    if inside < -options.rim_mm:
         return refusal(seq, OUTSIDE, margin=margin, runner_up=runner_up)
     covariance = face_covariance(face, fit.covariance)
     if face.printed is not None:
-        felt = felt_scale(face, fit, settings.refine.prior[-1])
+        felt = felt_scale(face, fit, options.scale_sd)
         pose, covariance = face.printed.pose(pose, covariance, felt)
     return Recognition(
         seq=seq,
@@ -251,6 +297,6 @@ def answer_at(
         reason="",
         noise=fit.noise,
         scale=fit.scale,
-        stroke_mm=embossed.style.stroke_mm + fit.stroke_excess * settings.template.wider_mm,
+        stroke_mm=embossed.style.stroke_mm + fit.stroke_excess * STROKE_UNIT_MM,
         inside_mm=inside if face.round is None else None,
     )

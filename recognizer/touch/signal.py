@@ -8,17 +8,35 @@ neighbours (spikes) and dead rows or columns are told from the image itself.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.touch.around import quantile
+from recognizer.touch.options import DEFAULTS, ReaderOptions
 from recognizer.touch.sensor_state import SensorState
-from recognizer.touch.settings import DEFAULTS, SignalSettings
 
 Array = NDArray[np.float64]
+Kind = TypeVar("Kind", np.bool_, np.float64)
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+QUIET_SIGMAS = 6.0  #: standard deviations of the type's noise that a contact rises, at least
+SCALE_SIGMAS = 7.0  #: of the image's own noise, where readings are on another scale than counts
+RISEN = 6  #: tactels that must rise for a contact; a spike is one
+BACKGROUND = 0.05  #: share of the tactels below the reading that a contact rises over
+LOWEST = 0.6  #: share of the tactels among which the background is sought ...
+DENSEST = 0.4  #: ... where so many of them read most alike, and ...
+FIFTH = 0.2  #: ... no higher over the reading that `BACKGROUND` names ...
+ABOVE = 1.4  #: ... than so many times as this share of the tactels is
+STRONG = 0.95  #: share of the tactels below the reading that stands for strokes ...
+#: ... that rise over the middle so many times as this does over the lowest, unless a bare plate is
+#: pressed: 0.9-1.6 at 20-120 N; symbols 1.6-3 from 4 N on
+TAIL = 1.6
+DEAD = 0.02  #: of the median row (column): one below it is dead ...
+LIVE_NEIGHBOURS = 0.3  #: ... if both its neighbours are above this share
+STRONGEST = 12  #: tactels whose mean says how hard is pressed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +58,7 @@ def signal_of(
     floor: float | None = None,
     newtons: bool = False,
     sensor: SensorType | None = None,
-    settings: SignalSettings = DEFAULTS.signal,
+    options: ReaderOptions = DEFAULTS,
 ) -> Signal:
     """Return the signal of one image.
 
@@ -51,38 +69,36 @@ def signal_of(
     trust
         (rows, columns) of a calibration: 0 for bad tactels; 1 everywhere if not given.
     floor
-        Reading without force; by default what the lowest of the tactels read.
+        Reading without force; by default that of the lowest tactels.
     newtons
         Whether the readings are newtons.
     sensor
         Type of the sensor: where it has tactels, its bits, noise and law; as of `fsr-16` if not
         given.
-    settings
-        How far the strongest tactels must rise for a contact, and the like. Readings that are
-        no whole numbers are counts averaged, or on a scale of their own (0 ... 1): what rises out
-        of their own noise is a contact too.
+    options
+        How far the strongest tactels must rise for a contact. Readings that are no whole numbers
+        are counts averaged, or on a scale of their own (0 ... 1): a rise out of their own noise is
+        a contact too.
     """
     known = np.ones(readings.shape) if trust is None else trust.astype(np.float64)
-    if sensor is not None:
-        settings = signal_limits(sensor, settings)
-        if sensor.missing:
-            known = known * sensor.present()
+    if sensor is not None and sensor.missing:
+        known = known * sensor.present()
     good = readings[known > 0]
     if good.size == 0:
         return Signal(np.zeros(readings.shape), known, contact=False, newtons=newtons)
     good = np.sort(good)
-    lowest = float(quantile(good, settings.background)) if floor is None else floor
-    level = _background(good, lowest, settings) if floor is None else floor
+    lowest = float(quantile(good, BACKGROUND)) if floor is None else floor
+    level = _background(good, lowest) if floor is None else floor
     forces = np.maximum(readings - level, 0.0)
-    strongest = max(float(good[-settings.strongest :][0]) - lowest, 0.0)
+    strongest = max(float(good[-RISEN:][0]) - lowest, 0.0)
     if sensor is not None and sensor.exponent != 1.0 and not newtons:
         forces = forces ** (1.0 / sensor.exponent)
         strongest **= 1.0 / sensor.exponent
-    rise = settings.contact_n if newtons else settings.contact_counts
+    rise = options.contact_n if newtons else contact_counts(sensor, options)
     noise = noise_of(good)
     if not (newtons or (good == np.rint(good)).all()):  # no counts: of a scale of their own
-        rise = min(rise, settings.contact_sigmas * noise)
-    alive = _live_mask(forces, known, settings)
+        rise = min(rise, SCALE_SIGMAS * noise)
+    alive = _live_mask(forces, known)
     return Signal(forces, known * alive, strongest > rise, newtons, noise)
 
 
@@ -113,21 +129,23 @@ def noise_of(readings: Array) -> float:
     return math.sqrt(square + step**2 / 12)
 
 
-def signal_limits(sensor: SensorType, settings: SignalSettings = DEFAULTS.signal) -> SignalSettings:
-    """Return the settings for a type: a contact rises by as much of its full scale, or its noise.
+def contact_counts(sensor: SensorType | None, options: ReaderOptions = DEFAULTS) -> float:
+    """Return the rise of a contact on a type: as much of its full scale, or of its noise.
 
     Examples
     --------
-    >>> signal_limits(SensorType()) == SignalSettings()
+    >>> contact_counts(SensorType()) == ReaderOptions().contact_counts
     True
     """
+    if sensor is None:
+        return options.contact_counts
     share = sensor.full / SensorType().full
-    rise = max(settings.contact_counts * share, settings.quiet_sigmas * sensor.noise)
-    return replace(settings, contact_counts=float(rise ** (1.0 / sensor.exponent)))
+    rise = max(options.contact_counts * share, QUIET_SIGMAS * sensor.noise)
+    return float(rise ** (1.0 / sensor.exponent))
 
 
-def _background(readings: Array, low: float, settings: SignalSettings) -> float:
-    """Return what most of the lowest readings are: tactels that feel nothing, where some do.
+def _background(readings: Array, low: float) -> float:
+    """Return the mean of most of the lowest readings: of tactels that feel nothing, if some do.
 
     Where most tactels are pressed alike, readings that are low and rare are believed.
 
@@ -136,32 +154,87 @@ def _background(readings: Array, low: float, settings: SignalSettings) -> float:
     readings
         (n,) rising.
     low
-        What a few readings lie below.
+        A few readings lie below it.
     """
-    lowest = readings[: max(math.ceil(settings.lowest * readings.size), 2)]
-    count = math.ceil(settings.densest * (lowest.size - 1))
+    lowest = readings[: max(math.ceil(LOWEST * readings.size), 2)]
+    count = math.ceil(DENSEST * (lowest.size - 1))
     first = int(np.argmin(lowest[count:] - lowest[: lowest.size - count]))
-    most = low + settings.above * (float(quantile(readings, settings.fifth)) - low)
+    most = low + ABOVE * (float(quantile(readings, FIFTH)) - low)
     level = min(float(lowest[first : first + count + 1].mean()), most)
-    middle, strong = (float(quantile(readings, share)) for share in (0.5, settings.strong))
-    even = strong - middle < settings.tail * (middle - low)  # strokes leave few strong ones
+    middle, strong = (float(quantile(readings, share)) for share in (0.5, STRONG))
+    even = strong - middle < TAIL * (middle - low)  # strokes leave few strong ones
     return low if even else level
 
 
-def _live_mask(forces: Array, known: Array, settings: SignalSettings) -> Array:
+def _live_mask(forces: Array, known: Array) -> Array:
     """Return 0 for whole rows and columns that read nothing between ones that do."""
     alive = np.ones(forces.shape)
     for axis in (0, 1):
         total = (forces * known).sum(axis=1 - axis)
         middle = quantile(np.sort(total), 0.5)
-        dead = total < settings.dead * middle
+        dead = total < DEAD * middle
         dead[0] = dead[-1] = False  # at the rim: rather the edge of a face
         if not dead.any():
             continue
-        neighbours = np.minimum(np.roll(total, 1), np.roll(total, -1)) > settings.beside * middle
+        neighbours = np.minimum(np.roll(total, 1), np.roll(total, -1)) > LIVE_NEIGHBOURS * middle
         where = np.flatnonzero(dead & neighbours)
         if axis == 0:
             alive[where] = 0
         else:
             alive[:, where] = 0
     return alive
+
+
+def combine_around(image: NDArray[Kind], reach: int, combine: np.ufunc) -> NDArray[Kind]:
+    """Return the maximum (`np.maximum`), any or all of the values about each tactel.
+
+    The square of 2 `reach` + 1 tactels is gone through line by line, first along columns and then
+    along rows; beyond the rim of the matrix nothing counts.
+
+    Parameters
+    ----------
+    image
+        (rows, columns).
+    combine
+        Of two values; of which it does not matter in what order they come, nor how often.
+
+    Examples
+    --------
+    >>> combine_around(np.array([[0.0, 3.0, 1.0, 1.0]]), 1, np.maximum)
+    array([[3., 3., 3., 1.]])
+    """
+    found: Any = image
+    for axis in (0, 1):
+        line = found.swapaxes(0, axis)
+        found = line.copy()
+        for away in range(1, min(reach, len(line) - 1) + 1):
+            combine(found[away:], line[:-away], out=found[away:])
+            combine(found[:-away], line[away:], out=found[:-away])
+        found = found.swapaxes(0, axis)
+    return np.asarray(found)
+
+
+def quantile(ordered: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    """Return the quantile of values that rise along the last axis, as `numpy.quantile` has it.
+
+    Examples
+    --------
+    >>> float(quantile(np.array([0.0, 1.0, 5.0]), 0.75))
+    3.0
+    """
+    at = (ordered.shape[-1] - 1) * share
+    low = min(int(at), ordered.shape[-1] - 1)
+    one, other = ordered[..., low], ordered[..., min(low + 1, ordered.shape[-1] - 1)]
+    part = at - low
+    between = other - one
+    return np.asarray(one + between * part if part < 0.5 else other - between * (1 - part))
+
+
+def mean_of_strongest(forces: NDArray[np.float64], count: int = STRONGEST) -> float:
+    """Return the mean of so many of the highest readings."""
+    return float(np.sort(forces, axis=None)[-count:].mean())
+
+
+def swap_halves(image: NDArray[Scalar], axis: int) -> NDArray[Scalar]:
+    """Return an image (rows, columns) with its halves along `axis` swapped."""
+    return np.roll(image, image.shape[axis] // 2, axis)

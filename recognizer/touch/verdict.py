@@ -19,8 +19,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW
-from recognizer.touch.settings import BeliefSettings
 
 # With these and the margins of the reader's options, 100,000 touches of 40 objects, a fifth of them
 # of surfaces of no database, gave 0 wrong answers, and an answer to 99.6 % of those that show
@@ -61,7 +61,7 @@ class Evidence:
 def reject_reason(
     evidence: Evidence,
     margin: float,
-    limits: BeliefSettings,
+    options: ReaderOptions,
     *,
     least_ratio: float = RATIO,
     wrong_share: float = 0.0,
@@ -83,9 +83,9 @@ def reject_reason(
         return NOT_ENCODED
     if evidence.touches > 1 and 2 * evidence.agreeing <= evidence.touches:
         return TOO_FEW  # few of many touches agree on some place by chance
-    if evidence.log_likelihood_ratio < least_ratio or evidence.inliers < limits.least_inliers:
+    if evidence.log_likelihood_ratio < least_ratio or evidence.inliers < options.least_inliers:
         return TOO_FEW
-    return AMBIGUOUS if margin < limits.margin else ""
+    return AMBIGUOUS if margin < options.margin else ""
 
 
 def is_encoded(evidence: Evidence, contradictions: float = CONTRADICTIONS) -> bool:
@@ -105,7 +105,7 @@ def least_explained(cells: int) -> float:
     return EXPLAINED if cells < MANY_INLIERS else EXPLAINED_BY_MANY
 
 
-def reject_few(evidence: Evidence, margin: float, matches: float, limits: BeliefSettings) -> str:
+def reject_few(evidence: Evidence, margin: float, matches: float, options: ReaderOptions) -> str:
     """Return why a place of few agreeing cells is no answer; "" where they are many or enough.
 
     Parameters
@@ -117,7 +117,7 @@ def reject_few(evidence: Evidence, margin: float, matches: float, limits: Belief
         return ""
     if matches > NAMED:
         return TOO_FEW
-    return AMBIGUOUS if margin < limits.margin_by_few else ""
+    return AMBIGUOUS if margin < options.margin_by_few else ""
 
 
 def reject_chance(doubt: float, most: float) -> str:
@@ -125,7 +125,7 @@ def reject_chance(doubt: float, most: float) -> str:
     return BY_CHANCE if doubt > most else ""
 
 
-def may_count_border(evidence: Evidence, margin: float, limits: BeliefSettings) -> bool:
+def may_count_border(evidence: Evidence, margin: float, options: ReaderOptions) -> bool:
     """Return whether a place lacks nothing but symbols, so that its border may count for it.
 
     Where symbols of it are not felt, or read as others, the face may be another one, whose border
@@ -134,5 +134,5 @@ def may_count_border(evidence: Evidence, margin: float, limits: BeliefSettings) 
     return (
         evidence.worn <= WORN_WITH_BORDER
         and evidence.contradictions == 0
-        and margin >= limits.margin_by_few
+        and margin >= options.margin_by_few
     )

@@ -1,99 +1,167 @@
-"""Image -> the places that it can be, each with what the database holds there fitted to it.
+"""Image -> the places that it can be, each with the registered symbols fitted to it. Thesis 6.3.
 
-A place that the symbols read so far allow is looked at again with all symbols that the database
-says are in view, then its rivals under that fit, wherever in the database they are. Thesis 6.3.
+A place that the symbols read so far allow is fitted again with all symbols that the database says
+are in view, then its rivals under that fit, wherever in the database they are.
+
+A plate touches a round face along a line, and the face falls away to both sides. Three things
+differ from a flat face: the depth of the plate (`image.bend_image`), the point of the unrolled
+plane under a tactel, and that the place decides the curvature. The image shows roughly along which
+line and under which radius it lies (`symbols.curvature`); symbols are read under that, and each
+place that they can be is verified under the curvature that the face has there.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import lru_cache
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from recognizer.touch.belief import VerifiedHypothesis
-from recognizer.touch.hypothesis import Hypothesis, log_likelihoods_at, shown_at
+from encoded_objects.base.sensor_type import SensorType
+from generator.database.registered import Bend
+from recognizer.touch.evidence import VerifiedHypothesis
+from recognizer.touch.hypothesis import (
+    KEPT,
+    NEAR,
+    Hypothesis,
+    find_hypotheses,
+    find_rivals,
+    labels_at,
+    log_likelihood,
+    log_likelihoods_at,
+)
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import find_hypotheses, find_rivals
-from recognizer.touch.prepare import PreparedLab
-from recognizer.touch.round import verify_on_round_faces
-from recognizer.touch.settings import FitSettings
+from recognizer.touch.options import Effort
+from recognizer.touch.pose import face_pose
+from recognizer.touch.prepare import Prepared, PreparedLab
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.fit import Fit, fit_lattices, score_cells
-from recognizer.touch.symbols.gain import Image, image_of_signal
-from recognizer.touch.symbols.kernels import kernels_in_use
-from recognizer.touch.symbols.refine import refine_lattices
-from recognizer.touch.symbols.template import ResponseTemplate
+from recognizer.touch.symbols.curvature import BendGuess, guess_bends
+from recognizer.touch.symbols.fit import (
+    CoarseSearch,
+    Fit,
+    fit_lattices,
+    refine_lattices,
+    score_cells,
+    search_image,
+)
+from recognizer.touch.symbols.image import Image, bend_image
 
-Fitted = tuple[tuple[Image, tuple[Fit, ...]], ...]
+STEPS = 4  #: of damped least squares, of a place with known symbols
+
+# Of round faces (`tests/bench/round_faces.py`).
+BENDS = 2  #: curvatures that an image is read under
+THOROUGH_BENDS = 5  #: in the second search, ...
+#: ... each with this effort: several curvatures do what several gains do on a flat face
+EACH_BEND = Effort(candidates=8, steps=3, finalists=3, final_steps=4)
+#: Factors by which a face is taken to fall away less: a force law that rises less than the one that
+#: is taken makes a strip look so.
+SHARES = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)
+FIRST_SHARES = (0.65, 0.8, 1.0)  #: of the first round of verifying
+TURNED_RAD = 0.5  #: by which lines at a place may differ from those that the image shows
+RADIUS_FACTOR = 2.5  #: by which radii may
+SAME_RAD = 0.05  #: within which two curvatures are one
+SAME_FACTOR = 1.1
 
 
-def verify_hypotheses(
-    reader: PreparedLab, signal: Signal, effort: FitSettings
-) -> list[VerifiedHypothesis]:
+@dataclass(frozen=True, eq=False)
+class ArrayImage:
+    """One touch against one array of the lab; coarse searches and first fits serve all stages."""
+
+    reader: PreparedLab
+    prepared: Prepared
+    signal: Signal
+    _curved: list[tuple[Image, CoarseSearch]] = field(default_factory=list)
+
+    @cached_property
+    def image(self) -> Image:
+        """The image, its face taken as flat."""
+        return self.reader.image(self.signal, self.prepared)
+
+    @cached_property
+    def searches(self) -> tuple[CoarseSearch, ...]:
+        """Coarse searches of it."""
+        return search_image(self.image, self.prepared.bank)
+
+    @cached_property
+    def first_fits(self) -> tuple[Fit, ...]:
+        """Lattices of the first search, best first; without covariances."""
+        return self._fits(self.reader.options.first)
+
+    def fits(self, effort: Effort) -> tuple[Fit, ...]:
+        """Return the lattices in the image, best first; without covariances."""
+        return self.first_fits if effort is self.reader.options.first else self._fits(effort)
+
+    def _fits(self, effort: Effort) -> tuple[Fit, ...]:
+        return fit_lattices(
+            self.image, self.prepared.bank, effort, self.searches, with_covariance=False
+        )
+
+    @cached_property
+    def curvatures(self) -> list[BendGuess]:
+        """Curvatures that the touch may have, likeliest first."""
+        embossed = self.prepared.embossed
+        return guess_bends(self.image, self.reader.sensor, embossed.radii_mm, THOROUGH_BENDS)
+
+    def curved(self, number: int) -> tuple[Image, CoarseSearch]:
+        """Return the image under a curvature, and its coarse search."""
+        while len(self._curved) <= number:
+            guess = self.curvatures[len(self._curved)]
+            bent = bend_image(self.image, self.reader.sensor, guess.bend)
+            (coarse,) = search_image(bent, self.prepared.bank, [guess.gain])
+            self._curved.append((bent, coarse))
+        return self._curved[number]
+
+
+@dataclass(frozen=True, eq=False)
+class TouchImages:
+    """One touch against all arrays of a lab."""
+
+    reader: PreparedLab
+    signal: Signal
+
+    @cached_property
+    def arrays(self) -> tuple[ArrayImage, ...]:
+        """Of each array."""
+        return tuple(
+            ArrayImage(self.reader, prepared, self.signal) for prepared in self.reader.prepared
+        )
+
+
+def verify_hypotheses(touch: TouchImages, effort: Effort) -> list[VerifiedHypothesis]:
     """Return the verified places over all arrays of the lab, best first."""
     found: list[VerifiedHypothesis] = []
-    fitted = fit_touch(reader, signal, effort)
-    for (embossed, template, bank), (image, fits) in zip(reader.prepared, fitted, strict=True):
-        found += _verify_on_flat_faces(image, embossed, template, fits)
-        if embossed.radii_mm:
-            found += verify_on_round_faces(image, reader.sensor, embossed, template, bank, effort)
+    for one in touch.arrays:
+        found += _verify_on_flat_faces(one.image, one.prepared.embossed, one.fits(effort))
+        if one.prepared.embossed.radii_mm:
+            found += verify_on_round_faces(one, effort)
     return sorted(found, key=lambda verified: -verified.score)
 
 
-def fit_touch(reader: PreparedLab, signal: Signal, effort: FitSettings) -> Fitted:
-    """Return for each array of a lab the image of a touch, and the lattices in it, best first.
-
-    How sure these are is not told. What a try has fitted serves `diagnose`.
-    """
-    return _fit_images(reader, signal, effort, kernels_in_use())
-
-
-@lru_cache(maxsize=2)
-def _fit_images(reader: PreparedLab, signal: Signal, effort: FitSettings, _kernels: str) -> Fitted:
-    return tuple(
-        (image, fit_lattices(image, template, bank, effort, told=False))
-        for image, (_, template, bank) in zip(
-            _images_of(reader, signal), reader.prepared, strict=True
-        )
-    )
-
-
-@lru_cache(maxsize=2)
-def _images_of(reader: PreparedLab, signal: Signal) -> tuple[Image, ...]:
-    return tuple(
-        image_of_signal(reader.sensor, signal, embossed.style.height_mm, reader.settings)
-        for embossed, _, _ in reader.prepared
-    )
-
-
 def _verify_on_flat_faces(
-    image: Image, embossed: EmbossedArray, template: ResponseTemplate, fits: tuple[Fit, ...]
+    image: Image, embossed: EmbossedArray, fits: tuple[Fit, ...]
 ) -> list[VerifiedHypothesis]:
     """Return the likeliest places, best first, fitted to what the database holds there."""
-    settings = image.settings.hypotheses
-    candidates = _on_flat_faces(embossed, find_hypotheses(embossed, fits, settings))
-    candidates = candidates[: settings.kept]
+    candidates = _on_flat_faces(embossed, find_hypotheses(embossed, fits))
+    candidates = candidates[:KEPT]
     if not candidates:
         return []
-    near = [place.score > candidates[0].score - settings.near for place in candidates]
+    near = [place.score > candidates[0].score - NEAR for place in candidates]
     candidates = candidates[: max(2, sum(near))]
-    verified = _fit_hypotheses(image, embossed, template, candidates, fits)
+    verified = _fit_hypotheses(image, embossed, candidates, fits)
     best = verified[0]
-    rivals = find_rivals(embossed, best.fit, best.hypothesis, len(fits), settings)
+    rivals = find_rivals(embossed, best.fit, best.hypothesis, len(fits))
     others = [
-        place
-        for place in _on_flat_faces(embossed, rivals)
-        if place.score > best.score - settings.near
+        place for place in _on_flat_faces(embossed, rivals) if place.score > best.score - NEAR
     ]
-    if others:  # also such as were verified before, under a fit that is not as good
+    if others:  # also places that were verified before, under a fit that is not as good
         everything = [replace(best.hypothesis, fit=len(fits)), *others]
-        verified += _fit_hypotheses(image, embossed, template, everything, (*fits, best.fit))
+        verified += _fit_hypotheses(image, embossed, everything, (*fits, best.fit))
     return sorted(verified, key=lambda one: -one.score)
 
 
 def _on_flat_faces(embossed: EmbossedArray, found: list[Hypothesis]) -> list[Hypothesis]:
-    """Return the places on flat faces; those on round ones are read with their bend."""
+    """Return the places on flat faces; those on round ones are read with their curvature."""
     if not embossed.radii_mm:
         return found
     return [place for place in found if embossed.face(place.face).round is None]
@@ -102,32 +170,148 @@ def _on_flat_faces(embossed: EmbossedArray, found: list[Hypothesis]) -> list[Hyp
 def _fit_hypotheses(
     image: Image,
     embossed: EmbossedArray,
-    template: ResponseTemplate,
     candidates: list[Hypothesis],
     fits: tuple[Fit, ...],
 ) -> list[VerifiedHypothesis]:
     """Return places with pose and gain fitted to their symbols, best first."""
-    settings = image.settings.hypotheses
     starts = [fits[place.fit] for place in candidates]
     lattices = refine_lattices(
         image,
-        template,
         np.array([fit.pose for fit in starts]),
         np.array([fit.gain for fit in starts]),
-        steps=settings.steps,
-        shown=shown_at(embossed, candidates),
+        steps=STEPS,
+        labels_at=labels_at(embossed, candidates),
     )
-    again = score_cells(image, template, lattices)
+    again = score_cells(image, lattices)
     verified = []
-    # a place is as likely as under the best of the fits that began where its own did: what one of
-    # them missed of gain and sharpness is no word against the symbols
+    # a place is as likely as under the best of the fits that began where its own did: a fit that
+    # misses gain and sharpness does not speak against the symbols
     own = np.array([place.fit for place in candidates])
     scores = np.full((len(candidates), len(candidates)), -np.inf)
     for n, fit in enumerate(again):
         alike = np.flatnonzero(own == own[n])
         places = [candidates[k] for k in alike.tolist()]
-        scores[n, alike] = log_likelihoods_at(embossed, fit, places, settings)
+        scores[n, alike] = log_likelihoods_at(embossed, fit, places)
     for n, (place, best) in enumerate(zip(candidates, scores.argmax(axis=0), strict=True)):
         score = float(scores[best, n])
-        verified.append(VerifiedHypothesis(image, template, embossed, place, again[best], score))
+        verified.append(VerifiedHypothesis(image, embossed, place, again[best], score))
     return sorted(verified, key=lambda one: -one.score)
+
+
+def verify_on_round_faces(touch: ArrayImage, effort: Effort) -> list[VerifiedHypothesis]:
+    """Return the likeliest places on round faces."""
+    image, sensor, embossed = touch.image, touch.reader.sensor, touch.prepared.embossed
+    keep = BENDS
+    if effort.crossed:
+        keep, effort = THOROUGH_BENDS, EACH_BEND
+    fits: list[Fit] = []
+    under: list[Bend] = []
+    for number, guess in enumerate(touch.curvatures[:keep]):
+        bent, coarse = touch.curved(number)
+        seen = fit_lattices(bent, touch.prepared.bank, effort, [coarse], with_covariance=False)
+        fits += seen
+        under += [guess.bend] * len(seen)
+    candidates = [
+        place
+        for place in find_hypotheses(embossed, tuple(fits))
+        if _is_compatible(embossed, place, fits[place.fit], under[place.fit])
+    ][:KEPT]
+    near = [place.score > candidates[0].score - NEAR for place in candidates]
+
+    def verified(place: Hypothesis, fit: Fit) -> list[VerifiedHypothesis]:
+        one = _verify_under_curvature(image, sensor, embossed, place, fit)
+        return [] if one is None else [one]
+
+    found: list[VerifiedHypothesis] = []
+    for place in candidates[: max(2, sum(near))]:
+        found += verified(place, fits[place.fit])
+    found = [_under_best_fit(one, found) for one in found]
+    if found:
+        best = max(found, key=lambda one: one.score)
+        for place in find_rivals(embossed, best.fit, best.hypothesis, len(fits)):
+            if place.score > best.score - NEAR and _is_compatible(
+                embossed, place, best.fit, best.bend
+            ):
+                found.append(replace(best, hypothesis=place, score=place.score))
+                found += verified(place, best.fit)
+    return found
+
+
+def bend_at(embossed: EmbossedArray, hypothesis: Hypothesis, fit: Fit) -> Bend | None:
+    """Return the curvature of the face at a place, in the axes of the sensor; None if flat."""
+    if not embossed.radii_mm:
+        return None
+    face = embossed.face(hypothesis.face)
+    if face.round is None or face.round.surface.concave:
+        return None
+    pose = face_pose(embossed, face, hypothesis, fit)
+    turn = math.atan2(pose[1, 0], pose[0, 0])
+    return face.round.bend(float(pose[0, 3]), float(pose[1, 3])).turned(turn)
+
+
+def _is_compatible(
+    embossed: EmbossedArray,
+    hypothesis: Hypothesis,
+    fit: Fit,
+    under: Bend | None,
+) -> bool:
+    """Whether a place has about the curvature under which its symbols were read."""
+    bend = bend_at(embossed, hypothesis, fit)
+    return _same_bend(bend, under, TURNED_RAD, RADIUS_FACTOR)
+
+
+def _same_bend(a: Bend | None, b: Bend | None, turn_rad: float, factor: float) -> bool:
+    if a is None or b is None:
+        return False
+    turn = abs(math.remainder(a.towards_rad - b.towards_rad, math.pi))
+    return turn < turn_rad and 1 / factor < a.radius_mm / b.radius_mm < factor
+
+
+def _verify_under_curvature(
+    image: Image,
+    sensor: SensorType,
+    embossed: EmbossedArray,
+    hypothesis: Hypothesis,
+    fit: Fit,
+) -> VerifiedHypothesis | None:
+    """Return a place with pose and gain fitted to its symbols under its curvature; None if flat.
+
+    In two rounds: the fit moves the curvature, and the curvature the fit.
+    """
+    found = None
+    for shares in (FIRST_SHARES, SHARES):
+        bend = bend_at(embossed, hypothesis, fit)
+        if bend is None:
+            return None
+        several = bend_image(image, sensor, bend, shares)
+        lattices = refine_lattices(
+            several,
+            np.tile(fit.pose, (len(shares), 1)),
+            np.tile(fit.gain, (len(shares), 1)),
+            steps=STEPS,
+            labels_at=labels_at(embossed, [hypothesis] * len(shares)),
+        )
+        each = score_cells(several, lattices)
+        scores = [log_likelihood(embossed, one, hypothesis) for one in each]
+        best = int(np.argmax(scores))
+        fit = each[best]
+        seen = bend_image(image, sensor, bend, shares[best : best + 1])
+        found = VerifiedHypothesis(seen, embossed, hypothesis, fit, scores[best], bend)
+    return found
+
+
+def _under_best_fit(one: VerifiedHypothesis, found: list[VerifiedHypothesis]) -> VerifiedHypothesis:
+    """Return a place under the best of the fits that began where its own did, and curve alike.
+
+    A fit that misses gain and sharpness does not speak against the symbols.
+    """
+    best = one
+    for other in found:
+        if other.hypothesis.fit != one.hypothesis.fit:
+            continue
+        if not _same_bend(other.bend, one.bend, SAME_RAD, SAME_FACTOR):
+            continue
+        score = log_likelihood(one.embossed, other.fit, one.hypothesis)
+        if score > best.score:
+            best = replace(other, hypothesis=one.hypothesis, score=score)
+    return best

@@ -18,8 +18,8 @@ import numpy as np
 
 from probe.contact.engines import ENGINES, engine_named
 from probe.simulate.world.levels import LEVELS
+from recognizer.touch.options import DEFAULTS, Effort
 from recognizer.touch.reader import Reader
-from recognizer.touch.settings import DEFAULTS
 from recognizer.validation.draw import FOREIGN
 from recognizer.validation.encoded_set import COPY, NEAR, SAME_PROFILE, SIDE, SMALL
 from recognizer.validation.errors import ValidationError
@@ -194,15 +194,8 @@ def reader_with(reader: Reader, name: str) -> Reader:
     """Return a reader that spends as `READERS` says, and no second try beyond it."""
     if name == AS_IS:
         return reader
-    candidates, steps, finalists, final_steps = READERS[name]
-    effort: dict[str, int] = {
-        "candidates": candidates,
-        "steps": steps,
-        "finalists": finalists,
-        "final_steps": final_steps,
-    }
-    spent = replace(reader.settings.first, **effort)
-    return replace(reader, settings=replace(reader.settings, first=spent, thorough=spent))
+    spent = Effort(*READERS[name])
+    return replace(reader, options=replace(reader.options, first=spent, thorough=spent))
 
 
 def settings_of(name: str) -> dict[str, int]:

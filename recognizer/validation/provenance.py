@@ -18,7 +18,6 @@ from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_nam
 from probe.contact.engines import engine_named
 from probe.contact.press import level_for
 from probe.simulate.world.levels import LEVELS
-from recognizer.touch.symbols.kernels import kernels_in_use
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
 from recognizer.validation.draw import INSIDE_MM
 from recognizer.validation.encoded_set import members_of
@@ -38,7 +37,7 @@ def provenance(record: RunRecord, database: str) -> dict[str, Any]:
         "versions": {
             "encoded-objects": version("encoded-objects"),
             "source, sha256": record.code_digest,
-            "kernels": kernels_in_use(),
+            "kernels": "compiled",
             "python": platform.python_version(),
             **{name: version(name) for name in LIBRARIES},
         },

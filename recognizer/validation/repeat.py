@@ -18,7 +18,6 @@ from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.symbols.fit import Fit, fit_lattices
-from recognizer.touch.symbols.gain import image_of_signal
 from recognizer.validation.campaign import plan_of, series_of
 from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.errors import ValidationError
@@ -124,10 +123,9 @@ def _draw_fit(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
     axis.imshow(found.counts, extent=_extent(reader), cmap="Greys")
     signal = reader.signal(found.counts)
     best: tuple[float, Fit, Alphabet, float] | None = None
-    for encoding, template, bank in reader.prepared if signal.contact else ():
-        height_mm = encoding.style.height_mm
-        image = image_of_signal(reader.sensor, signal, height_mm, reader.settings)
-        for fit in fit_lattices(image, template, bank, reader.settings.first):
+    for prepared in reader.prepared if signal.contact else ():
+        encoding, image = prepared.embossed, reader.image(signal, prepared)
+        for fit in fit_lattices(image, prepared.bank, reader.options.first):
             if best is None or fit.value > best[0]:
                 best = (fit.value, fit, encoding.alphabet, encoding.style.pitch_mm)
     if best is not None:

@@ -57,9 +57,9 @@ from recognizer.scan.mosaic.planar import (
 from recognizer.scan.mosaic.register import register_patches
 from recognizer.thesis.merge import product_shift
 from recognizer.touch.lab import open_lab
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
-from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import Signal, signal_of
 from recognizer.validation.statistics import chi2_quantile
 
@@ -83,7 +83,7 @@ class Scan:
     pitch_mm: float
 
 
-FIRM = SignalSettings(contact_n=0.1)
+FIRM = ReaderOptions(contact_n=0.1)
 
 
 def scanned(database: str, name: str, pitch_mm: float, tactels: float, counts: bool, seed: int):
@@ -109,7 +109,7 @@ def scanned(database: str, name: str, pitch_mm: float, tactels: float, counts: b
             signals.append(signal_of(read.astype(float)))
         else:
             read = np.maximum(forces * gains + rng.normal(0, 0.02, (16, 16)), 0)
-            signals.append(signal_of(read, trust=dead, floor=0.0, newtons=True, settings=FIRM))
+            signals.append(signal_of(read, trust=dead, floor=0.0, newtons=True, options=FIRM))
         true.append(pose)
     back = np.linalg.inv(T_BASE_PLANE)
     believed = []

@@ -1,4 +1,4 @@
-"""Time of a touch by stage, and error against run time of the reader's settings.
+"""Time of a touch by stage, and error against run time of the reader's effort.
 
     python tests/bench/recognizer_times.py --database lab.db [--touches 40] [--png PICTURE.png]
 
@@ -17,26 +17,24 @@ for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np  # noqa: E402
 
+from recognizer.touch.hypothesis import find_hypotheses  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
-from recognizer.touch.locate import find_hypotheses  # noqa: E402
+from recognizer.touch.options import DEFAULTS, Effort  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
-from recognizer.touch.recognise import recognise_with_hypothesis  # noqa: E402
-from recognizer.touch.settings import DEFAULTS, FitSettings  # noqa: E402
+from recognizer.touch.recognise import read_touch  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
-from recognizer.touch.symbols.fit import fit_lattices  # noqa: E402
-from recognizer.touch.symbols.gain import first_gain, image_of_signal, normalize_image  # noqa: E402
-from recognizer.touch.symbols.search import search  # noqa: E402
-from recognizer.touch.verify import verify_hypotheses  # noqa: E402
+from recognizer.touch.symbols.fit import fit_lattices, search_image  # noqa: E402
+from recognizer.touch.verify import TouchImages, verify_hypotheses  # noqa: E402
 from recognizer.validation.draw import draw_touch  # noqa: E402
 from recognizer.validation.touch_plan import TouchPlan, sensor_of  # noqa: E402
 from recognizer.validation.trial import judge  # noqa: E402
 
-SETTINGS = {
-    "1 lattice, 1 + 1 steps": FitSettings(1, 1, 1, 1),
-    "2 lattices, 2 + 2 steps (default)": FitSettings(),
-    "3 lattices, 3 + 4 steps": FitSettings(3, 3, 2, 4),
-    "8 lattices, 4 + 10 steps": FitSettings(8, 4, 4, 10),
-    "24 lattices, 6 + 14 steps": FitSettings(24, 6, 6, 14),
+EFFORTS = {
+    "1 lattice, 1 + 1 steps": Effort(1, 1, 1, 1),
+    "2 lattices, 2 + 2 steps (default)": Effort(),
+    "3 lattices, 3 + 4 steps": Effort(3, 3, 2, 4),
+    "8 lattices, 4 + 10 steps": Effort(8, 4, 4, 10),
+    "24 lattices, 6 + 14 steps": Effort(24, 6, 6, 14),
 }
 
 
@@ -48,25 +46,19 @@ def clocked(action):
 
 def stages(reader, signals):
     """Return medians of the stages, ms."""
-    encoding, template, bank = reader.prepared[0]
+    prepared, first = reader.prepared[0], reader.options.first
     rows = []
     for signal in signals:
-        image, made = clocked(
-            lambda s=signal: image_of_signal(reader.sensor, s, encoding.style.height_mm)
-        )
-        gain = first_gain(image, template.ink)
-        felt = normalize_image(image, gain[None])
-        seen, weights = (
-            part.reshape(bank.shape).astype(np.float32) for part in (felt.psi, felt.trust)
-        )
-        _, coarse = clocked(lambda s=seen, w=weights: search(bank, s, w, template.order, 4))
+        image, made = clocked(lambda s=signal: reader.image(s, prepared))
+        searches, coarse = clocked(lambda i=image: search_image(i, prepared.bank))
         found, fitted = clocked(
-            lambda i=image: fit_lattices(i, template, bank, reader.settings.first)
+            lambda i=image, c=searches: fit_lattices(i, prepared.bank, first, c)
         )
-        _, placed = clocked(lambda f=found: find_hypotheses(encoding, f, DEFAULTS.hypotheses))
-        _, read = clocked(lambda s=signal: verify_hypotheses(reader, s, reader.settings.first))
-        _, whole = clocked(lambda s=signal: recognise_with_hypothesis(reader, s))
-        rows.append((made, coarse, fitted - coarse, placed, read - fitted - placed, whole))
+        _, placed = clocked(lambda f=found: find_hypotheses(prepared.embossed, f))
+        touch = TouchImages(reader, signal)
+        _, read = clocked(lambda t=touch: verify_hypotheses(t, first))
+        _, whole = clocked(lambda s=signal: read_touch(reader, s))
+        rows.append((made, coarse, fitted, placed, read - made - coarse - fitted - placed, whole))
     names = ("image", "coarse search", "refinement", "places", "verification", "whole touch")
     return dict(zip(names, np.median(rows, axis=0), strict=True))
 
@@ -87,13 +79,12 @@ def main() -> None:
         print(f"{level}:")
         for name, ms in stages(reader, signals).items():
             print(f"  {name:16s} {ms:7.2f} ms")
-        for name, settings in SETTINGS.items():
-            spent = replace(DEFAULTS, first=settings, thorough=settings)
-            one = replace(reader, settings=spent)
+        for name, effort in EFFORTS.items():
+            one = replace(reader, options=replace(DEFAULTS, first=effort, thorough=effort))
             found = []
             for number, (touch, signal) in enumerate(zip(touches, signals, strict=True)):
-                (answer, _), ms = clocked(lambda s=signal, r=one: recognise_with_hypothesis(r, s))
-                found.append((judge(plan, number, touch, answer, ms / 1e3), ms))
+                reading, ms = clocked(lambda s=signal, r=one: read_touch(r, s))
+                found.append((judge(plan, number, touch, reading.answer, ms / 1e3), ms))
             right = [t for t, _ in found if t.verdict == "right"]
             wrong = sum(t.verdict == "wrong" for t, _ in found)
             rms = float(np.sqrt(np.mean([t.error_mm**2 for t in right])))

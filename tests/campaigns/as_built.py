@@ -36,14 +36,14 @@ from recognizer.as_built.estimate import (  # noqa: E402
     keep_prints,
 )
 from recognizer.as_built.touches import (  # noqa: E402
+    WIDE_SCALE,
     measure_prints,
-    settings_for_prints,
 )
 from recognizer.as_built.verdict import judge_print  # noqa: E402
 from recognizer.errors import AsBuiltError  # noqa: E402
-from recognizer.touch.contacts import TouchImage  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
+from recognizer.touch.source import TouchImage  # noqa: E402
 from recognizer.validation.statistics import chi2_quantile  # noqa: E402
 
 CHI2_95 = chi2_quantile(0.95)  # 3 degrees of freedom
@@ -145,7 +145,7 @@ def main() -> None:
         learn = [one for _, one in touched(scene, before, 1, options.touches, options.level)]
         judge = list(touched(scene, before, 2, options.touches, options.level))
         usual = sum(bool(before.read(image.counts)) for image in learn)
-        wide = Reader(open_lab(database), settings=settings_for_prints())
+        wide = Reader(open_lab(database), options=WIDE_SCALE)
         start = perf_counter()
         try:
             felt = measure_prints(wide, learn)

@@ -17,7 +17,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at, recognise
 from recognizer.touch.signal import Signal
-from recognizer.touch.verify import verify_hypotheses
+from recognizer.touch.verify import TouchImages, verify_hypotheses
 from recognizer.validation.campaign import LEVEL_SHARES, Campaign, plan_of, series_of
 from recognizer.validation.draw import draw_touch
 from recognizer.validation.touch_plan import sensor_of
@@ -32,19 +32,19 @@ SETS = (
 
 def doubt_of_best(reader: Reader, signal: Signal, judged) -> float | None:
     """Return the doubt of the likeliest place of a touch; None where it is not the true one."""
-    found = verify_hypotheses(reader, signal, reader.settings.thorough)
+    found = verify_hypotheses(TouchImages(reader, signal), reader.options.thorough)
     if not found:
         return None
-    best, settings, arrays = found[0], reader.settings, reader.lab.arrays
+    best, arrays = found[0], reader.lab.arrays
     answer = answer_at(
-        best.embossed, best.last_fit(), best.hypothesis, settings, 0,
+        best.embossed, best.last_fit(), best.hypothesis, reader.options, 0,
         reason="", margin=0.0, runner_up=None,
     )  # fmt: skip
     if judged(answer) != RIGHT:
         return None
     tip_mm = reader.sensor.overlay.tab_diameter_mm
-    by_symbols = expected_matches(arrays, best.embossed, best.fit, best.hypothesis, settings)
-    return min(by_symbols, expected_by_border(arrays, best, tip_mm, settings))
+    by_symbols = expected_matches(arrays, best.embossed, best.fit, best.hypothesis)
+    return min(by_symbols, expected_by_border(arrays, best, tip_mm))
 
 
 def main() -> None:
@@ -53,7 +53,7 @@ def main() -> None:
     parser.add_argument("--engine", default="own")
     asked = runner.parse(parser)
     reader = Reader(open_lab(asked.database), sensor_of("", "tab"))
-    limit = reader.settings.belief.doubt
+    limit = reader.options.doubt
     heads = ("of", "likeliest place true", f"and doubt <= {limit:g}", "answered")
     runner.table((f"touches, {asked.engine}", *heads))
     for name, kind, levels in SETS:

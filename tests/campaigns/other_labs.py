@@ -25,9 +25,9 @@ import runner
 from encoded_objects import encode
 from generator.array.lab_key import lab_key_of
 from recognizer.touch.lab import open_lab
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise_with_rivals
-from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.recognise import read_touch
 from recognizer.validation.campaign import LEVEL_SHARES
 from recognizer.validation.draw import draw_touch
 from recognizer.validation.touch_plan import TouchPlan
@@ -51,8 +51,7 @@ def main() -> None:
     parser.add_argument("--own", type=int, default=0, help="touches of the lab's own parts")
     asked = runner.parse(parser)
     own, others = make_labs(asked.output, asked.seed)
-    belief = replace(DEFAULTS.belief, doubt=math.inf)
-    reader = Reader(open_lab(own), settings=replace(DEFAULTS, belief=belief))
+    reader = Reader(open_lab(own), options=ReaderOptions(doubt=math.inf))
     for name, labs, number in (("touches", others, asked.touches), ("own", [own], asked.own)):
         work = touch_labs(reader, labs, asked.seed, registered=name == "own")
         rows = runner.resume(asked.output / f"{name}.jsonl", range(number), work)
@@ -112,7 +111,7 @@ def touch_labs(
         kind, level = (_choose(rng, shares) for shares in (KINDS, LEVEL_SHARES))
         plan = TouchPlan(labs[lab], seed, level, kind)
         drawn = draw_touch(plan, number, makers[lab])
-        answer, _ = recognise_with_rivals(reader, reader.signal(drawn.counts), number)
+        answer = read_touch(reader, reader.signal(drawn.counts), number).answer
         accepted = bool(answer) and bool(usual.read(drawn.counts, seq=number))
         if not registered:  # every answer is wrong
             drawn = replace(drawn, contact=replace(drawn.contact, registered=False))

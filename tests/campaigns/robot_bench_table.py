@@ -9,9 +9,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import beta, chi2
 
 from probe.arm import SensorPose
-from recognizer.touch.fusion import fuse_poses
 from recognizer.touch.recognition import Recognition
-from recognizer.touch.robot import ObjectPose, object_pose
+from recognizer.touch.robot import ObjectPose, fuse_poses, object_pose
 
 Array = np.ndarray
 FLAT = [0, 1, 5]  #: x, y and the turn about the vertical

@@ -34,13 +34,11 @@ class Reading:
     options: tuple[str, ...] = ()  #: of `recognize-object`
     of: tuple[str, ...] = ()  #: sets that are read; none: the one of the part's name
     every: int = 1  #: of so many touches one is read
-    kernels: str = ""  #: "numpy": without the compiled loops
     learns: bool = False  #: the sensor, from its touches, before they are read
     scan: bool = False  #: touches of one label "scan" are one recording, and one answer
 
 
 FORTY, SMALL = Reading("forty"), Reading("small")
-NUMPY_OF = ("own-1", "own-2", "own-3", "own-4", "mujoco", "rows", "hard", "light")
 TYPES = ("flexitac-12x32", "flexitac-16x32", "fsr-8x8", "gel-24x32", "mat-32x32")
 LEARNED = ("dead-20", "hot-5", "gain-30", "floating", "places-25")
 SCAN = ("--scan",)
@@ -66,10 +64,6 @@ READINGS = {
     "scan-small": replace(SMALL, options=SCAN, scan=True),
     "scan-forty": replace(FORTY, options=SCAN, scan=True),
     "scan-one-touch": Reading("one-touch", SCAN, scan=True),
-    "numpy": replace(FORTY, of=NUMPY_OF, every=10, kernels="numpy"),
-    "numpy-gel": Reading(
-        "type-gel-24x32", ("--sensor-type", "gel-24x32"), ("type-gel-24x32",), 6, "numpy"
-    ),
 }
 PARTS = tuple(READINGS)
 
@@ -135,7 +129,6 @@ def _read(
     learn = ("--learn", "state.json") if how.learns else ()
     told = run(
         "recognize-object", "touches.h5", "--every", "--json", *how.options, *learn, folder=place,
-        variables={"ENCODED_OBJECTS_KERNELS": how.kernels},
     )  # fmt: skip
     last = -1
     for answer in json.loads(told):

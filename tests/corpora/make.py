@@ -43,7 +43,7 @@ ENVIRONMENT = {
     "COLUMNS": "100",
     "NO_COLOR": "1",
 }
-UNSET = ("ENCODED_OBJECTS_KERNELS", "FORCE_COLOR")
+UNSET = ("FORCE_COLOR",)
 RELATIVE, ABSOLUTE = 1e-9, 1e-12  #: by which numbers that are not whole may differ
 DIGITS = 12  #: of a number that is stored
 COMPRESSED_FROM = 1_000_000  #: bytes of a stored corpus

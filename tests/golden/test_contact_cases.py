@@ -29,7 +29,7 @@ from probe.surface.polygon import polygon
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import compose_poses
 from recognizer.scan.mosaic.register import register_patches
-from recognizer.touch.settings import SignalSettings
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.signal import signal_of
 
 SENSORS = {kind: SensorType(overlay=Overlay(kind=kind)) for kind in ("tab", "pad")}
@@ -48,7 +48,7 @@ EVERY_LEVEL = [
 
 OF_FORCES = [pair for pair in EVERY_LEVEL if pair[0] != "gel"]  #: a gel's image is of depths
 
-FELT = SignalSettings(contact_counts=0.1)  #: of newtons without a calibration
+FELT = ReaderOptions(contact_counts=0.1)  #: of newtons without a calibration
 
 
 @pytest.mark.parametrize(("kind", "level"), EVERY_LEVEL)
@@ -187,7 +187,7 @@ def test_case_12_raw_products_fail_where_registration_does_not(scene):
         images = [felt(faces[pair % 2], at) for at in (place, compose_poses(place, true))]
         shift = raw_product(*images, believed[:2] / P, 4)
         raw_wrong += math.hypot(*(shift - true[:2] / P)) > 1
-        patches = [patch_of(TAB, signal_of(image, floor=0.0, settings=FELT)) for image in images]
+        patches = [patch_of(TAB, signal_of(image, floor=0.0, options=FELT)) for image in images]
         found = register_patches(*patches, believed, spread, period_mm=7.0)
         answered += bool(found)
         wrong += bool(found) and math.hypot(*(found.pose - true)[:2]) > P

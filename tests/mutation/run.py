@@ -35,7 +35,6 @@ from types import CodeType
 
 for _library in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"
-os.environ["ENCODED_OBJECTS_KERNELS"] = "numpy"  # what is changed is that form
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

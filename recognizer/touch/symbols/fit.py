@@ -2,38 +2,73 @@
 
 Forces (newtons, or counts that rise with force) -> Fit: pose of the sensor on the lattice of
 symbols, gain, and for every cell of the lattice under the sensor the log-likelihood of each
-symbol and of none. Whole and partial symbols count alike: each with what it shows.
-Lattice frame: mm; cell (i, j) is the i-th column and the j-th row upwards, its symbol's
-axes are the frame's. A sensor point s lies at R(theta) s + (x, y). Thesis 6.2.
+symbol and of none. Whole and partial symbols count alike: each with what it shows. A coarse search
+under a few gains gives candidates; damped least squares refines them, labels chosen again at every
+step. Lattice frame: mm; cell (i, j) is the i-th column and the j-th row upwards, its symbol's axes
+are the frame's. A sensor point s lies at R(theta) s + (x, y). Thesis 6.2.
 """
 
 from __future__ import annotations
 
+import ctypes
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.settings import FitSettings
-from recognizer.touch.symbols.compiled import CellSums, sum_cells_compiled
-from recognizer.touch.symbols.covariance import covariances
-from recognizer.touch.symbols.deep_press import deep_gain
-from recognizer.touch.symbols.gain import Image, first_gain, normalize_image, tilted_gain
-from recognizer.touch.symbols.kernels import compiled_kernels
-from recognizer.touch.symbols.noise import log_likelihoods, psi_deviation
-from recognizer.touch.symbols.projection import (
-    Projection,
-    likeliest_labels,
-    project_template,
-    values_of,
+from encoded_objects.base.compiled import addresses
+from recognizer.touch.options import Effort
+from recognizer.touch.symbols.image import (
+    Image,
+    deep_gain,
+    first_gain,
+    normalize_image,
+    tilted_gain,
 )
-from recognizer.touch.symbols.refine import Lattices, refine_lattices
-from recognizer.touch.symbols.search import Bank, search
-from recognizer.touch.symbols.template import PSI, ResponseTemplate, psi
+from recognizer.touch.symbols.kernels import (
+    FAR,
+    FIRST_NOISE,
+    FORM_SD,
+    LARGEST_STEP,
+    LEAST_NOISE,
+    POSE,
+    UNKNOWNS,
+    kernels,
+)
+from recognizer.touch.symbols.linearize import LabelsAt, prior_precision
+from recognizer.touch.symbols.search import Bank, LatticeScores, score_lattices
+from recognizer.touch.symbols.template import PSI, psi
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LEAST_REST = 0.1  #: of a tactel's force that is left over the bare face's, in the coarse search
+SAME_SHIFT = 0.08  #: pitches by which two lattices that are one may differ
+SAME_TURN = 0.02  #: and half turns
+
+# By how much the fit's own covariance is too small. Measured against simulated touches of all
+# contact levels: on faces 95-97 % of the errors lie within the 95 % ellipse (`docs/recognizer.md`,
+# "How sure it is").
+PAD_SIZE = 1.18  #: times the variance under a pad, neighbours that err alike counted
+TAB_SIZE = 0.6  #: times the variance under tabs ...
+STRANGE_SIZE = 0.025  #: ... and with the fourth power of the form's distance from `FORM_SD`
+UNSEEN = 1e-8  #: least eigenvalue of a normal matrix of unit diagonal
+
+
+@dataclass(frozen=True, slots=True)
+class Lattices:
+    """Candidates: sensor point s lies at R(theta) s + (x, y) in the lattice frame."""
+
+    pose: (
+        Array  #: (b, 7) x, y (mm), theta (rad); stroke excess, cross-talk, exponent - 1, scale - 1
+    )
+    gain: Array  #: (b, 4) logarithm of the scale; depth at the centre, slopes per half width
+    value: Array  #: (b,) log-likelihood of the image, nats, up to a constant of the image
+    normal: Array  #: (b, 11, 11) inverse covariance of pose and gain under `FIRST_NOISE`
+    right: Array  #: (b, 11) slope of the log-likelihood by them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,80 +78,103 @@ class Fit:
     x_mm: float
     y_mm: float
     theta_rad: float
-    nuisance: Array  #: (4,) width, cross-talk, exponent - 1, scale - 1
-    gain: Array  #: (4,) logarithm of the scale, depth, and its slopes, `pressing`
+    nuisance: Array  #: (4,) stroke excess, cross-talk, exponent - 1, scale - 1
+    gain: Array  #: (4,) logarithm of the scale, depth, and its slopes, of `image`
     cells: NDArray[np.int64]  #: (m, 2) column and upward row of the cells in view
     scores: Array  #: (m, q + 1) log-likelihoods, nats, 0 for the best; the last one: no symbol
-    seen: Array  #: (m,) tactels that look at the cell, by how hard they press
+    seen: Array  #: (m,) tactels on the cell, by how hard they press
     noise: float  #: standard deviation of psi with which the scores were made
     value: float  #: log-likelihood of the image with every cell at its best, nats
-    covariance: Array  #: (3, 3) of x, y (mm) and theta (rad); NaN where it was not asked for
+    covariance: Array  #: (3, 3) of x, y (mm) and theta (rad); NaN if not computed
     with_scale: Array | None = None  #: (4,) covariance of scale - 1 with these, and its variance
 
     @property
     def pose(self) -> Array:
-        """Return (7,) of `refine.Lattices`."""
+        """Return (7,) of `Lattices`."""
         return np.array([self.x_mm, self.y_mm, self.theta_rad, *self.nuisance])
 
     @property
     def scale(self) -> float:
-        """Return the size of the print as it is felt, 1 as designed."""
+        """Return the size of the print, 1 as designed."""
         return 1.0 / (1.0 + float(self.nuisance[3]))
 
     @property
     def stroke_excess(self) -> float:
-        """Return by how much strokes are felt wider than designed, `TemplateSettings.wider_mm`."""
+        """Return by how much strokes seem wider than designed, tenths of a mm."""
         return float(self.nuisance[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoarseSearch:
+    """The coarse search of an image under one gain; serves searches of any effort."""
+
+    gain: Array  #: (4,)
+    scores: LatticeScores
+
+
+def search_image(
+    image: Image, bank: Bank, gains: Sequence[Array] | None = None
+) -> tuple[CoarseSearch, ...]:
+    """Return the coarse searches of an image; none if nothing is pressed.
+
+    Gains to begin with, (4,) each, are guessed from the image if they are not given.
+    """
+    if gains is None:
+        deep = deep_gain(image)
+        guessed = (first_gain(image), tilted_gain(image) if deep is None else deep)
+        gains = [gain for gain in guessed if gain is not None]
+    return tuple(CoarseSearch(gain, _search_under(image, bank, gain)) for gain in gains)
 
 
 def fit_lattices(
     image: Image,
-    template: ResponseTemplate,
     bank: Bank,
-    settings: FitSettings,
-    gains: Sequence[Array] | None = None,
+    effort: Effort,
+    searches: Sequence[CoarseSearch] | None = None,
     *,
-    told: bool = True,
+    with_covariance: bool = True,
 ) -> tuple[Fit, ...]:
     """Return the likeliest lattices of an image, best first; none if nothing is pressed.
 
-    Gains to begin with, (4,) each, are guessed from the image if they are not given. `told`:
-    whether covariances are asked for.
+    Parameters
+    ----------
+    searches
+        Coarse searches of the image, where they are known.
     """
-    if gains is None:
-        deep = deep_gain(image)
-        guessed = (first_gain(image, template.ink), tilted_gain(image) if deep is None else deep)
-        gains = [gain for gain in guessed if gain is not None]
-    starts = [_search_under(image, template, bank, gain, settings.candidates) for gain in gains]
+    if searches is None:
+        searches = search_image(image, bank)
+    starts = [one.scores.best(bank, effort.candidates) for one in searches]
     if sum(len(start) for start in starts) == 0:
         return ()
-    each = [len(start) for start in starts]
-    pose, gain = np.concatenate(starts), np.repeat(gains, each, axis=0)
-    lattices = refine_lattices(image, template, pose, gain, steps=settings.steps, told=False)
-    if settings.crossed:
-        lattices = _cross_gains(image, template, lattices, settings.crossed)
-    best = _distinct_lattices(image, template, lattices)[: settings.finalists]
-    pose, gain = lattices.pose[best], lattices.gain[best]
-    lattices = refine_lattices(image, template, pose, gain, steps=settings.final_steps, told=told)
-    found = score_cells(image, template, lattices, told=told)
-    return tuple(found[b] for b in _distinct_lattices(image, template, lattices))
+    pose = np.concatenate(starts)
+    gain = np.repeat([one.gain for one in searches], [len(start) for start in starts], axis=0)
+    lattices = refine_lattices(image, pose, gain, steps=effort.steps, with_normal=False)
+    if effort.crossed:
+        lattices = _cross_gains(image, lattices, effort.crossed)
+    best = _distinct_lattices(image, lattices)[: effort.finalists]
+    lattices = refine_lattices(
+        image, lattices.pose[best], lattices.gain[best],
+        steps=effort.final_steps, with_normal=with_covariance,
+    )  # fmt: skip
+    found = score_cells(image, lattices, with_covariance=with_covariance)
+    return tuple(found[b] for b in _distinct_lattices(image, lattices))
 
 
-def _distinct_lattices(image: Image, template: ResponseTemplate, found: Lattices) -> list[int]:
+def _distinct_lattices(image: Image, found: Lattices) -> list[int]:
     """Return the numbers of lattices, best first, each once."""
-    same, pitch = image.settings.search, template.pitch_mm
+    pitch = image.template.pitch_mm
     kept: list[int] = []
     for b in np.argsort(-found.value, kind="stable").tolist():
         away = found.pose[kept, :3] - found.pose[b, :3]
         shift = np.abs((away[:, :2] / pitch + 0.5) % 1.0 - 0.5).max(axis=1)
         turn = np.abs((away[:, 2] / math.pi + 1.0) % 2.0 - 1.0)
-        if not ((shift < same.same_shift) & (turn < same.same_turn)).any():
+        if not ((shift < SAME_SHIFT) & (turn < SAME_TURN)).any():
             kept.append(b)
     return kept
 
 
-def _cross_gains(image: Image, template: ResponseTemplate, found: Lattices, gains: int) -> Lattices:
-    """Return lattices, and the same turned by quarters, each under the best of several gains.
+def _cross_gains(image: Image, found: Lattices, gains: int) -> Lattices:
+    """Return lattices and these turned by quarters, each under the best of several gains.
 
     A square lattice turned by a quarter is one again, so all four see the image alike but for
     the symbols; and a lattice may be stuck under a gain from which another one got away.
@@ -131,7 +189,7 @@ def _cross_gains(image: Image, template: ResponseTemplate, found: Lattices, gain
         pose[:, 2] += math.pi / 2
     poses = np.concatenate([*tried, found.pose[np.sort(best[2 * gains :])]])
     each = [
-        refine_lattices(image, template, poses, one, steps=1, told=False)
+        refine_lattices(image, poses, one, steps=1, with_normal=False)
         for one in np.repeat(found.gain[best[:gains], None], len(poses), axis=1)
     ]
     kept = np.argmax([lattices.value for lattices in each], axis=0)
@@ -143,94 +201,172 @@ def _cross_gains(image: Image, template: ResponseTemplate, found: Lattices, gain
     return Lattices(**picked)
 
 
-def _search_under(
-    image: Image, template: ResponseTemplate, bank: Bank, gain: Array, keep: int
-) -> Array:
-    """Return the best lattices (n, 3) of the coarse search under a gain."""
+def _search_under(image: Image, bank: Bank, gain: Array) -> LatticeScores:
     felt = normalize_image(image, gain[None])
-    response, bare = (np.expm1(felt.psi[0] * math.log(1 + PSI)) / PSI, felt.bare[0])
-    rest = np.maximum(1.0 - bare, image.settings.search.least_rest)
+    response, bare = np.expm1(felt.psi[0] * math.log(1 + PSI)) / PSI, felt.bare[0]
+    rest = np.maximum(1.0 - bare, LEAST_REST)
     seen = psi(np.maximum(response - bare, 0.0) / rest)
     weights = (felt.press[0] * rest) ** 2 * felt.trust
-    return search(
+    return score_lattices(
         bank,
         seen.reshape(bank.shape).astype(np.float32),
         weights.reshape(bank.shape).astype(np.float32),
-        template.order,
-        keep,
+        image.template.order,
     )
 
 
-def score_cells(
+def refine_lattices(
     image: Image,
-    template: ResponseTemplate,
-    lattices: Lattices,
+    pose: Array,
+    gain: Array,
     *,
-    told: bool = True,
+    steps: int,
+    labels_at: LabelsAt | None = None,
+    with_normal: bool = True,
+) -> Lattices:
+    """Return candidates after damped steps, with their log-likelihoods.
+
+    Parameters
+    ----------
+    pose
+        (b, 7), or (b, 3) where nothing is known of the rest.
+    gain
+        (b, 4).
+    steps
+        How many, at most.
+    labels_at
+        Labels of the cells, where they are known; otherwise each cell shows what fits best.
+    with_normal
+        Whether `normal` and `right` are asked for; without, they are those of some step.
+    """
+    count = len(pose)
+    whole = np.zeros((count, POSE))
+    whole[:, : pose.shape[1]] = pose
+    gain = np.array(gain, np.float64, order="C")
+    labels = corner = None
+    if labels_at is not None:
+        labels, corner = label_tables(image, whole, steps, labels_at)
+    scene = image.scene.of_lattices(count, labels, prior_precision(image))
+    value, right = np.empty(count), np.zeros((count, UNKNOWNS))
+    normal = np.zeros((count, UNKNOWNS, UNKNOWNS))
+    kernels().refine(
+        ctypes.addressof(scene), steps, int(with_normal),
+        *addresses(labels, corner, whole, gain, value, normal, right),
+    )  # fmt: skip
+    return Lattices(whole, gain, value, normal, right)
+
+
+def label_tables(
+    image: Image, pose: Array, steps: int, labels_at: LabelsAt
+) -> tuple[NDArray[np.int8], Ints]:
+    """Return labels (b, high, wide) of all cells that steps can reach, and the first (b, 2)."""
+    pitch = image.template.pitch_mm
+    scale = 1 + max(image.options.scale_most, float(np.abs(pose[:, 6]).max()))
+    reach = scale * image.reach_mm + steps * max(LARGEST_STEP[:2])
+    corner = np.floor((pose[:, :2] - reach) / pitch).astype(np.int64)
+    side = math.ceil(2 * reach / pitch) + 2
+    labels = labels_at(corner[:, None] + _square_of_cells(side))
+    return labels.astype(np.int8).reshape(len(pose), side, side), corner
+
+
+@lru_cache(maxsize=16)
+def _square_of_cells(side: int) -> Ints:
+    """Return the cells (side^2, 2) of a square, its first one (0, 0)."""
+    down, along = np.divmod(np.arange(side * side), side)
+    return np.stack([along, down], axis=-1)
+
+
+def score_cells(
+    image: Image, lattices: Lattices, *, with_covariance: bool = True
 ) -> tuple[Fit, ...]:
     """Return the fits of lattices with the scores of all their cells, in their order.
 
-    Scores are made with the noise that the likeliest lattice leaves. `told`: whether their normal
-    matrices are, and so covariances can be.
+    Scores are made with the noise that the likeliest lattice leaves.
     """
-    sums = _sum_cells(image, template, lattices)
-    covariance = np.full((len(lattices.pose), 3, 3), math.nan)
-    if told:
-        covariance = covariances(image, lattices, sums.left * image.trust, sums.noise)
-    unit = float(image.trust.sum()) * math.log(sums.noise)
+    count, tactels, order = len(lattices.pose), len(image.forces), image.template.order
+    scene = image.scene.of_lattices(count)
+    pose, gain = np.ascontiguousarray(lattices.pose), np.ascontiguousarray(lattices.gain)
+    numbers, cells = np.empty(count, np.int64), np.empty((count, tactels, 2), np.int64)
+    sums, seen = np.empty((count, tactels, order + 1)), np.empty((count, tactels))
+    level, left = np.empty(count), np.empty((count, tactels))
+    noise: float = kernels().score_cells(
+        ctypes.addressof(scene), int(np.argmax(lattices.value)), LEAST_NOISE,
+        *addresses(pose, gain, numbers, cells, sums, seen, level, left),
+    )  # fmt: skip
+    covariance = np.full((count, 3, 3), math.nan)
+    if with_covariance:
+        covariance = covariances(image, lattices, left * image.trust, noise)
+    unit = float(image.trust.sum()) * math.log(noise)
     found = []
-    for b, count in enumerate(sums.count.tolist()):
-        scores = sums.scores[b, :count]
+    for b, m in enumerate(numbers.tolist()):
+        scores = sums[b, :m]
         most = scores.max(axis=1)
         found.append(
             Fit(
-                x_mm=float(lattices.pose[b, 0]),
-                y_mm=float(lattices.pose[b, 1]),
-                theta_rad=math.remainder(float(lattices.pose[b, 2]), 2 * math.pi),
-                nuisance=lattices.pose[b, 3:],
-                gain=lattices.gain[b],
-                cells=sums.cells[b, :count],
+                x_mm=float(pose[b, 0]),
+                y_mm=float(pose[b, 1]),
+                theta_rad=math.remainder(float(pose[b, 2]), 2 * math.pi),
+                nuisance=pose[b, 3:],
+                gain=gain[b],
+                cells=cells[b, :m],
                 scores=scores - most[:, None],
-                seen=sums.seen[b, :count],
-                noise=sums.noise,
-                value=float(most.sum() + sums.level[b] - unit),
+                seen=seen[b, :m] / image.cell_share,
+                noise=noise,
+                value=float(most.sum() + level[b] - unit),
                 covariance=covariance[b],
             )
         )
     return tuple(found)
 
 
-def _sum_cells(image: Image, template: ResponseTemplate, lattices: Lattices) -> CellSums:
-    """Return what the cells in view of lattices score, and what that is judged by."""
-    settings, best = image.settings.noise, int(np.argmax(lattices.value))
-    library = compiled_kernels()
-    if library is not None:
-        return sum_cells_compiled(library, image, template, lattices.pose, lattices.gain, best)
-    under = project_template(image, template, lattices.pose, lattices.gain)
-    felt, cells = under.felt, under.cells
-    away = _residuals(under)
-    bounded = np.minimum(np.abs(away[best]), settings.far * settings.first)
-    left = math.sqrt(float((felt.trust * bounded**2).sum() / felt.trust.sum()))
-    noise = max(settings.least, left)
-    each = log_likelihoods(felt, under.tables, np.full(len(cells), noise))
-    level = felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
-    count = np.zeros(len(cells), np.int64)
-    names, scores, seen = np.zeros_like(cells), np.zeros_like(each), np.zeros_like(away)
-    for b in range(len(cells)):
-        known, dense = np.unique(cells[b], axis=0, return_inverse=True)
-        dense, count[b] = dense.reshape(-1), len(known)
-        names[b, : count[b]] = known
-        for k, column in enumerate(each[b].T):
-            scores[b, : count[b], k] = np.bincount(dense, column, len(known))
-        seen[b, : count[b]] = np.bincount(dense, felt.press[b] * felt.trust, len(known))
-    return CellSums(noise, count, names, scores, seen, level, away)
+def covariances(image: Image, lattices: Lattices, away: Array, noise: float) -> Array:
+    """Return the covariances (b, 3, 3) of x, y (mm) and theta (rad) of lattices.
+
+    The normal matrix of the last step gives the shape. Its size is the noise that the fit leaves,
+    and what that noise cannot say: tactels of a pad err with their neighbours, and under tabs a
+    touch whose form lies far from what was known beforehand (`FORM_SD`) has more of the template
+    wrong than the fitted part of it.
+
+    Parameters
+    ----------
+    away
+        (b, n) what the likeliest labels leave of the readings, on a covered tactel's scale.
+    noise
+        Standard deviation of psi with which the lattices are scored.
+    """
+    if image.pressing.hardens:
+        prior = np.array([*FORM_SD, image.options.scale_sd])
+        strange = ((lattices.pose[:, 3:POSE] / prior) ** 2).sum(axis=1)
+        size = TAB_SIZE + STRANGE_SIZE * strange**2
+    else:
+        size = PAD_SIZE * _neighbours_alike(away, image.shape, FAR * FIRST_NOISE)
+    shapes = invert_normal(lattices.normal)[:, :3, :3]
+    return np.asarray((noise / FIRST_NOISE) ** 2 * size[:, None, None] * shapes)
 
 
-def _residuals(under: Projection) -> Array:
-    """Return how far (b, n) readings lie from the likeliest labels, on a covered tactel's scale."""
-    felt, cells = under.felt, under.cells
-    scores = log_likelihoods(felt, under.tables, np.full(len(cells), felt.settings.first))
-    values = values_of(under, likeliest_labels(cells, scores, felt.settings.tie))
-    unit = felt.settings.first / felt.press
-    deviation = psi_deviation(felt, values[:, :, None], unit)[..., 0]
-    return (felt.psi - values[..., 0]) * felt.press / deviation
+def invert_normal(normal: Array) -> Array:
+    """Return the inverses of normal matrices (..., k, k).
+
+    Wide, not narrow, in what the image does not show.
+    """
+    diagonal = np.diagonal(normal, axis1=-2, axis2=-1)
+    unit = 1.0 / np.sqrt(np.maximum(diagonal, 1e-12))
+    units = unit[..., :, None] * unit[..., None, :]
+    sizes, axes = np.linalg.eigh(normal * units)
+    shown = axes / np.maximum(sizes, UNSEEN)[..., None, :]
+    return np.asarray(shown @ axes.swapaxes(-2, -1) * units)
+
+
+def _neighbours_alike(away: Array, shape: tuple[int, int], most: float) -> Array:
+    """Return by how much (b,) neighbours that err alike widen a covariance, 1 or more.
+
+    The sum of the autocorrelation of what is left over the eight neighbours.
+    """
+    left = np.clip(away, -most, most).reshape(-1, *shape)
+    left = left - left.mean(axis=(1, 2), keepdims=True)
+    own = np.maximum((left * left).sum(axis=(1, 2)), 1e-12)
+    side = (left[:, 1:] * left[:, :-1]).sum(axis=(1, 2))
+    side += (left[:, :, 1:] * left[:, :, :-1]).sum(axis=(1, 2))
+    across = (left[:, 1:, 1:] * left[:, :-1, :-1]).sum(axis=(1, 2))
+    across += (left[:, 1:, :-1] * left[:, :-1, 1:]).sum(axis=(1, 2))
+    return np.asarray(np.maximum(1.0, 1.0 + 2.0 * (side + across) / own))

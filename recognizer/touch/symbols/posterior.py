@@ -1,71 +1,117 @@
-"""Where a lattice of known symbols lies, and how sure that is: its last fit.
+"""Where a lattice of known symbols lies, how sure that is, and how much of the image it explains.
 
-Image + a lattice near the truth + what its cells show -> pose, gain and their covariance. What a
-sensor may be off by decides what each tactel is worth and how wide the ellipse is: how far its
-readings scatter and how far its tips stand aside is fitted to each touch (`spread`), together with
-what it adds to all readings alike and what neighbouring readings hold of each other (`blur`), which
-makes slopes less steep than the template's. Damped least squares; lattice and sensor frame, mm.
+Image + a lattice near the truth + the labels of its cells -> pose, gain and their covariance. Two
+numbers decide what each tactel is worth and how wide the ellipse is, and are fitted to each touch:
+how far its readings scatter, and how far its tips stand aside (`TactelScatter`). So are an offset
+of all readings, and how much neighbouring readings hold of each other (blur), which makes slopes
+less steep than the template's. Damped least squares; lattice and sensor frame, mm.
+
+The compiled loop does all of it where normal matrices are well conditioned; about one touch in a
+hundred is fitted here, with an inverse that stays wide in what the image does not show.
 """
 
 from __future__ import annotations
 
+import ctypes
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.symbols.blur import second_differences
-from recognizer.touch.symbols.compiled import LastSteps, fit_posterior_compiled
-from recognizer.touch.symbols.covariance import invert_normal
-from recognizer.touch.symbols.fit import Fit
-from recognizer.touch.symbols.gain import Image, bounded_gain
-from recognizer.touch.symbols.kernels import compiled_kernels
-from recognizer.touch.symbols.projection import (
-    Shown,
+from encoded_objects.base.compiled import addresses
+from recognizer.touch.symbols.fit import UNSEEN, Fit, invert_normal, label_tables
+from recognizer.touch.symbols.image import Image, bounded_gain
+from recognizer.touch.symbols.kernels import (
+    ABOVE,
+    DAMPING,
+    DEEPEST_GAIN,
+    EASIER,
+    FORM_SD,
+    HARDER,
+    HIDDEN,
+    LARGEST_STEP,
+    LEAST_DIAGONAL,
+    POSE,
+    QUIET,
+    SHALLOWER,
+    UNKNOWNS,
+    Steps,
+    kernels,
+)
+from recognizer.touch.symbols.linearize import (
+    LabelsAt,
+    force_jacobian,
+    prior_departure,
+    prior_precision,
     project_symbols,
     response_by_psi,
     response_of,
 )
-from recognizer.touch.symbols.refine import (
-    POSE,
-    force_jacobian,
-    prior_departure,
-    prior_precision,
-)
-from recognizer.touch.symbols.spread import TactelScatter, fit_spread, usual_spread
-from recognizer.touch.symbols.template import ResponseTemplate
+from recognizer.touch.symbols.template import CROSS_TALK
 
 Array = NDArray[np.float64]
+
+STEPS = 2  #: of damped least squares
+OFFSET_SD = 0.05  #: of the largest reading: deviation of an offset of all readings
+BLUR_SD = 0.05  #: of the share of each neighbour in a reading
+LARGEST_MORE = (0.1, 0.05, 0.05)  #: steps of offset (of the largest reading) and blur both ways
+LEAST_MORE = (0.01, 1.0, 1.0)  #: is added to the diagonal of the normal matrix for these
+
+# How far readings of a sensor scatter, until a touch shows it.
+USUAL_SCATTER = 0.08  #: deviation of psi on a covered tactel
+USUAL_ASIDE_MM = 0.08  #: of a tip's place, each way
+USUAL_WEIGHT = 4.0  #: tactels that these two weigh as much as
+FREEDOM = 8.0  #: of Student's distribution of errors: a dead tactel or a spike weighs little
+ROUNDS = 6  #: of expectation and maximisation, at each step
+
+# Times the variance of least squares: measured as `fit.TAB_SIZE` was.
+SIZE = 1.1
+BLURRED_SIZE = 2.5  #: more by this, for the share that readings hold of their neighbours ...
+USUAL_BLUR = 0.12  #: ... beyond this
+#: More for each unit by which the squared distance of the form (stroke excess, cross-talk,
+#: exponent) from what was known beforehand, in deviations, exceeds the usual ...
+FORM_SIZE = 0.25
+USUAL_FORM = 5.0  #: ... 4.7 in own simulation, 8.8 in MuJoCo (medians)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TactelScatter:
+    """Standard deviations of psi on a covered tactel, and of the place of a tip."""
+
+    felt: float
+    aside_mm: float
+
+    def variances(self, parts: Array) -> Array:
+        """Return (n,) of forces; `parts` (2, n) are those of a scatter of 1 and 1."""
+        return np.asarray(self.felt**2 * parts[0] + self.aside_mm**2 * parts[1])
+
+    def log_likelihood(self, left: Array, parts: Array, trust: Array) -> float:
+        """Return that of residuals (n,), nats, up to a constant."""
+        variance = self.variances(parts)
+        loss = (FREEDOM + 1) * np.log1p(left * left / (FREEDOM * variance)) + np.log(variance)
+        return -0.5 * float((trust * loss).sum())
+
+    def weights(self, left: Array, parts: Array, trust: Array) -> Array:
+        """Return one over the variance (n,), less for what lies far out."""
+        variance = self.variances(parts)
+        return np.asarray(trust * (FREEDOM + 1) / (FREEDOM * variance + left * left))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosePosterior:
-    """A pose, as far as one touch tells it."""
+    """The pose of a lattice by one touch."""
 
-    pose: Array  #: (7,) of `refine.Lattices`
+    pose: Array  #: (7,) of `fit.Lattices`
     gain: Array  #: (4,)
     covariance: Array  #: (4, 4) of x, y (mm), theta (rad) and scale - 1
-    spread: TactelScatter
+    scatter: TactelScatter
     blur: tuple[float, float]  #: shares of each neighbour in a row's, in a column's reading
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Linearized:
-    """An image about one lattice."""
-
-    pose: Array
-    gain: Array
-    more: Array  # (3,) offset, blur across rows and across columns
-    left: Array  # (n,) forces that are left over
-    parts: Array  # (2, n) of `spread`
-    jacobian: Array  # (n, 14) forces by pose, gain and these three
-    departure: Array  # (14,) how far each unknown lies from what is known beforehand
-
-
-def refit_pose(image: Image, template: ResponseTemplate, fit: Fit, shown: Shown) -> Fit:
-    """Return a fit with pose, gain and covariance as its symbols tell them."""
-    found = fit_posterior(image, template, fit.pose, fit.gain, shown)
+def refit_pose(image: Image, fit: Fit, labels_at: LabelsAt) -> Fit:
+    """Return a fit with pose, gain and covariance by its symbols."""
+    found = fit_posterior(image, fit.pose, fit.gain, labels_at)
     return replace(
         fit,
         x_mm=float(found.pose[0]),
@@ -78,68 +124,94 @@ def refit_pose(image: Image, template: ResponseTemplate, fit: Fit, shown: Shown)
     )
 
 
-def fit_posterior(
-    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown
-) -> PosePosterior:
+def fit_posterior(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> PosePosterior:
     """Return the pose of a lattice whose symbols are known.
 
     Parameters
     ----------
     pose, gain
         (7,) and (4,), to begin with.
-    shown
-        What the cells show.
     """
-    least, most = _step_bounds(image)
-    how = LastSteps(
-        image.settings.posterior.steps, image.settings.spread, least, most, _precision(image)
-    )
-    library = compiled_kernels()
-    found = None
-    if library is not None:
-        found = fit_posterior_compiled(library, image, template, pose, gain, shown, how)
-    pose, gain, more, now, normal = found or _fit(image, template, pose, gain, shown, how)
-    told = invert_normal(normal, image.settings.covariance.unseen)
+    found = _fit_compiled(image, pose, gain, labels_at)
+    pose, gain, more, now, normal = found or fit_steps(image, pose, gain, labels_at)
+    inverse = invert_normal(normal)
     rows = [0, 1, 2, POSE - 1]
-    covariance = _size(image, pose, more) * told[rows][:, rows]
-    spread = TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
-    return PosePosterior(pose, gain, covariance, spread, (float(more[1]), float(more[2])))
+    covariance = _size(pose, more) * inverse[rows][:, rows]
+    scatter = TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
+    return PosePosterior(pose, gain, covariance, scatter, (float(more[1]), float(more[2])))
 
 
-def _fit(
-    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown, how: LastSteps
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Return what `compiled.fit_posterior_compiled` says."""
-    known, trust, freedom = np.diag(how.known), image.trust, how.spread.freedom
-    at = _linearize(image, template, pose, gain, np.zeros(3), shown)
-    spread, damping = usual_spread(how.spread), image.settings.refine.damping
-    for step in range(how.steps + 1):
-        spread = fit_spread(spread, at.left, at.parts, at.jacobian, known, trust, how.spread)
-        weights = spread.weights(at.left, at.parts, trust, freedom)
+#: Pose (7,), gain (4,), offset and blurs (3,), variances (2,) of a covered tactel's psi and of a
+#: tip's place, and the normal matrix (14, 14).
+_Fitted = tuple[Array, Array, Array, Array, Array]
+
+
+def _fit_compiled(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> _Fitted | None:
+    """Return the fit; None where a normal matrix is badly conditioned."""
+    labels, corner = label_tables(image, pose[None], STEPS, labels_at)
+    scene = image.scene.of_lattices(1, labels)
+    aside = np.ascontiguousarray(np.broadcast_to(image.aside, len(image.forces)), np.float64)
+    least, most = step_bounds(image)
+    known = precision_of(image)
+    steps = Steps(
+        rows=image.shape[0], columns=image.shape[1], steps=STEPS, rounds=ROUNDS, freedom=FREEDOM,
+        touches=USUAL_WEIGHT, unseen=UNSEEN, usual=(USUAL_SCATTER**2, USUAL_ASIDE_MM**2),
+        least=tuple(least.tolist()), most=tuple(most.tolist()), known=tuple(known.tolist()),
+        aside=aside.ctypes.data,
+    )  # fmt: skip
+    pose, gain = np.array(pose, np.float64), np.array(gain, np.float64)
+    more, now, normal = np.empty(3), np.empty(2), np.empty((len(known), len(known)))
+    seen = kernels().fit_posterior(
+        ctypes.addressof(scene), ctypes.addressof(steps),
+        *addresses(labels, corner, pose, gain, more, now, normal),
+    )  # fmt: skip
+    return (pose, gain, more, now, normal) if seen else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Linearized:
+    """An image about one lattice."""
+
+    pose: Array
+    gain: Array
+    more: Array  # (3,) offset, blur across rows and across columns
+    left: Array  # (n,) forces that are left over
+    parts: Array  # (2, n) of `TactelScatter`
+    jacobian: Array  # (n, 14) forces by pose, gain and these three
+    departure: Array  # (14,) how far each unknown lies from what is known beforehand
+
+
+def fit_steps(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> _Fitted:
+    """Return the fit, whatever the image shows."""
+    precision, trust = precision_of(image), image.trust
+    known = np.diag(precision)
+    at = _linearize(image, pose, gain, np.zeros(3), labels_at)
+    scatter, damping = TactelScatter(USUAL_SCATTER, USUAL_ASIDE_MM), DAMPING
+    for step in range(STEPS + 1):
+        scatter = fit_scatter(scatter, at.left, at.parts, at.jacobian, known, trust)
+        weights = scatter.weights(at.left, at.parts, trust)
         weighted = (at.jacobian * weights[:, None]).T
         normal = weighted @ at.jacobian + known
-        if step == how.steps:
+        if step == STEPS:
             break
         right = weighted @ at.left - known @ at.departure
-        moved = _move(image, at, normal, right, damping, how)
-        tried = _linearize(image, template, *moved, shown)
+        tried = _linearize(image, *_move(image, at, normal, right, damping), labels_at)
         before, after = (
-            spread.log_likelihood(one.left, one.parts, trust, freedom)
+            scatter.log_likelihood(one.left, one.parts, trust)
             - 0.5 * float(one.departure @ known @ one.departure)
             for one in (at, tried)
         )
         if after > before:
-            at, damping = tried, damping / image.settings.refine.easier
+            at, damping = tried, damping / EASIER
         else:
-            damping *= image.settings.refine.harder
-    return at.pose, at.gain, at.more, np.square([spread.felt, spread.aside_mm]), normal
+            damping *= HARDER
+    return at.pose, at.gain, at.more, np.square([scatter.felt, scatter.aside_mm]), normal
 
 
 def _linearize(
-    image: Image, template: ResponseTemplate, pose: Array, gain: Array, more: Array, shown: Shown
+    image: Image, pose: Array, gain: Array, more: Array, labels_at: LabelsAt
 ) -> _Linearized:
-    noise = image.settings.noise
-    felt, _, values = project_symbols(image, template, pose[None], gain[None], shown)
+    felt, _, values = project_symbols(image, pose[None], gain[None], labels_at)
     jacobian, force = (
         one[0] for one in force_jacobian(image, pose[None], gain[None], values, felt)
     )
@@ -150,7 +222,7 @@ def _linearize(
     rows, across = second_differences(jacobian, image.shape)
     jacobian = jacobian + (more[1] * rows + more[2] * across)
     parts = np.empty((2, len(force)))
-    parts[0] = noise.quiet**2 + value[:, 0] ** 2
+    parts[0] = QUIET**2 + value[:, 0] ** 2
     parts[1] = image.aside * (value[:, 1] ** 2 + value[:, 2] ** 2)
     parts *= unit**2
     left = image.forces - force - columns @ more
@@ -160,53 +232,124 @@ def _linearize(
 
 
 def _move(
-    image: Image, at: _Linearized, normal: Array, right: Array, damping: float, how: LastSteps
+    image: Image, at: _Linearized, normal: Array, right: Array, damping: float
 ) -> tuple[Array, Array, Array]:
     """Return pose, gain and the sensor's unknowns a damped step further."""
-    refine = image.settings.refine
-    lattice, limits = len(at.pose) + len(at.gain), np.array(refine.limits)
+    least, most = step_bounds(image)
     system = normal.copy()
-    system.flat[:: len(system) + 1] += np.diagonal(normal) * damping + how.least
-    step = _clip(np.asarray(np.linalg.solve(system, right)), how.most)
-    pose, gain = at.pose + step[:POSE], at.gain + step[POSE:lattice]
-    pose[3:] = _clip(pose[3:], limits)
-    gain[1] = min(max(gain[1], refine.shallower * at.gain[1]), refine.deepest)
-    gain = bounded_gain(gain[None], image.settings.gain.steepest)[0]
-    return pose, gain, at.more + step[lattice:]
+    system.flat[:: len(system) + 1] += np.diagonal(normal) * damping + least
+    step = _clip(np.asarray(np.linalg.solve(system, right)), most)
+    pose, gain = at.pose + step[:POSE], at.gain + step[POSE:UNKNOWNS]
+    pose[3:] = _clip(pose[3:], np.array(image.limits))
+    gain[1] = min(max(gain[1], SHALLOWER * at.gain[1]), DEEPEST_GAIN)
+    gain = bounded_gain(gain[None])[0]
+    return pose, gain, at.more + step[UNKNOWNS:]
 
 
-def _step_bounds(image: Image) -> tuple[Array, Array]:
-    """Return what the diagonal gains (14,), and the largest step (14,)."""
-    refine, settings = image.settings.refine, image.settings.posterior
-    most = np.array([*refine.step, *settings.step])
-    most[len(refine.step)] *= float(image.forces.max())
-    return np.array([*refine.least, *settings.least]), most
+def step_bounds(image: Image) -> tuple[Array, Array]:
+    """Return what is added to the diagonal (14,), and the largest step (14,)."""
+    most = np.array([*LARGEST_STEP, *LARGEST_MORE])
+    most[UNKNOWNS] *= float(image.forces.max())
+    return np.array([*LEAST_DIAGONAL, *LEAST_MORE]), most
 
 
 def _clip(values: Array, most: Array) -> Array:
     return np.asarray(np.minimum(np.maximum(values, -most), most))
 
 
-def _precision(image: Image) -> Array:
+def precision_of(image: Image) -> Array:
     """Return what is known of each unknown beforehand, one over its variance (14,)."""
-    settings = image.settings.posterior
-    offset = settings.offset * max(float(image.forces.max()), 1e-12)
-    more = 1.0 / np.square([offset, settings.blur, settings.blur])
+    offset = OFFSET_SD * max(float(image.forces.max()), 1e-12)
+    more = 1.0 / np.square([offset, BLUR_SD, BLUR_SD])
     return np.concatenate([prior_precision(image), more])
 
 
-def _size(image: Image, pose: Array, more: Array) -> float:
+def _size(pose: Array, more: Array) -> float:
     """Return by how much the covariance is wider than least squares say.
 
-    Readings that hold much of each other do so in a way that no second difference tells. And where
-    strokes are felt in another form than was known beforehand, more of the template is wrong than
-    the fitted part of it: what is not fitted moves all symbols alike, so that nothing of it is left
-    over (`docs/recognizer.md`, "How sure it is").
+    Readings that hold much of each other do so in a way that no second difference describes. And
+    where strokes have another form than was known beforehand, more of the template is wrong than
+    the fitted part of it: the rest moves all symbols alike and leaves no residual
+    (`docs/recognizer.md`, "How sure it is").
     """
-    settings, refine = image.settings.covariance, image.settings.refine
-    heard = image.settings.template.cross_talk * (1 + float(pose[4]))
-    heard += 2 * float(more[1:].sum())
-    blurred = settings.blurred * max(0.0, heard - settings.usual_blur)
-    away = pose[3 : POSE - 1] / np.array(refine.prior[3 : POSE - 1])
-    strange = max(0.0, float(away @ away) - settings.usual_form)
-    return (settings.size + blurred) * (1 + settings.form * strange)
+    cross_talk = CROSS_TALK * (1 + float(pose[4]))
+    cross_talk += 2 * float(more[1:].sum())
+    blurred = BLURRED_SIZE * max(0.0, cross_talk - USUAL_BLUR)
+    away = pose[3 : POSE - 1] / np.array(FORM_SD)
+    strange = max(0.0, float(away @ away) - USUAL_FORM)
+    return (SIZE + blurred) * (1 + FORM_SIZE * strange)
+
+
+def fit_scatter(
+    before: TactelScatter, left: Array, parts: Array, jacobian: Array, known: Array, trust: Array,
+    rounds: int = ROUNDS,
+) -> TactelScatter:  # fmt: skip
+    """Return the scatter under which residuals are likeliest, drawn towards the usual one.
+
+    One part goes with what is felt (gains, lengths of tips, noise), the other with the image's
+    slope (tips that stand aside): a sensor whose gains are even and whose tips are not would
+    otherwise pass for a better one than it is. Restricted maximum likelihood by expectation and
+    maximisation: K. L. Lange, R. J. A. Little, J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989) 881;
+    D. A. Harville, same journal, 72 (1977) 320.
+
+    Parameters
+    ----------
+    before
+        To begin with.
+    left
+        (n,) residuals.
+    parts
+        (2, n) variances of a scatter of 1 and 1.
+    jacobian, known
+        (n, k) by which what was fitted took up a share of the residuals, and the precision (k, k)
+        of what was known of it.
+    trust
+        (n,) of the tactels.
+    """
+    usual = np.square([USUAL_SCATTER, USUAL_ASIDE_MM])
+    now = np.square([before.felt, before.aside_mm])
+    for _ in range(rounds):
+        scatter = TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
+        weights = scatter.weights(left, parts, trust)
+        normal = (jacobian * weights[:, None]).T @ jacobian + known
+        inverse = invert_normal(normal)
+        taken = ((jacobian @ inverse) * jacobian).sum(axis=1) * weights
+        share = trust * now[:, None] * parts / scatter.variances(parts)
+        asked = share @ (weights * left * left + taken) + USUAL_WEIGHT * usual / now
+        now = now * np.sqrt(asked / (share.sum(axis=1) + USUAL_WEIGHT))
+    return TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
+
+
+def second_differences(images: Array, shape: tuple[int, int]) -> tuple[Array, Array]:
+    """Return second differences across rows (n, k), and across columns, of images (n, k).
+
+    Readings run into each other along rows and columns: a reading that holds the share b of both
+    its neighbours is the image plus b times its second difference. Beyond the rim nothing is felt.
+    """
+    square = images.reshape(*shape, -1)
+    rows, columns = -2.0 * square, -2.0 * square
+    rows[1:] += square[:-1]
+    rows[:-1] += square[1:]
+    columns[:, 1:] += square[:, :-1]
+    columns[:, :-1] += square[:, 1:]
+    return rows.reshape(images.shape), columns.reshape(images.shape)
+
+
+def explained_share(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> float:
+    """Return the share of the variance of psi that given symbols explain where they stand.
+
+    It is less than 0 where they explain nothing. The part that the noise of readings alone would
+    leave is taken off first.
+
+    Parameters
+    ----------
+    pose, gain
+        (7,) and (4,) of one lattice.
+    """
+    labels, corner = label_tables(image, pose[None], 0, labels_at)
+    scene = image.scene.of_lattices(1, labels)
+    pose, gain = np.array(pose, np.float64), np.array(gain, np.float64)
+    share: float = kernels().explained_share(
+        ctypes.addressof(scene), *addresses(labels, corner, pose, gain), HIDDEN, ABOVE
+    )
+    return share

@@ -12,22 +12,28 @@ Sensor frame, mm; psi values as in `template`.
 
 from __future__ import annotations
 
-import ctypes
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.compiled import addresses
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.touch.settings import DEFAULTS, SearchSettings
-from recognizer.touch.symbols.kernels import compiled_kernels, kernels_in_use
+from recognizer.touch.symbols.kernels import kernels
 from recognizer.touch.symbols.template import Floats, ResponseTemplate
 
+# Work grows with ROTATIONS (PHASES^2 + SHIFTS^2).
+ROTATIONS = 72  #: over the full turn, an even number
+PHASES = 2  #: places per tactel along each axis
+SHIFTS = 10  #: of the lattice along each axis
+RIM = 1  #: tactels beyond the matrix at which a symbol's centre may lie
+REACH = 1.1  #: of a template's half width that kernels cover
+NOTHING = 1e-9  #: response below which it is the rounding error of none
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, eq=False)
 class Bank:
     """Everything about the search that does not depend on the image."""
 
@@ -41,51 +47,58 @@ class Bank:
     rotations_rad: NDArray[np.float64]  #: (rotations,)
     shifts_mm: NDArray[np.float64]  #: (shifts^2, 2) of the lattice
 
+    @cached_property
+    def tactels(self) -> NDArray[np.intp]:
+        """(2, places, m) which tactels of a padded image lie at each tap about each place."""
+        side, around = 2 * self.reach + 1, 2 * (self.reach + self.rim)
+        shape = (2, self.shape[0] + around, self.shape[1] + around)
+        layer, down, along = np.unravel_index(self.taps[:, None], (2, side, side))
+        height, width = shape[1] - 2 * self.reach, shape[2] - 2 * self.reach
+        y, x = (part.reshape(-1, 1) for part in np.indices((height, width)))
+        return np.ravel_multi_index((layer + 0 * y, y + down, x + along), shape)
+
 
 def bank_of(
-    template: ResponseTemplate, sensor: SensorType, settings: SearchSettings = DEFAULTS.search
+    template: ResponseTemplate,
+    sensor: SensorType,
+    *,
+    rotations: int = ROTATIONS,
+    shifts: int = SHIFTS,
+    reach: float = REACH,
 ) -> Bank:
-    """Return the tables of a search."""
-    rotations, phases, shifts = settings.rotations, settings.phases, settings.shifts
+    """Return the tables of a search; `reach` of a template's half width is covered by kernels."""
+    phases, rim = PHASES, RIM
     across, down = sensor.step_mm
     turns = np.arange(rotations) * 2 * np.pi / rotations  # an even number
     half = rotations // 2
-    reach = math.ceil(template.half_mm * settings.reach / min(across, down))
-    rim = math.ceil(settings.rim)
+    taps_away = math.ceil(template.half_mm * reach / min(across, down))
     offset = (np.arange(phases) + 0.5) / phases - 0.5  # of a place from its tactel, tactels
-    k = np.arange(-reach, reach + 1)
+    k = np.arange(-taps_away, taps_away + 1)
     # tactel minus place, sensor frame: [ky, kx, py, px]
     dx = (k[None, :, None, None] - offset[None, None, None, :]) * across
     dy = (-k[:, None, None, None] + offset[None, None, :, None]) * down
     dx, dy = np.broadcast_arrays(dx, dy)
-    kernels = np.empty((2, len(k) ** 2, template.order, half, phases * phases), np.float32)
+    responses = np.empty((2, len(k) ** 2, template.order, half, phases * phases), np.float32)
     for i, turn in enumerate(turns[:half]):
         c, s = math.cos(turn), math.sin(turn)
         u = np.stack([c * dx - s * dy, s * dx + c * dy], axis=-1)
         value = template.at(u)[..., 0].reshape(len(k) ** 2, phases * phases, template.order)
-        kernels[0, :, :, i] = value.swapaxes(1, 2)
-        kernels[1, :, :, i] = kernels[0, :, :, i] ** 2
+        responses[0, :, :, i] = value.swapaxes(1, 2)
+        responses[1, :, :, i] = responses[0, :, :, i] ** 2
     lookups, shifts_mm = _lookups(template, sensor, turns, rim, phases, shifts)
-    taps, even, odd = _opposite_pairs(kernels, settings.nothing)
-    return Bank(
-        (sensor.rows, sensor.columns),
-        reach,
-        rim,
-        taps,
-        even,
-        odd,
-        lookups,
-        turns,
-        shifts_mm,
+    taps, even, odd = _opposite_pairs(responses)
+    shape = (sensor.rows, sensor.columns)
+    return Bank(shape, taps_away, rim, taps, even, odd, lookups, turns, shifts_mm)
+
+
+def _opposite_pairs(responses: Floats) -> tuple[NDArray[np.int32], Floats, Floats]:
+    """Return `taps`, `even` and `odd` of a bank from responses (2, K^2, ...) at each tap."""
+    flat, opposite = (
+        one.reshape(2 * responses.shape[1], -1) for one in (responses, responses[:, ::-1])
     )
-
-
-def _opposite_pairs(kernels: Floats, nothing: float) -> tuple[NDArray[np.int32], Floats, Floats]:
-    """Return `taps`, `even` and `odd` of a bank from kernels (2, K^2, ...), symbols at each tap."""
-    flat, opposite = (one.reshape(2 * kernels.shape[1], -1) for one in (kernels, kernels[:, ::-1]))
     number = np.arange(len(flat), dtype=np.int32)
     across = number.reshape(2, -1)[:, ::-1].ravel()
-    felt = np.maximum(np.abs(flat), np.abs(opposite)).max(axis=1) > nothing  # not in the corners
+    felt = np.maximum(np.abs(flat), np.abs(opposite)).max(axis=1) > NOTHING  # not in the corners
     one = number[felt & (number <= across)]
     taps = np.stack([one, across[one]])
     even, odd = (
@@ -126,114 +139,59 @@ def _lookups(
     return np.ascontiguousarray(np.sort(table, axis=2)[:, :, :used]), shifts_mm
 
 
-def search(
-    bank: Bank, values: Floats, weights: Floats, order: int, keep: int
-) -> NDArray[np.float64]:
-    """Return the best lattices.
+@dataclass(frozen=True, slots=True, eq=False)
+class LatticeScores:
+    """How well every rotation and shift of the lattice explains an image."""
+
+    scores: Floats  #: (rotations, shifts^2)
+    around: Floats  #: the best of each score and its neighbours; rotations and shifts are cyclic
+
+    def best(self, bank: Bank, keep: int) -> NDArray[np.float64]:
+        """Return the best lattices (n, 3), at most `keep`, no two of them neighbours.
+
+        x, y (mm), theta: sensor point s lies at R(theta) s + (x, y) in the lattice frame.
+        """
+        shifts, flat = self.scores.shape[1], self.scores.ravel()
+        peaks = np.flatnonzero(flat >= self.around.ravel())
+        order = peaks[np.argsort(-flat[peaks], kind="stable")][:keep]
+        turn, shift = np.divmod(order, shifts)
+        return np.concatenate([bank.shifts_mm[shift], bank.rotations_rad[turn, None]], axis=1)
+
+
+def score_lattices(bank: Bank, values: Floats, weights: Floats, order: int) -> LatticeScores:
+    """Return the scores of all lattices.
 
     Parameters
     ----------
     values
         (rows, columns) psi of the normalised forces.
     weights
-        (rows, columns) 0 ... 1; 0 where a tactel tells nothing.
-    keep
-        How many to return at most; no two of them are neighbours.
-
-    Returns
-    -------
-    (n, 3) x, y (mm), theta: sensor point s lies at R(theta) s + (x, y) in the lattice frame.
+        (rows, columns) 0 ... 1; 0 where a tactel says nothing.
+    order
+        Number of symbols.
     """
-    seen = np.array([values, weights], np.float32)
-    kernels = kernels_in_use()  # what a try was searched with serves the next one, and `diagnose`
-    scores, around = _scores_of(bank, seen.tobytes(), order, kernels)
-    return _peaks(bank, scores, around, keep)
-
-
-@lru_cache(maxsize=4)
-def _scores_of(bank: Bank, seen: bytes, order: int, _kernels: str) -> tuple[Floats, Floats]:
-    """Return the scores of an image, (2, rows, columns), and `best_around` them."""
-    values, weights = np.frombuffer(seen, np.float32).reshape(2, *bank.shape)
-    scores = lattice_scores(bank, values, weights, order)
-    return scores, best_around(scores)
-
-
-def best_around(scores: Floats) -> Floats:
-    """Return the best of each score (rotations, shifts^2) and those beside it; all go round."""
-    turns, n = len(scores), math.isqrt(scores.shape[1])
-    library = compiled_kernels()
-    if library is not None:
-        scores = np.ascontiguousarray(scores)  # named, so that it stays while it is looked at
-        around = np.empty_like(scores)
-        library.look_around(turns, n, *addresses(scores, around))
-        return around
-    most = scores.reshape(turns, n, n)
-    for axis in range(3):  # all three go round
-        one = most.swapaxes(0, axis)
-        line = one.copy()
-        np.maximum(line[1:], one[:-1], out=line[1:])
-        np.maximum(line[:-1], one[1:], out=line[:-1])
-        line[0], line[-1] = np.maximum(line[0], one[-1]), np.maximum(line[-1], one[0])
-        most = line.swapaxes(0, axis)
-    return most.reshape(scores.shape)
-
-
-def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> Floats:
-    """Return the score of every rotation and shift, (rotations, shifts^2)."""
     pad = bank.reach + bank.rim
     rows, columns = bank.shape
     height, width = rows + 2 * bank.rim, columns + 2 * bank.rim
     padded = np.zeros((2, rows + 2 * pad, columns + 2 * pad), np.float32)
     padded[:, pad : pad + rows, pad : pad + columns] = 2 * weights * values, -weights
-    one, other = padded.ravel().take(_tactels_of(bank))
-    turns = len(bank.rotations_rad)
-    even, odd = (one + other) @ bank.even, (one - other) @ bank.odd
-    library = compiled_kernels()
-    if library is not None:
-        return _sum_lattices(library, bank, even, odd, (height, width, order))
-    even, odd = (part.reshape(height, width, order, turns // 2, -1) for part in (even, odd))
-    best = np.concatenate([even + odd, (even - odd)[..., ::-1]], axis=3).max(axis=2)
-    np.maximum(best, 0, out=best)
-    phases = round(math.sqrt(best.shape[-1]))
-    grid = best.reshape(height, width, turns, phases, phases).transpose(2, 0, 3, 1, 4)
-    places = np.zeros((turns, height * width * phases * phases + 1), np.float32)
-    places[:, :-1] = grid.reshape(turns, -1)
-    base = (np.arange(turns) * places.shape[1])[:, None, None]
-    return np.asarray(np.take(places.ravel(), bank.lookups + base).sum(axis=2))
-
-
-@lru_cache(maxsize=16)
-def _tactels_of(bank: Bank) -> NDArray[np.intp]:
-    """Return (2, places, m) which tactels of a padded image lie at each tap about each place."""
-    side, around = 2 * bank.reach + 1, 2 * (bank.reach + bank.rim)
-    shape = (2, bank.shape[0] + around, bank.shape[1] + around)
-    layer, down, along = np.unravel_index(bank.taps[:, None], (2, side, side))
-    height, width = shape[1] - 2 * bank.reach, shape[2] - 2 * bank.reach
-    y, x = (part.reshape(-1, 1) for part in np.indices((height, width)))
-    return np.ravel_multi_index((layer + 0 * y, y + down, x + along), shape)
-
-
-def _sum_lattices(
-    library: ctypes.CDLL, bank: Bank, even: Floats, odd: Floats, sides: tuple[int, int, int]
-) -> Floats:
-    """Return the scores of lattices from those of symbols at places, compiled."""
+    one, other = padded.ravel().take(bank.tactels)
+    even = np.ascontiguousarray((one + other) @ bank.even, np.float32)
+    odd = np.ascontiguousarray((one - other) @ bank.odd, np.float32)
     turns, lattices, cells = bank.lookups.shape
-    height, width, order = sides
     phases = math.isqrt(even.shape[1] // (order * turns // 2))
     lookups = np.ascontiguousarray(bank.lookups, np.int32)
-    even, odd = (np.ascontiguousarray(part, np.float32) for part in (even, odd))
     scores = np.empty((turns, lattices), np.float32)
-    library.sum_lattices(
+    kernels().sum_lattices(
         height, width, order, turns, phases, lattices, cells,
         *addresses(even, odd, lookups, scores),
     )  # fmt: skip
-    return scores
+    return LatticeScores(scores, best_around(scores))
 
 
-def _peaks(bank: Bank, scores: Floats, around: Floats, keep: int) -> NDArray[np.float64]:
-    """Return the best lattices of which no two are neighbours."""
-    shifts, flat = scores.shape[1], scores.ravel()
-    peaks = np.flatnonzero(flat >= around.ravel())
-    order = peaks[np.argsort(-flat[peaks], kind="stable")][:keep]
-    turn, shift = np.divmod(order, shifts)
-    return np.concatenate([bank.shifts_mm[shift], bank.rotations_rad[turn, None]], axis=1)
+def best_around(scores: Floats) -> Floats:
+    """Return the best of each score (rotations, shifts^2) and its neighbours, cyclic all ways."""
+    scores = np.ascontiguousarray(scores)
+    around = np.empty_like(scores)
+    kernels().look_around(len(scores), math.isqrt(scores.shape[1]), *addresses(scores, around))
+    return around

@@ -16,13 +16,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.symbols.damped import ascend, damped_step
-from recognizer.touch.symbols.gain import Image, bounded_gain
-from recognizer.touch.symbols.projection import Shown
-from recognizer.touch.symbols.refine import POSE, linearize_image
-from recognizer.touch.symbols.template import ResponseTemplate
+from recognizer.touch.symbols.image import Image, bounded_gain
+from recognizer.touch.symbols.kernels import (
+    DEEPEST_GAIN,
+    FORM_MOST,
+    LARGEST_STEP,
+    LEAST_DIAGONAL,
+    POSE,
+    SHALLOWER,
+)
+from recognizer.touch.symbols.linearize import (
+    LabelsAt,
+    ascend,
+    damped_step,
+    linearize_image,
+    prior_precision,
+)
+from recognizer.touch.symbols.template import STROKE_UNIT_MM
 
 Array = NDArray[np.float64]
+
+STEPS = 8  #: of damped least squares, at most
+SETTLED = 0.01  #: nats by which a step may change a stretch that counts as found
+LARGEST = 0.15  #: of scale - 1 and of both unknowns of the shear
+WIDEST = 2.5  #: tenths of a mm, of the stroke's excess
+SHEAR_STEP = (0.01, 0.01)  #: largest change of the shear in one step
+SHEAR_LEAST = (10.0, 10.0)  #: is added to the diagonal of its normal matrix
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,47 +65,43 @@ class _StretchedLattice:
     right: Array  # (1, 13)
 
 
-def fit_stretch(
-    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown
-) -> Stretch:
+def fit_stretch(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> Stretch:
     """Return how the lattice under a touch is stretched.
 
     Parameters
     ----------
     pose, gain
         (7,) and (4,) of the fit, to begin with.
-    shown
-        What the cells show.
+    labels_at
+        Labels of the cells.
     """
-    settings = image.settings.stretch
-    prior = (*image.settings.refine.prior[:3], 0.0, *image.settings.refine.prior[4:6], 0.0)
-    refine = replace(image.settings.refine, prior=prior)
-    free = replace(image, settings=replace(image.settings, refine=refine))
-    least = np.array([*refine.least, *settings.least])
-    most = np.array([*refine.step, *settings.step])
-    limits = np.array([settings.widest, *refine.limits[1:3], settings.largest])
+    precision = prior_precision(image)
+    precision[[3, POSE - 1]] = 0.0
+    least = np.array([*LEAST_DIAGONAL, *SHEAR_LEAST])
+    most = np.array([*LARGEST_STEP, *SHEAR_STEP])
+    limits = np.array([WIDEST, *FORM_MOST[1:], LARGEST])
 
     def moved(at: _StretchedLattice, damping: Array) -> _StretchedLattice:
         step = np.clip(damped_step(at, damping, least), -most, most)
         pose, gain = at.pose + step[:, :POSE], at.gain + step[:, POSE : POSE + 4]
         pose[:, 3:] = np.clip(pose[:, 3:], -limits, limits)
-        gain[:, 1] = np.clip(gain[:, 1], refine.shallower * at.gain[:, 1], refine.deepest)
-        gain = bounded_gain(gain, image.settings.gain.steepest)
-        stretch = np.clip(at.stretch + step[:, POSE + 4 :], -settings.largest, settings.largest)
-        return _evaluate(free, template, pose, gain, stretch, shown)
+        gain[:, 1] = np.clip(gain[:, 1], SHALLOWER * at.gain[:, 1], DEEPEST_GAIN)
+        gain = bounded_gain(gain)
+        stretch = np.clip(at.stretch + step[:, POSE + 4 :], -LARGEST, LARGEST)
+        return _evaluate(image, precision, pose, gain, stretch, labels_at)
 
-    start = _evaluate(free, template, pose[None], gain[None], np.zeros((1, 2)), shown)
-    found = ascend(start, moved, settings.steps, refine, settings.settled)
-    return _stretch_of(found, image.settings.template.wider_mm)
+    start = _evaluate(image, precision, pose[None], gain[None], np.zeros((1, 2)), labels_at)
+    found = ascend(start, moved, STEPS, settled=SETTLED)
+    return _stretch_of(found, STROKE_UNIT_MM)
 
 
 def _evaluate(
-    image: Image, template: ResponseTemplate, pose: Array, gain: Array, stretch: Array, shown: Shown
+    image: Image, precision: Array, pose: Array, gain: Array, stretch: Array, labels_at: LabelsAt
 ) -> _StretchedLattice:
     points = image.points_mm
     (a, c), turn = stretch[0], float(pose[0, 2])
     stretched = replace(image, points_mm=points @ np.array([[1 + a, c], [c, 1 - a]]))
-    at = linearize_image(stretched, template, pose, gain, shown)
+    at = linearize_image(stretched, pose, gain, labels_at, precision)
     cos, sin, scale = math.cos(turn), math.sin(turn), 1 + float(pose[0, 6])
     across, up = at.jacobian[0, :, 0], at.jacobian[0, :, 1]  # by x and y of the lattice
     along_x = (across * cos + up * sin) * scale  # and of the sensor
@@ -96,7 +111,7 @@ def _evaluate(
         [at.jacobian[0], along_x * x - along_y * y, along_x * y + along_y * x]
     )
     weighted = (jacobian * at.sure[0, :, None]).T
-    known, precision = np.append(at.known[0], [0.0, 0.0]), np.append(at.precision, [0.0, 0.0])
+    known, precision = np.append(at.known[0], [0.0, 0.0]), np.append(precision, [0.0, 0.0])
     return _StretchedLattice(
         pose=pose,
         gain=gain,

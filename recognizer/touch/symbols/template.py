@@ -6,7 +6,7 @@ the symbol's axes (x along the array's columns, y against its rows), mm.
 
 A tab feels the share of its tip that the plateau covers, and a little more than that share
 because a partly covered tip bulges into the open side; what a pad feels is pressed once by
-the layer model (`pad`); a pixel of a gel sees the mean of the imprint, which membrane and optics
+the layer model; a pixel of a gel sees the mean of the imprint, which membrane and optics
 blur. Responses are kept as
 psi(y) = log(1 + 3 y) / log 4, in which gain errors and noise have about one size. Three
 things are fitted with the rest, to first order: how much wider than asked the strokes are
@@ -26,12 +26,27 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import Alphabet, SymbolStyle
-from recognizer.touch.settings import DEFAULTS, TemplateSettings
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
 PSI = 3.0  #: of log(1 + 3 y) / log 4
+
+# Chosen on simulated touches of the 40 objects of `docs/validation/forty.yaml` (typical noise and
+# strong mismatch; `tests/bench/recognizer_times.py`).
+STEP_MM = 0.05  #: grid of the tables; positions are off by 0.025 mm at most
+BULGE = 0.59  #: F(c)/F(1) = c (1 + BULGE (1 - c)) of a tip covered by the share c
+PENETRATION_MM = 0.4  #: of the plateau into the overlay, for the felt part of a wall
+STROKE_UNIT_MM = 0.1  #: unit of the fitted stroke excess
+CROSS_TALK = 0.12  #: of a reading that neighbours get; twice that at the far end
+EXPONENTS = (0.7, 1.1)  #: between which the slope by the force law's exponent is taken
+GEL_PEAK = 100.0  #: percentile of a gel's imprints that counts as 1
+PAD_PEAK = 98.0  #: percentile of a pad's responses that counts as 1
+PAD_FINE = 20  #: tactels to a pitch when a pad is pressed
+PAD_CELLS = 2  #: pitches pressed: half a cell beyond the one that is kept, each side
+PAD_NEIGHBOURHOODS = 3  #: arrangements of neighbours over which a symbol is averaged
+PAD_PRESSURE = 0.05  #: mean pressure over Young's modulus: the pad is taken as linear
+PAD_STIFFNESS = 1e9  #: N mm / rad: the plate stays level
 
 
 def psi(response: NDArray[np.float64] | Floats) -> NDArray[np.float64]:
@@ -82,33 +97,30 @@ def template_of(
     alphabet: Alphabet,
     style: SymbolStyle,
     sensor: SensorType,
-    settings: TemplateSettings = DEFAULTS.template,
 ) -> ResponseTemplate:
     """Return the template of an alphabet, as embossed and as felt by a sensor."""
-    step, cross_talk, low, high = (
-        settings.step_mm, settings.cross_talk, settings.low, settings.high
-    )  # fmt: skip
+    step, (low, high) = STEP_MM, EXPONENTS
     pad = sensor.overlay.kind == "pad"
     felt = _RESPONSES[sensor.overlay.kind]
     half = style.pitch_mm / 2 if pad else _reach_mm(alphabet, style, sensor)
     steps = math.ceil(half / step) + (0 if pad else 1)
     axis = np.asarray((np.arange(2 * steps + 1) - steps) * step, np.float64)
     usual, wide = (
-        felt(alphabet, replace(style, stroke_mm=style.stroke_mm + by), sensor, axis, settings)
-        for by in (0.0, settings.wider_mm)
+        felt(alphabet, replace(style, stroke_mm=style.stroke_mm + by), sensor, axis)
+        for by in (0.0, STROKE_UNIT_MM)
     )
     rimmed = np.zeros((len(axis) + 2, len(axis) + 2, alphabet.order, 6), np.float32)
     values = rimmed[1:-1, 1:-1]
     for label in range(alphabet.order):
-        middle = _with_cross_talk(usual[label], cross_talk, sensor, step)
+        middle = _with_cross_talk(usual[label], CROSS_TALK, sensor, step)
         values[..., label, 0] = psi(middle)
         values[..., label, 1] = np.gradient(values[..., label, 0], step, axis=1)
         values[..., label, 2] = np.gradient(values[..., label, 0], step, axis=0)
-        values[..., label, 3] = psi(_with_cross_talk(wide[label], cross_talk, sensor, step)) - psi(
+        values[..., label, 3] = psi(_with_cross_talk(wide[label], CROSS_TALK, sensor, step)) - psi(
             middle
         )
         values[..., label, 4] = psi(
-            _with_cross_talk(usual[label], 2 * cross_talk, sensor, step)
+            _with_cross_talk(usual[label], 2 * CROSS_TALK, sensor, step)
         ) - psi(usual[label])
         values[..., label, 5] = (psi(middle**high) - psi(middle**low)) / (high - low)
     ink = float(usual.sum() * step**2 / style.pitch_mm**2) / alphabet.order
@@ -121,17 +133,16 @@ def _tab_responses(
     style: SymbolStyle,
     sensor: SensorType,
     axis: Array,
-    settings: TemplateSettings,
 ) -> Array:
     """Return the responses (order, n, n) of tabs."""
     x, y = np.meshgrid(axis, axis)
     reach = alphabet.reach * style.pitch_mm
-    tip = _disc(sensor.overlay.tab_diameter_mm / 2, settings.step_mm)
+    tip = _disc(sensor.overlay.tab_diameter_mm / 2, STEP_MM)
 
     def felt(strokes: Array) -> Array:
-        presence = _presence(_distance(strokes * reach, x, y), style, settings)
+        presence = _presence(_distance(strokes * reach, x, y), style)
         cover = np.clip(_convolved(presence, tip), 0, 1)
-        return np.asarray(cover * (1 + settings.bulge * (1 - cover)))
+        return np.asarray(cover * (1 + BULGE * (1 - cover)))
 
     return np.stack([felt(np.array(glyph.strokes, float)) for glyph in alphabet.glyphs])
 
@@ -141,22 +152,77 @@ def _pad_responses(
     style: SymbolStyle,
     sensor: SensorType,
     axis: Array,
-    settings: TemplateSettings,
 ) -> Array:
     """Return the responses (order, n, n) of a pad, 1 where they are highest."""
     from scipy.ndimage import correlate1d
 
-    from recognizer.touch.symbols.pad import pad_responses
-
-    step = settings.step_mm
+    step = STEP_MM
     tactel = _line(sensor.pitch_mm, step)
     cut = len(tactel) // 2
     beyond = axis[0] + np.arange(-cut, len(axis) + cut) * step
-    base = pad_responses(alphabet, style, sensor, beyond, settings)
+    base = _pressures(alphabet, style, sensor, beyond)
     across = correlate1d(base, tactel, axis=1, mode="nearest")
     tactels = correlate1d(across, tactel, axis=2, mode="nearest")
     tactels = tactels[:, cut : cut + len(axis), cut : cut + len(axis)]
-    return np.asarray(tactels / np.percentile(tactels, settings.pad_peak))
+    return np.asarray(tactels / np.percentile(tactels, PAD_PEAK))
+
+
+def _pressures(
+    alphabet: Alphabet,
+    style: SymbolStyle,
+    sensor: SensorType,
+    axis_mm: Array,
+) -> Array:
+    """Return the pressure under a pad (order, n, n) over a cell, 1 where it is highest.
+
+    A pad passes a load on farther than a cell and bridges symbols that stand close together: its
+    response is no blur of the symbol alone. Each symbol is pressed among others by the layer model
+    on tactels far finer than the real ones. Thesis 4.2.
+
+    Parameters
+    ----------
+    axis_mm
+        (n,) offsets from the cell's centre, both ways; rows run upwards.
+    """
+    from scipy.ndimage import map_coordinates
+
+    from probe.contact.contract import Touch, WristStiffness
+    from probe.contact.layer import layer
+    from probe.surface.face import endless_face
+    from probe.surface.symbols import Relief
+
+    pitch, fine = style.pitch_mm, style.pitch_mm / PAD_FINE
+    across = PAD_CELLS * PAD_FINE
+    probe = SensorType(across, across, fine, sensor.overlay)
+    side = PAD_CELLS * pitch
+    force = PAD_PRESSURE * sensor.overlay.young_mpa * side * side
+    rng = np.random.default_rng(1)
+    found = []
+    for label in range(alphabet.order):
+        total = np.zeros((across, across))
+        for _ in range(PAD_NEIGHBOURHOODS):
+            labels = rng.integers(alphabet.order, size=(4, 4))
+            labels[1, 1] = label
+            face = endless_face(
+                labels,
+                tuple(glyph.strokes for glyph in alphabet.glyphs),
+                pitch_mm=pitch,
+                unit_mm=alphabet.reach * pitch,
+                relief=Relief(style.height_mm, style.stroke_mm, 0.0),  # only tops are pressed
+            )
+            at = Touch(
+                1.5 * pitch,
+                -1.5 * pitch,
+                0.0,
+                force,
+                wrist=WristStiffness(PAD_STIFFNESS, PAD_STIFFNESS),
+            )
+            total += layer(face, probe, at, cells_per_tactel=2).forces_n
+        found.append(total[::-1] / PAD_NEIGHBOURHOODS)  # rows upwards
+    where = axis_mm / fine + (across - 1) / 2
+    grid = np.stack(np.meshgrid(where, where, indexing="ij"))
+    smooth = np.array([map_coordinates(one, grid, order=3, mode="nearest") for one in found])
+    return np.asarray(np.maximum(smooth, 0.0) / max(float(smooth.max()), 1e-300))
 
 
 def _gel_responses(
@@ -164,24 +230,23 @@ def _gel_responses(
     style: SymbolStyle,
     sensor: SensorType,
     axis: Array,
-    settings: TemplateSettings,
 ) -> Array:
     """Return the responses (order, n, n) of the pixels of a gel."""
     from scipy.ndimage import correlate1d, gaussian_filter
 
     x, y = np.meshgrid(axis, axis)
-    reach, step = alphabet.reach * style.pitch_mm, settings.step_mm
+    reach, step = alphabet.reach * style.pitch_mm, STEP_MM
     pixel = _line(sensor.pitch_mm, step)
     blur = math.hypot(sensor.overlay.blur_mm, sensor.overlay.membrane_mm) / step
 
     def seen(strokes: Array) -> Array:
-        presence = _presence(_distance(strokes * reach, x, y), style, settings)
+        presence = _presence(_distance(strokes * reach, x, y), style)
         imprint = gaussian_filter(presence, blur, mode="constant")
         across = correlate1d(imprint, pixel, axis=0, mode="constant")
         return np.asarray(correlate1d(across, pixel, axis=1, mode="constant"))
 
     found = np.stack([seen(np.array(glyph.strokes, float)) for glyph in alphabet.glyphs])
-    return np.asarray(np.minimum(found / np.percentile(found, settings.gel_peak), 1.0))
+    return np.asarray(np.minimum(found / np.percentile(found, GEL_PEAK), 1.0))
 
 
 _RESPONSES = {"tab": _tab_responses, "pad": _pad_responses, "gel": _gel_responses}
@@ -219,12 +284,12 @@ def _distance(strokes: Array, x: Array, y: Array) -> Array:
     return best
 
 
-def _presence(distance: Array, style: SymbolStyle, settings: TemplateSettings) -> Array:
+def _presence(distance: Array, style: SymbolStyle) -> Array:
     """Return how much of the plateau's pressure is felt at a point: 1 on it, falling on a wall."""
     top = style.stroke_mm / 2 - style.chamfer_mm
     slope = math.tan(max(style.draft_rad, 0.02))
-    wall = min(settings.penetration_mm, style.height_mm) * slope + style.chamfer_mm
-    return np.clip(1 - (distance - top) / max(wall, settings.step_mm), 0, 1)
+    wall = min(PENETRATION_MM, style.height_mm) * slope + style.chamfer_mm
+    return np.clip(1 - (distance - top) / max(wall, STEP_MM), 0, 1)
 
 
 def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> float:

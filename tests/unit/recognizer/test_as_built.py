@@ -18,13 +18,16 @@ from recognizer.as_built.estimate import (
 from recognizer.as_built.verdict import AS_DESIGNED, CORRECTED, PRINT_AGAIN, judge_print
 from recognizer.errors import AsBuiltError
 from recognizer.touch.as_built import (
+    APART_SD,
+    ASIDE_SD_MM,
+    SCALE_SD,
+    SKEW_SD_RAD,
     FeltScale,
     PrintedFace,
     print_matrix,
     print_of,
     usual_print,
 )
-from recognizer.touch.settings import DEFAULTS
 
 NEAR = st.floats(0.94, 1.06)
 TOP = np.eye(3)
@@ -167,7 +170,7 @@ def test_a_pose_is_as_unsure_as_the_print_where_it_is_far_from_the_middle():
     pose = np.eye(4)
     pose[:2, 3] = 30, 30  # the middle
     own = np.diag([1e-4, 1e-4, 1e-6])
-    floor = np.diag([DEFAULTS.printed.aside_mm**2] * 2 + [0])  # backlash, shifted layers
+    floor = np.diag([ASIDE_SD_MM**2] * 2 + [0])  # backlash, shifted layers
     same, covariance = face.pose(pose, own)
     np.testing.assert_allclose(same, pose, atol=1e-12)
     np.testing.assert_allclose(covariance, own + floor + np.diag([0, 0, 1.5e-3**2]), atol=1e-12)
@@ -190,14 +193,12 @@ def felt(excess, sigma=1e-3, expected=1e9, with_pose=(0.0, 0.0, 0.0)):
 
 
 def test_prints_that_nobody_measured_come_out_as_designed_more_or_less():
-    usual, settings = usual_print(), DEFAULTS.printed
+    usual = usual_print()
     assert (usual.scale_x, usual.scale_y, usual.skew_rad, usual.touches) == (1.0, 1.0, 0.0, 0)
     mean, apart = np.array([0.5, 0.5, 0, 0]), np.array([1, -1, 0, 0])
-    assert apart @ usual.covariance @ apart == pytest.approx(2 * settings.apart**2 / 2)
-    assert mean @ usual.covariance @ mean == pytest.approx(
-        settings.scale**2 + settings.apart**2 / 4
-    )
-    assert usual.covariance[2, 2] == pytest.approx(settings.skew_rad**2)
+    assert apart @ usual.covariance @ apart == pytest.approx(2 * APART_SD**2 / 2)
+    assert mean @ usual.covariance @ mean == pytest.approx(SCALE_SD**2 + APART_SD**2 / 4)
+    assert usual.covariance[2, 2] == pytest.approx(SKEW_SD_RAD**2)
 
 
 def test_what_a_touch_feels_of_the_scale_moves_its_place_towards_the_middle():
@@ -211,7 +212,7 @@ def test_what_a_touch_feels_of_the_scale_moves_its_place_towards_the_middle():
     np.testing.assert_allclose(found[:3, :3], pose[:3, :3], atol=1e-9)
     # what is left of the mean, and of the difference, which no touch tells
     left, apart = (1 - share) * 2e-6, 2e-6
-    floor = DEFAULTS.printed.aside_mm**2
+    floor = ASIDE_SD_MM**2
     assert covariance[0, 0] == pytest.approx(floor + 20**2 * (left + apart), rel=0.01)
     assert covariance[1, 1] == pytest.approx(floor + 10**2 * (left + apart), rel=0.01)
     assert covariance[0, 1] == pytest.approx(-20 * 10 * (left - apart), rel=0.02)
@@ -240,7 +241,7 @@ def test_a_place_that_hangs_on_the_scale_moves_with_it():
     assert found[:2, 3] == pytest.approx((-0.04, 0.0), abs=1e-6)  # the print is as designed
     assert math.atan2(found[1, 0], found[0, 0]) == pytest.approx(-0.0004, rel=1e-3)
     left = covariance - np.outer((1e-5, 0, 1e-7), (1e-5, 0, 1e-7)) / 1e-6
-    floor = np.diag([DEFAULTS.printed.aside_mm**2] * 2 + [0.0])
+    floor = np.diag([ASIDE_SD_MM**2] * 2 + [0.0])
     np.testing.assert_allclose(told, left + floor, atol=1e-9)
 
 

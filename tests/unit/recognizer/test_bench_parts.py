@@ -42,9 +42,8 @@ from recognizer.bench.reading import AGAIN_S, RESTLESS_S, ReadTrigger
 from recognizer.bench.simulated import parse_simulation
 from recognizer.bench.touch_log import TouchLog
 from recognizer.scan.mosaic.canvas import GlobalImage
-from recognizer.touch.cause import EDGE, NO_LOAD, Cause
 from recognizer.touch.lab import Lab
-from recognizer.touch.recognition import refusal
+from recognizer.touch.recognition import EDGE, NO_LOAD, Cause, refusal
 
 
 def recorded(path, counts, step_ns=10_000_000):

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recognizer.touch.cause import Cause
+from recognizer.touch.first_look import gap_share
 
 from encoded_objects import simulate
 from encoded_objects.base.sensor_type import SensorType
@@ -13,9 +15,7 @@ from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.simulate.registered import registered_surface
 from recognizer.touch import cause
-from recognizer.touch.cause import Cause
 from recognizer.touch.diagnose import CauseSettings, diagnose, image_features
-from recognizer.touch.first_look import gap_share
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, TOO_FEW, refusal

@@ -23,8 +23,8 @@ from probe.simulate.registered import registered_surface
 from probe.wrist import Wrist, counts_of, distances_at
 from recognizer.command import run
 from recognizer.command.scanning import ScanError, pose_during, read_joints
-from recognizer.touch.contacts import TouchImage
 from recognizer.touch.robot import Seating
+from recognizer.touch.source import TouchImage
 
 SPEC = "name: Cube\nshape: {cube: 40 mm}\n"
 KEYS = {"seq", "object", "face", "index", "T_face_probe", "T_object_probe", "margin", "reason"}

@@ -17,7 +17,7 @@ from recognizer.scan.mosaic.grow import add_touch, mosaic_of, settle_mosaic
 from recognizer.scan.mosaic.mosaic import ALONE, no_touches, outliers
 from recognizer.scan.mosaic.planar import PlacedTouch, compose_poses, planar_belief, relative_pose
 from recognizer.scan.mosaic.register import AMBIGUOUS, CONSTANT
-from recognizer.touch.settings import SignalSettings
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.signal import signal_of
 
 SENSOR = SensorType()
@@ -33,7 +33,7 @@ SPREAD = (1.0 * P, 1.0 * P, 0.3 * DEG)
 DECODED = (0.03, 0.03, 0.1 * DEG)
 T_FACE_ARM = np.array([60.0, 35.0, 0.4])
 
-FELT = SignalSettings(contact_counts=0.1)  #: of newtons without a calibration
+FELT = ReaderOptions(contact_counts=0.1)  #: of newtons without a calibration
 
 
 @lru_cache
@@ -51,7 +51,7 @@ def scanned(n=4):
         forces = tabs(face, SENSOR, Touch(*pose, 80.0)).forces_n * gains
         forces = np.maximum(forces + rng.normal(0, 0.02, (16, 16)), 0)
         poses.append(pose)
-        signals.append(signal_of(forces, floor=0.0, settings=FELT))
+        signals.append(signal_of(forces, floor=0.0, options=FELT))
     return np.array(poses), tuple(signals)
 
 
@@ -154,7 +154,7 @@ def test_steps_do_not_drift():
 def test_blank_touches_stay_where_they_are_believed():
     rng = np.random.default_rng(1)
     flat = [
-        signal_of(0.3 + rng.normal(0, 0.01, (16, 16)), floor=0.0, settings=FELT) for _ in range(3)
+        signal_of(0.3 + rng.normal(0, 0.01, (16, 16)), floor=0.0, options=FELT) for _ in range(3)
     ]
     places = [planar_belief((k * 4.25 * P, 0.0, 0.0), SPREAD) for k in range(3)]
     some = [PlacedTouch(f, p, seq=k) for k, (f, p) in enumerate(zip(flat, places, strict=True))]
@@ -172,7 +172,7 @@ def test_a_surface_that_repeats_is_ambiguous():
     for k in range(2):
         forces = tabs(face, SENSOR, Touch(30 + 6.0 * k, 40, 0.2, 80.0)).forces_n
         pose = planar_belief((6.0 * k * math.cos(0.2), -6.0 * k * math.sin(0.2), 0.0), wide)
-        some.append(PlacedTouch(signal_of(forces, floor=0.0, settings=FELT), pose, seq=k))
+        some.append(PlacedTouch(signal_of(forces, floor=0.0, options=FELT), pose, seq=k))
     mosaic = mosaic_of(SENSOR, some)
     assert mosaic.reasons == (ALONE, AMBIGUOUS)
     assert mosaic.poses[1] == pytest.approx(some[1].believed.pose, abs=1e-6)

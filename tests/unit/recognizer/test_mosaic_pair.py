@@ -14,7 +14,7 @@ from probe.surface.face import endless_face
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import compose_poses, inverse
 from recognizer.scan.mosaic.register import AMBIGUOUS, APART, CONSTANT, NOISE, register_patches
-from recognizer.touch.settings import SignalSettings
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.signal import signal_of
 
 SENSOR = SensorType()
@@ -29,7 +29,7 @@ GLYPHS = (
 A = np.array([41.3, 52.9, 0.35])
 BELIEF = np.diag([P**2, P**2, (0.5 * DEG) ** 2])
 
-FELT = SignalSettings(contact_counts=0.1)  #: of newtons without a calibration
+FELT = ReaderOptions(contact_counts=0.1)  #: of newtons without a calibration
 
 
 class Ridges:
@@ -59,7 +59,7 @@ def felt(surface, pose, seed=0, trust=None, force=80.0):
     noisy = np.maximum(noisy + rng.normal(0, 0.02, (16, 16)), 0)
     if trust is not None:
         noisy = np.where(trust > 0, noisy, 0.0)
-    return patch_of(SENSOR, signal_of(noisy, trust=trust, floor=0.0, settings=FELT))
+    return patch_of(SENSOR, signal_of(noisy, trust=trust, floor=0.0, options=FELT))
 
 
 def two(surface, true, **options):

@@ -8,6 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recognizer.touch.belief import weigh_cells
+from recognizer.touch.locate import find_hypotheses, find_rivals
+from recognizer.touch.settings import DEFAULTS, BeliefSettings
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
@@ -15,16 +18,13 @@ from generator.spec import read_specs
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.simulate.registered import registered_surface
-from recognizer.touch.belief import weigh_cells
 from recognizer.touch.chance import expected_matches
 from recognizer.touch.hypothesis import Hypothesis, labels_at, log_likelihood
 from recognizer.touch.lab import open_lab
-from recognizer.touch.locate import find_hypotheses, find_rivals
 from recognizer.touch.pose import inside_mm
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise, recognise_with_hypothesis
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUTSIDE, TOO_FEW
-from recognizer.touch.settings import DEFAULTS, BeliefSettings
 from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import psi, template_of

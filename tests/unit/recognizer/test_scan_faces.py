@@ -8,8 +8,8 @@ import pytest
 from recognizer.scan.answer import ScanHypothesis
 from recognizer.scan.session import _Face, _hypotheses_of, contradict, join_faces
 from recognizer.touch.hypothesis import Hypothesis
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, refusal
-from recognizer.touch.settings import ReaderSettings
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def touched(small, lab):
             place = Hypothesis(0, 6, 2, face, score)
             found.append(ScanHypothesis(lab, None, place, fit, score))
         belief = SimpleNamespace(
-            reader=SimpleNamespace(settings=ReaderSettings()),
+            reader=SimpleNamespace(options=ReaderOptions()),
             places=tuple(found), recognition=refusal(4, reason),
         )  # fmt: skip
         pose = None

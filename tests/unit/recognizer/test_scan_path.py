@@ -19,7 +19,6 @@ from recognizer.scan.path import (
 )
 from recognizer.scan.views import LatticeView, ScanSettings
 from recognizer.touch.lab import open_lab
-from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.fit import Fit
 
@@ -68,7 +67,7 @@ def corner(encoding, face):
 
 def followed(encoding, views, steps=None):
     steps = steps or [UNKNOWN] * len(views)
-    return follow_path(encoding, views, steps, DEFAULTS.hypotheses)
+    return follow_path(encoding, views, steps)
 
 
 def test_a_path_decides_places_that_one_touch_leaves_open(encoding):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from recognizer.touch.contacts import TouchImage
 
 from encoded_objects import encode
 from probe.contact.contract import Touch
@@ -12,7 +13,6 @@ from probe.contact.press import press
 from probe.simulate.registered import registered_surface
 from recognizer.as_built.touches import measure_prints
 from recognizer.errors import AsBuiltError
-from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 

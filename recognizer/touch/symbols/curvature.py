@@ -17,10 +17,19 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend
-from recognizer.touch.symbols.damped import ascend, damped_step
-from recognizer.touch.symbols.gain import Image, bounded_gain
+from recognizer.touch.symbols.image import Image, bounded_gain
+from recognizer.touch.symbols.linearize import ascend, damped_step
 
 Array = NDArray[np.float64]
+
+DIRECTIONS = 18  #: of lines, over half a turn
+STEPS = 6  #: of damped least squares
+HARDER = 6.0  #: multiplies the damping after a step that does not help
+AROUND = 5  #: tactels, side of the square over which forces are averaged
+APART_RAD = 0.35  #: by which two curvatures of one radius differ
+FIRST, LEAST, MOST = 0.45, 0.08, 0.8  #: depth, heights of the overlay: to begin with, bounds
+LARGEST_STEP = 0.2  #: of the depth
+FAINT = 0.03  #: root of a response below which its slope is not trusted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +42,7 @@ class BendGuess:
 
 
 def guess_bends(
-    image: Image, sensor: SensorType, radii_mm: tuple[float, ...], ink: float, keep: int
+    image: Image, sensor: SensorType, radii_mm: tuple[float, ...], keep: int
 ) -> list[BendGuess]:
     """Return the bends that explain an image best, at most `keep`, no two of them alike.
 
@@ -43,11 +52,8 @@ def guess_bends(
         As of a flat face.
     radii_mm
         Of the faces that may be touched.
-    ink
-        Mean response of symbols.
     """
-    settings = image.settings.bends
-    angles = np.arange(settings.directions) * math.pi / settings.directions
+    angles = np.arange(DIRECTIONS) * math.pi / DIRECTIONS
     bends = [Bend(radius, float(angle)) for radius in radii_mm for angle in angles]
     height = sensor.overlay.height_mm
     symbol = image.pressing.symbol * height
@@ -58,16 +64,16 @@ def guess_bends(
     whole = float(seen @ seen)
     if not whole > 0:
         return []
-    fitted = _fit_gains(image, falls, ink, smooth, seen)
+    fitted = _fit_gains(image, falls, smooth, seen)
     found: list[BendGuess] = []
     for b in np.argsort(-fitted.value, kind="stable").tolist():
         if len(found) == keep:
             break
-        if any(_same_bend(bends[b], one.bend, settings.apart) for one in found):
+        if any(_same_bend(bends[b], one.bend, APART_RAD) for one in found):
             continue
         scale = 2.0 * math.log(max(float(fitted.scale[b]), 1e-9))
         gain = np.array([[scale, *fitted.plane[b]]])
-        gain = bounded_gain(gain, image.settings.gain.steepest)[0]
+        gain = bounded_gain(gain)[0]
         found.append(BendGuess(bends[b], gain, -float(fitted.value[b]) / whole))
     return found
 
@@ -92,9 +98,8 @@ class _Average:
     def _sum(self, values: Array) -> Array:
         from scipy.ndimage import uniform_filter
 
-        around = self.image.settings.bends.around
         square = values.reshape(-1, *self.image.shape)
-        sums = uniform_filter(square, (0, around, around), mode="constant")
+        sums = uniform_filter(square, (0, AROUND, AROUND), mode="constant")
         return np.asarray(sums.reshape(values.shape))
 
 
@@ -109,9 +114,9 @@ class _Strips:
     right: Array  # (b, 4)
 
 
-def _fit_gains(image: Image, falls: Array, ink: float, smooth: _Average, seen: Array) -> _Strips:
+def _fit_gains(image: Image, falls: Array, smooth: _Average, seen: Array) -> _Strips:
     """Return the planes under which bends explain an image best."""
-    pressing, basis, settings = image.pressing, image.plane, image.settings.bends
+    pressing, basis, ink = image.pressing, image.plane, image.template.ink
 
     def pressed(plane: Array) -> _Strips:
         depth = plane @ basis.T - falls
@@ -122,7 +127,7 @@ def _fit_gains(image: Image, falls: Array, ink: float, smooth: _Average, seen: A
         root = np.sqrt(np.maximum(smooth.of(force), 1e-9))
         scale = (root @ seen) / (root * root).sum(axis=1)
         away = seen - scale[:, None] * root
-        half = 0.5 * scale[:, None] / np.maximum(root, settings.faint)
+        half = 0.5 * scale[:, None] / np.maximum(root, FAINT)
         columns = [half * smooth.of(slope * one) for one in basis.T]
         jacobian = np.stack([*columns, root], axis=-1)
         return _Strips(
@@ -135,10 +140,10 @@ def _fit_gains(image: Image, falls: Array, ink: float, smooth: _Average, seen: A
 
     def moved(at: _Strips, damping: Array) -> _Strips:
         step = damped_step(at, damping, 1e-9)[:, :3]
-        plane = at.plane + np.clip(step, -settings.step, settings.step)
-        plane[:, 0] = np.clip(plane[:, 0], settings.least, settings.most)
+        plane = at.plane + np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+        plane[:, 0] = np.clip(plane[:, 0], LEAST, MOST)
         return pressed(plane)
 
     start = np.zeros((len(falls), 3))
-    start[:, 0] = settings.first
-    return ascend(pressed(start), moved, settings.steps, settings)
+    start[:, 0] = FIRST
+    return ascend(pressed(start), moved, STEPS, harder=HARDER)

@@ -1,0 +1,152 @@
+"""Which touches are searched for widely, after a first search. Thesis 6.3.
+
+A wide search costs seven times the first. It can hardly change the answer where the first one is
+sure; where symbols explain the image and are so few that they stand elsewhere as well; where fewer
+tactels are pressed than the symbols would press that it takes to name a place; where hardly a
+symbol agrees with the best place, or no strokes show; where the image speaks for symbols of no
+registered place; and where symbols of a place are there beyond doubt and most of the image is
+something else.
+
+Strokes show where weak readings lie within a pitch of the strongest ones: next to a stroke the
+sensor hangs over the bare face. A blank plate presses evenly; so may symbols that stand along the
+tactels' rows and are pressed hard, so nothing is refused for it before a search.
+
+Chosen on 2,326 touches of forty and of forty small objects, most of them at edges and corners, worn
+or soft (own engine, seeds 1001 and 1002, MuJoCo, 1003). Of 274 answers by few symbols that chance
+allows none was wrong, and a wide search would refuse 15 of them. It is asked 303 times of 921 where
+no such answer is, and makes 42 touches right of the 50 that it can.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.touch.evidence import VerifiedHypothesis, symbols_to_name
+from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.options import TIE_NATS
+from recognizer.touch.prepare import PreparedLab
+from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, TOO_FEW, Recognition
+from recognizer.touch.signal import Signal, mean_of_strongest, quantile
+from recognizer.touch.verdict import MANY_INLIERS, RATIO, Evidence
+
+Array = NDArray[np.float64]
+
+PRESSED = 0.15  #: share of the strongest readings from which a tactel is pressed
+AROUND = 5  #: tactels, side of a square in which strokes and gaps lie
+HIGH = 0.85  #: quantile of its readings that stands for strokes
+WEAK = 0.35  #: share of that below which a tactel lies over a gap
+#: Share of such tactels below which no strokes show: of 30,777 touches of a blank plate nine in ten
+#: show fewer than .27 (seed 22), of 682 amid a face, along its rows, at 160 N six fewer than .285
+#: (seeds 11 and 12).
+GAPS = 0.285
+FINEST, COARSEST = 3.1, 5.0  #: tactels, pitches between which gaps were measured
+INK = 0.44  #: share of a cell's tactels that its symbol presses, and some around it
+#: Inliers, with fewer of which a wide search finds no place: of 49 touches that it made right (own
+#: engine, MuJoCo, forty and small objects; seeds 1401-1408) none.
+AGREED = 3
+SURE_RATIO = 20.0  #: nats from which a place's symbols are there beyond doubt, and then ...
+EXPLAINED = 0.6  #: ... the share of the image that they explain
+DOUBT = 1e-3  #: of an answer by few symbols that a better fit may bring below the limit
+MARGIN = 12.0 - TIE_NATS  #: nats that such an answer leaves other places behind
+NEARLY_CHANCE = 1e-5  #: doubt above which an answer by less than `SURE_RATIO` is confirmed
+
+
+def may_find_more(
+    reader: PreparedLab,
+    signal: Signal,
+    answer: Recognition,
+    judged: Recognition,
+    best: VerifiedHypothesis | None,
+) -> bool:
+    """Return whether a wide search may change the answer of a first one.
+
+    Parameters
+    ----------
+    answer, judged
+        Of the first search, before and after few symbols and chance were judged.
+    best
+        The place of the answer; None: there was none.
+    """
+    if best is None:
+        return True
+    evidence, arrays = best.evidence, reader.lab.arrays
+    if answer and evidence.inliers >= MANY_INLIERS:
+        return False
+    if reader.sensor.overlay.kind != "tab" or any(each.radii_mm for each in arrays):
+        return True  # few symbols need confirmation; a round face presses few tactels
+    if answer:
+        return not judged and _is_nearly_sure(judged)
+    if answer.reason == AMBIGUOUS and evidence.inliers < symbols_to_name(best.embossed):
+        return False  # the image is explained, and it shows no more
+    if answer.reason == TOO_FEW:
+        return False
+    return _is_unexplained(reader, signal, evidence)
+
+
+def is_nearly_chance(judged: Recognition, evidence: Evidence) -> bool:
+    """Return whether a wide search has to confirm an answer, as chance nearly allows it."""
+    if judged.doubt is None or judged.doubt <= NEARLY_CHANCE:
+        return False
+    return evidence.log_likelihood_ratio < SURE_RATIO
+
+
+def shows_strokes(reader: PreparedLab, signal: Signal) -> bool:
+    """Return whether strokes show; True where the test was never calibrated (pads, pitches)."""
+    sensor = reader.sensor
+    if sensor.overlay.kind != "tab":
+        return True
+    pitches = [each.style.pitch_mm / sensor.pitch_mm for each in reader.lab.arrays]
+    if min(pitches) < FINEST or max(pitches) > COARSEST:
+        return True
+    return gap_share(signal) >= GAPS
+
+
+def gap_share(signal: Signal) -> float:
+    """Return the share of the tactels next to strong ones that read little."""
+    forces = signal.forces * signal.trust
+    reach = AROUND // 2
+    rows, columns = (np.arange(-reach, n + reach).clip(0, n - 1) for n in forces.shape)
+    windows = np.lib.stride_tricks.sliding_window_view(
+        forces[rows[:, None], columns], (AROUND, AROUND)
+    )
+    near = quantile(np.sort(windows.reshape(*forces.shape, -1), axis=-1), HIGH)
+    adjacent = (near > _pressed_from(signal)) & (signal.trust > 0)
+    weak = adjacent & (forces < WEAK * near)
+    return float(weak.sum()) / max(int(adjacent.sum()), 1)
+
+
+def pressed_tactels(signal: Signal) -> int:
+    """Return how many tactels are pressed by strokes."""
+    return int((signal.forces * signal.trust > _pressed_from(signal)).sum())
+
+
+def _is_nearly_sure(judged: Recognition) -> bool:
+    """Return whether little is missing to the answer that few symbols give."""
+    if judged.reason == BY_CHANCE:
+        return judged.doubt is not None and judged.doubt <= DOUBT
+    if judged.reason == AMBIGUOUS:
+        return judged.margin is not None and judged.margin >= MARGIN
+    return False
+
+
+def _is_unexplained(reader: PreparedLab, signal: Signal, evidence: Evidence) -> bool:
+    """Return whether symbols are pressed that are those of a place, or may be under another fit."""
+    if evidence.inliers < AGREED or evidence.log_likelihood_ratio < RATIO:
+        return False
+    if not shows_strokes(reader, signal):
+        return False
+    least = min(_tactels_to_name(reader, each) for each in reader.lab.arrays)
+    if pressed_tactels(signal) < least:
+        return False
+    return evidence.log_likelihood_ratio < SURE_RATIO or evidence.explained >= EXPLAINED
+
+
+def _pressed_from(signal: Signal) -> float:
+    return PRESSED * mean_of_strongest(signal.forces * signal.trust)
+
+
+def _tactels_to_name(reader: PreparedLab, embossed: EmbossedArray) -> float:
+    """Return how many tactels the symbols press that can name one of the registered cells."""
+    cell = (embossed.style.pitch_mm / reader.sensor.pitch_mm) ** 2
+    return INK * cell * symbols_to_name(embossed)

@@ -1,0 +1,314 @@
+"""An image about lattices of known symbols: likelihood, forces, and their derivatives.
+
+Poses (b, 7) and gains (b, 4) of b lattices + image (n tactels) + labels of the cells -> the
+log-likelihood of each, the forces that the symbols give, and how they change with pose and gain.
+The image is psi(f / g) = T_label(R(theta) s + (x, y) - cell), g the force on a plateau (`image`).
+A sensor point s lies at R(theta) s + (x, y) in the lattice frame. Damped least squares (Levenberg,
+Marquardt) for many starts at once: K. Levenberg, Quart. Appl. Math. 2 (1944) 164; D. W. Marquardt,
+J. SIAM 11 (1963) 431. Lattice and sensor frame in mm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.touch.symbols.image import Image, NormalizedImage, normalize_image
+from recognizer.touch.symbols.kernels import (
+    DAMPING,
+    DISPLACED_MM,
+    EASIER,
+    FAR,
+    FIRST_NOISE,
+    FORCE_SCALE_SD,
+    FORM_SD,
+    GRAZED,
+    HARDER,
+    LOUD,
+    MOST_NATS,
+    POSE,
+    QUIET,
+    UNKNOWNS,
+)
+from recognizer.touch.symbols.template import PSI, Floats, psi
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Which symbols cells show: (b, n, 2) cells of b lattices -> (b, n) labels, -1 for none.
+LabelsAt = Callable[[Ints], Ints]
+
+MOST_DAMPING = 1e6  #: beyond which a step is nothing
+
+
+@dataclass(frozen=True, slots=True)
+class LinearizedImage:
+    """An image about b poses and gains, each tactel weighed by what it is worth."""
+
+    value: Array  #: (b,) log-likelihood of the image, nats, up to a constant of the image
+    jacobian: Array  #: (b, n, 11) forces by pose and gain
+    left: Array  #: (b, n) forces that are left over
+    sure: Array  #: (b, n) one over their variances; 0 where a tactel does not pull
+    known: Array  #: (b, 11) how far each unknown lies from what is known of it beforehand
+    precision: Array  #: (11,) of that
+
+
+def linearize_image(
+    image: Image, pose: Array, gain: Array, labels_at: LabelsAt, precision: Array | None = None
+) -> LinearizedImage:
+    """Return how well lattices of known symbols explain an image, and what a small change does.
+
+    Parameters
+    ----------
+    pose, gain
+        (b, 7) and (b, 4).
+    precision
+        (11,) how well each unknown is known beforehand; that of the image if not given.
+    """
+    felt, labels, values = project_symbols(image, pose, gain, labels_at)
+    if precision is None:
+        precision = prior_precision(image)
+    known = prior_departure(image, pose, gain)
+    value = _log_likelihood(felt, labels, values)
+    value += felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
+    value -= 0.5 * (known**2 * precision).sum(axis=1)
+    jacobian, force = force_jacobian(image, pose, gain, values, felt)
+    width = _width(values, felt)
+    left = image.forces - force
+    sure = np.where(np.abs(left / width) < FAR, felt.trust, 0.0) / width**2
+    return LinearizedImage(value, jacobian, left, sure, known, precision)
+
+
+def prior_departure(image: Image, pose: Array, gain: Array) -> Array:
+    """Return how far (b, 11) each unknown lies from what is known of it beforehand."""
+    away = np.zeros((len(pose), UNKNOWNS))
+    away[:, 3:POSE] = pose[:, 3:]
+    if image.newtons:
+        away[:, POSE] = gain[:, 0] - math.log(image.pressing.scale)
+    return away
+
+
+def prior_precision(image: Image) -> Array:
+    """Return what is known of each unknown beforehand, one over its variance (11,); 0: nothing."""
+    precision = np.zeros(UNKNOWNS)
+    precision[3:POSE] = 1 / np.square([*FORM_SD, image.options.scale_sd])
+    if image.newtons:
+        precision[POSE] = 1 / FORCE_SCALE_SD**2
+    return precision
+
+
+def _width(values: Array, felt: NormalizedImage) -> Array:
+    """Return the standard deviation (b, n) of forces, from that of psi."""
+    unit = FIRST_NOISE / felt.press
+    relative = unit * psi_deviation(felt, values[:, :, None], unit)[..., 0]
+    return np.asarray(relative * response_by_psi(response_of(values[..., 0])) * felt.plateau)
+
+
+def force_jacobian(
+    image: Image, pose: Array, gain: Array, values: Array, felt: NormalizedImage
+) -> tuple[Array, Array]:
+    """Return the derivatives (b, n, 11) of the forces by pose and gain, and the forces (b, n)."""
+    pressing, basis = image.pressing, image.plane
+    c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
+    x, y = image.points_mm.T
+    across, up = c * x - s * y, s * x + c * y
+    slope_x, slope_y = values[..., 1], values[..., 2]
+    turn, scale = slope_y * across - slope_x * up, slope_x * across + slope_y * up
+    free = np.moveaxis(values[..., 3:], -1, 0)
+    by_pose = np.stack([slope_x, slope_y, turn, *free, scale], axis=-1)
+    total = response_of(values[..., 0])
+    by_pose = by_pose * (response_by_psi(total) * felt.plateau)[..., None]
+    symbol = np.clip((total - felt.bare) / np.maximum(1 - felt.bare, 1e-3), 0.0, 1.5)
+    # beyond the edge of the face there is none
+    rest = np.where(values[..., 0] > GRAZED, 1 - symbol, 0.0)
+    unit = np.exp(gain[:, :1])
+    lower = felt.depth - pressing.symbol
+    force = unit * (symbol * felt.plain + rest * felt.lower)
+    slope = unit * (symbol * pressing.slope(felt.depth) + rest * pressing.slope(lower))
+    by_gain = np.concatenate([force[..., None], slope[..., None] * basis], axis=-1)
+    return np.concatenate([by_pose, by_gain], axis=-1), force
+
+
+def project_symbols(
+    image: Image, pose: Array, gain: Array, labels_at: LabelsAt
+) -> tuple[NormalizedImage, Ints, Array]:
+    """Return an image under gains, the label (b, n) under each tactel, and psi and slopes there.
+
+    Psi and slopes (b, n, 6) are those of the bare face where there is no symbol.
+    """
+    felt = normalize_image(image, gain)
+    cells, offsets = _cells_under(image, pose)
+    labels = labels_at(cells)
+    tables = _fit_form(image.template.of(offsets, labels.clip(min=0)), pose, felt)
+    return felt, labels, _with_bare_face(felt, labels, tables[:, :, 0].astype(np.float64))
+
+
+def _with_bare_face(felt: NormalizedImage, labels: Ints, found: Array) -> Array:
+    """Return psi and slopes (b, n, 6) of the bare face where there is no symbol.
+
+    Beyond the edge of a face nothing is felt: a tactel without a symbol shows the nearer of both.
+    """
+    found[labels < 0] = 0.0
+    floor = psi(felt.bare)
+    bare = (labels < 0) & (felt.psi > floor / 2)
+    found[bare, 0] = floor[bare]
+    return np.asarray(found)
+
+
+def response_of(value: Array | Floats) -> Array:
+    """Return y of psi(y)."""
+    return np.asarray(np.expm1(value * np.float32(math.log(1 + PSI))) / np.float32(PSI))
+
+
+def response_by_psi(response: Array) -> Array:
+    """Return dy/dpsi."""
+    return (1 + PSI * response) * math.log(1 + PSI) / PSI
+
+
+def _cells_under(image: Image, pose: Array) -> tuple[Ints, Array]:
+    """Return the cell (b, n, 2) under each tactel, and where in it that lies, mm."""
+    c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
+    pitch = image.template.pitch_mm
+    x, y = image.points_mm.T
+    c, s = c * (1 + pose[:, 6, None]), s * (1 + pose[:, 6, None])
+    u = np.stack([pose[:, 0, None] + c * x - s * y, pose[:, 1, None] + s * x + c * y], axis=-1)
+    cells = np.floor(u / pitch)
+    return cells.astype(np.int64), u - (cells + 0.5) * pitch
+
+
+def _fit_form(tables: Floats, pose: Array, felt: NormalizedImage) -> Floats:
+    """Return templates (b, n, q, 6), their own to be changed, as form and gain are fitted."""
+    for slope, by in enumerate(pose[:, 3:6, None, None].astype(np.float32).swapaxes(0, 1), 3):
+        tables[..., 0] += tables[..., slope] * by
+    if (felt.contact < 1).any():
+        tables *= felt.contact[..., None, None].astype(np.float32)
+    if felt.bare.any():
+        bare = felt.bare[..., None].astype(np.float32)
+        response = response_of(tables[..., 0]).astype(np.float32)
+        total = response + (1 - response) * bare
+        by = (1 - bare) * (1 + 3 * response) / (1 + 3 * total)
+        tables = (tables * by[..., None]).astype(np.float32)
+        tables[..., 0] = psi(total)
+    return tables
+
+
+def psi_deviation(felt: NormalizedImage, tables: Floats | Array, unit: Array) -> Floats:
+    """Return the spread (b, n, q) of psi around templates (b, n, q, 6), in units of the noise.
+
+    Parameters
+    ----------
+    unit
+        (b, n) that unit: deviation of psi on a covered tactel.
+    """
+    value, x, y = tables[..., 0], tables[..., 1], tables[..., 2]
+    square = QUIET**2 + value * value + DISPLACED_MM**2 * (x * x + y * y)
+    return np.asarray(np.sqrt(square + _readings_share(felt, value, unit)), np.float32)
+
+
+def _readings_share(felt: NormalizedImage, value: Array | Floats, unit: Array) -> Array | float:
+    """Return what the noise of readings adds to the square (b, n, q) of a spread."""
+    if felt.faint.max(initial=0.0) < LOUD:
+        return 0.0
+    return (reading_deviation(felt, value) / unit[..., None]) ** 2
+
+
+def reading_deviation(felt: NormalizedImage, value: Array | Floats) -> Array:
+    """Return the standard deviation of psi (b, n, q) that the noise of readings leaves at it."""
+    by_response = PSI / math.log1p(PSI) * np.exp(-math.log1p(PSI) * value)
+    return np.asarray(by_response * felt.faint[..., None])
+
+
+def _log_likelihood(felt: NormalizedImage, labels: Ints, values: Array) -> Array:
+    """Return the log-likelihoods (b,) of given labels (b, n), with their psi and slopes."""
+    unit = FIRST_NOISE / np.maximum(felt.press, 1e-3)
+    symbol = values[:, :, None].astype(np.float32)
+    own = log_densities(felt, symbol[..., 0], psi_deviation(felt, symbol, unit), unit)[..., 0]
+    return np.asarray(np.where(labels < 0, log_densities_of_none(felt, unit), own).sum(axis=1))
+
+
+def log_densities_of_none(felt: NormalizedImage, unit: Array) -> Array:
+    """Return the log-likelihood (b, n) of no symbol: beyond the edge of the face, or on it."""
+    floor = psi(felt.bare)
+    bare = np.stack([np.zeros_like(floor), floor], axis=-1)
+    width = np.sqrt(QUIET**2 + bare**2 + _readings_share(felt, bare, unit))
+    return np.asarray(log_densities(felt, bare, width, unit).max(axis=-1))
+
+
+def log_densities(
+    felt: NormalizedImage, values: Array | Floats, widths: Array | Floats, unit: Array
+) -> Array:
+    """Return log-likelihoods (b, n, q) of values, each with its width in units of the noise."""
+    away = (felt.psi[..., None] - values) / (unit[..., None] * widths)
+    each = -np.minimum(0.5 * away * away, MOST_NATS) - np.log(widths)
+    return np.asarray(felt.trust[:, None] * each, np.float64)
+
+
+class Point(Protocol):
+    """Where b starts are: a dataclass whose fields are arrays (b, ...)."""
+
+    @property
+    def value(self) -> Array:
+        """(b,) objective to maximise."""
+
+    @property
+    def normal(self) -> Array:
+        """(b, k, k) normal matrices."""
+
+    @property
+    def right(self) -> Array:
+        """(b, k) right-hand sides."""
+
+
+P = TypeVar("P", bound=Point)
+
+
+def ascend(
+    start: P,
+    moved: Callable[[P, Array], P],
+    steps: int,
+    *,
+    settled: float = 0.0,
+    harder: float = HARDER,
+) -> P:
+    """Return the best points that are reached in `steps` damped steps.
+
+    Parameters
+    ----------
+    moved
+        (points, damping (b,)) -> the points a step further.
+    settled
+        End when no step changes a value by as much.
+    harder
+        Factor of the damping after a step that does not help.
+    """
+    best, damping = start, np.full(len(start.value), DAMPING)
+    for _ in range(steps):
+        tried = moved(best, damping)
+        better = tried.value > best.value
+        done = bool((np.abs(tried.value - best.value) < settled).all())
+        best = _select_points(better, tried, best)
+        damping = np.where(better, damping / EASIER, np.minimum(damping * harder, MOST_DAMPING))
+        if done:
+            break
+    return best
+
+
+def damped_step(at: Point, damping: Array, least: Array | float) -> Array:
+    """Return the step (b, k) at points; `least` is added to the diagonals in any case."""
+    diagonal = np.einsum("bii->bi", at.normal) * damping[:, None] + least
+    system = at.normal + diagonal[:, :, None] * np.eye(diagonal.shape[1])
+    return np.asarray(np.linalg.solve(system, at.right[..., None])[..., 0])
+
+
+def _select_points(better: NDArray[np.bool_], one: Any, other: Any) -> Any:
+    """Return the points of one where they are better, else those of the other."""
+    picked = {}
+    for item in fields(one):
+        new, old = getattr(one, item.name), getattr(other, item.name)
+        picked[item.name] = np.where(better.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+    return type(one)(**picked)
