@@ -191,9 +191,7 @@ def test_prints_that_nobody_measured_come_out_as_designed_more_or_less():
     assert (usual.scale_x, usual.scale_y, usual.skew_rad, usual.touches) == (1.0, 1.0, 0.0, 0)
     mean, apart = np.array([0.5, 0.5, 0, 0]), np.array([1, -1, 0, 0])
     assert apart @ usual.covariance @ apart == pytest.approx(2 * APART_SD**2 / 2)
-    assert mean @ usual.covariance @ mean == pytest.approx(
-        SCALE_SD**2 + APART_SD**2 / 4
-    )
+    assert mean @ usual.covariance @ mean == pytest.approx(SCALE_SD**2 + APART_SD**2 / 4)
     assert usual.covariance[2, 2] == pytest.approx(SKEW_SD_RAD**2)
 
 

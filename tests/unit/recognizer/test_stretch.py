@@ -12,9 +12,9 @@ from probe.contact.press import press
 from probe.simulate.registered import registered_surface
 from recognizer.as_built.touches import feel_prints
 from recognizer.errors import AsBuiltError
-from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
+from recognizer.touch.source import TouchImage
 
 MIDDLE = np.array([20.0, 20.0])
 
