@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from recognizer.touch.around import combine_around, quantile
+from recognizer.touch.signal import combine_around, quantile
 
 
 @pytest.mark.parametrize("shape", [(16, 16), (12, 32), (3, 1)])

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recognizer.touch.cause import Cause
-from recognizer.touch.first_look import gap_share
 
 from encoded_objects import simulate
 from encoded_objects.base.sensor_type import SensorType
@@ -14,12 +12,14 @@ from generator.spec import read_specs
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.simulate.registered import registered_surface
-from recognizer.touch import cause
-from recognizer.touch.diagnose import CauseSettings, diagnose, image_features
+from recognizer.touch import recognition as cause
+from recognizer.touch.diagnose import diagnose, image_features
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, TOO_FEW, refusal
+from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, TOO_FEW, Cause, refusal
+from recognizer.touch.search_gate import GAPS, gap_share
 from recognizer.touch.signal import signal_of
+from recognizer.touch.verify import TouchImages
 from recognizer.validation.draw import FOREIGN
 
 SENSOR = SensorType()
@@ -58,10 +58,10 @@ def felt(lab, name, touch):
 
 def code_of(reader, image):
     signal = signal_of(np.asarray(image, float))
-    return diagnose(reader, signal, []).code
+    return diagnose(TouchImages(reader, signal), []).code
 
 
-def test_what_the_image_shows_by_itself(reader):
+def test_what_the_image_shows_by_itself(reader, monkeypatch):
     rng = np.random.default_rng(1)
     image = bars(rng)
     assert code_of(reader, image) == cause.UNCLEAR  # nothing is the matter with it
@@ -76,7 +76,8 @@ def test_what_the_image_shows_by_itself(reader):
     assert code_of(reader, row) == cause.ONE_ROW
     smeared = 8 + np.mean([np.roll(image - 8, k, axis=1) for k in range(5)], axis=0)
     signal = signal_of(smeared)
-    found = diagnose(reader, signal, [], CauseSettings(smeared=1.5))
+    monkeypatch.setattr("recognizer.touch.diagnose.SMEARED", 1.5)
+    found = diagnose(TouchImages(reader, signal), [])
     assert found.code == cause.MOVING
     assert found.evidence["direction_deg"] == pytest.approx(0, abs=10) or found.evidence[
         "direction_deg"
@@ -102,10 +103,10 @@ def test_weak_is_told_in_newtons_where_they_are_known(reader):
     image = np.where(bars(rng) > 50, rng.uniform(0.99, 1.0, (16, 16)), 0.0)
     for high, code in ((0.14, cause.SOFT), (0.16, cause.UNCLEAR)):
         signal = signal_of(high * image, floor=0.0, newtons=True)
-        assert diagnose(reader, signal, []).code == code
-    assert str(diagnose(reader, signal_of(0.14 * image, floor=0.0, newtons=True), [])).startswith(
-        "pressed too softly: readings reach 0.14 N"
-    )
+        assert diagnose(TouchImages(reader, signal), []).code == code
+    assert str(
+        diagnose(TouchImages(reader, signal_of(0.14 * image, floor=0.0, newtons=True)), [])
+    ).startswith("pressed too softly: readings reach 0.14 N")
 
 
 def test_an_edge_is_said_with_its_numbers(lab, reader):
@@ -162,8 +163,7 @@ def test_symbols_along_the_rows_are_read_however_few_gaps_they_show(keyed):
     reader, at = Reader(open_lab(keyed)), Touch(18.4, 18.4, np.pi / 2, 300.0)
     surface = registered_surface(keyed, "Cube", "F5").surface
     counts = np.rint(100 * press(surface, SENSOR, at).forces_n)
-    settings = reader.settings.first_look
-    assert gap_share(signal_of(counts), settings) < settings.gaps  # as of a plain plate
+    assert gap_share(signal_of(counts)) < GAPS  # as of a plain plate
     answer = reader.read(counts)
     assert (answer.face, answer.x_mm, answer.y_mm) == (
         "F5", pytest.approx(18.4, abs=0.2), pytest.approx(18.4, abs=0.2),

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import recognizer.touch.belief
-from recognizer.touch.belief import (
+import recognizer.touch.evidence
+from recognizer.touch.evidence import (
     VerifiedHypothesis,
     null_log_likelihood,
     symbols_to_name,
@@ -16,21 +16,14 @@ from recognizer.touch.belief import (
     weigh_cells,
 )
 from recognizer.touch.hypothesis import Hypothesis
-from recognizer.touch.prepare import settings_for
-from recognizer.touch.settings import BeliefSettings, ReaderSettings
-
-LIMITS = BeliefSettings()
+from recognizer.touch.prepare import cell_share
 
 
 @pytest.mark.parametrize(("tactels", "share"), [(3.0, 1.0), (math.sqrt(8.0), 1.0), (2.0, 0.25)])
 def test_few_tactels_on_a_symbol_count_whole(tactels, share):
     sensor = SimpleNamespace(pitch_mm=2.0)
     styles = [SimpleNamespace(style=SimpleNamespace(pitch_mm=2 * t)) for t in (tactels, 9.0)]
-    found = settings_for(SimpleNamespace(arrays=styles), sensor, ReaderSettings())
-    usual = ReaderSettings()
-    assert found.belief.whole == pytest.approx(share * usual.belief.whole)
-    assert found.hypotheses.corner == pytest.approx(share * usual.hypotheses.corner)
-    assert found.hypotheses.heavy == pytest.approx(share * usual.hypotheses.heavy)
+    assert cell_share(SimpleNamespace(arrays=styles), sensor) == pytest.approx(share)
 
 
 def one_cell(small, scores, seen=20.0, held=2, order=4):
@@ -38,7 +31,7 @@ def one_cell(small, scores, seen=20.0, held=2, order=4):
     cells = {(5, 5): (0, held)} if held is not None else {(0, 0): (0, 1)}
     lab = small.Lab(cells, order=order)
     fit = small.fit_of([(0, 0)], [scores], seen)
-    found = weigh_cells(lab.embossed, fit, Hypothesis(0, 5, 5, 0, 0.0), LIMITS)
+    found = weigh_cells(lab.embossed, fit, Hypothesis(0, 5, 5, 0, 0.0))
     return bool(found.worn[0]), bool(found.seen[0]), bool(found.agree[0]), float(found.against[0])
 
 
@@ -82,7 +75,7 @@ def test_labels_that_a_place_shows_where_they_are_not_worn_away(small):
     place = Hypothesis(0, 4, 4, 0, 0.0)
     cells = np.array([[(i, j) for i in range(-3, 5)] for j in range(-3, 4)])
     worn = np.array([(0, 0), (1, -2), (0, 3)])
-    found = unworn_labels_at(lab.embossed, place, worn, cells)
+    found = unworn_labels_at(lab.embossed, place, worn)(cells)
     assert found.shape == cells.shape[:2]
     shown = lab.shows(4, 4, 0, cells.reshape(-1, 2).tolist())
     gone = {tuple(cell) for cell in worn.tolist()}
@@ -91,7 +84,7 @@ def test_labels_that_a_place_shows_where_they_are_not_worn_away(small):
         for cell, label in zip(cells.reshape(-1, 2).tolist(), shown, strict=True)
     ]
     assert found.ravel().tolist() == truth
-    none = unworn_labels_at(lab.embossed, place, worn[:0], cells).ravel()
+    none = unworn_labels_at(lab.embossed, place, worn[:0])(cells).ravel()
     assert none.tolist() == [-1 if label == 4 else label for label in shown]
 
 
@@ -118,8 +111,7 @@ def test_an_image_of_no_registered_place_shows_anything_with_the_same_probabilit
 
 def verified(small, fit, place, score=0.0, lab=None):
     lab = lab or small.two_faces()
-    image = SimpleNamespace(settings=ReaderSettings())
-    return VerifiedHypothesis(image, None, lab.embossed, place, fit, score)
+    return VerifiedHypothesis(None, lab.embossed, place, fit, score)
 
 
 def test_what_speaks_for_a_place(small, monkeypatch):
@@ -138,13 +130,13 @@ def test_what_speaks_for_a_place(small, monkeypatch):
     fit = small.fit_of(cells, scores, seen, nuisance=np.array([0.7, 0.1, 0.2, 0.3]), value=-5.0)
     asked = []
 
-    def share(image, template, pose, gain, shown):
-        asked.append(shown(np.array([cells])))
+    def share(image, pose, gain, labels_at):
+        asked.append(labels_at(np.array([cells])))
         return 0.77
 
-    monkeypatch.setattr(recognizer.touch.belief, "explained_share", share)
+    monkeypatch.setattr(recognizer.touch.evidence, "explained_share", share)
     one = verified(small, fit, place, score=-4.0, lab=lab)
-    found = one.evidence()
+    found = one.evidence
     assert found.explained == 0.77
     assert (found.contradictions, found.strong_contradictions) == (
         4,

@@ -11,9 +11,8 @@ import pytest
 import recognizer.touch.chance
 from recognizer.touch.chance import chance_of_match, expected_by_border, expected_matches
 from recognizer.touch.hypothesis import Hypothesis, bounded_scores
-from recognizer.touch.settings import BeliefSettings, HypothesisSettings, ReaderSettings
+from recognizer.touch.options import ReaderOptions
 
-SETTINGS = ReaderSettings()
 SEEN = [(i, j) for j in range(3) for i in range(3)]
 
 
@@ -79,21 +78,21 @@ def test_random_labs_match_as_often_as_it_says(small):
     scores[3, (labels[3] + 1) % 4] = 1.5  # another symbol is likelier there
     scores -= scores.max(axis=1, keepdims=True)
     fit = small.fit_of(SEEN, scores)
-    doubt = expected_matches([lab.embossed], lab.embossed, fit, place, SETTINGS)
-    bounded = bounded_scores(fit, SETTINGS.hypotheses)[:, :4]
+    doubt = expected_matches([lab.embossed], lab.embossed, fit, place)
+    bounded = bounded_scores(fit)[:, :4]
     own = bounded[np.arange(9), labels].sum()
     drawn = rng.integers(4, size=(400_000, 9))
     as_well = (bounded[np.arange(9), drawn].sum(axis=1) >= own).mean() * 143
     assert 0.9 * as_well <= doubt <= 2.5 * as_well
 
 
-def doubt_of(small, lab, row=4, column=4, settings=SETTINGS, arrays=None, borders=True, **changed):
+def doubt_of(small, lab, row=4, column=4, arrays=None, borders=True, **changed):
     """Of a touch that shows beyond doubt what a place of the first face of a lab holds."""
     labels = lab.shows(row, column, 0, SEEN)
     fit = small.fit_of(SEEN, small.sure_of(labels, lab.order), **changed)
     arrays = [lab.embossed] if arrays is None else arrays
     place = Hypothesis(0, row, column, 0, 0.0)
-    return expected_matches(arrays, lab.embossed, fit, place, settings, borders=borders)
+    return expected_matches(arrays, lab.embossed, fit, place, borders=borders)
 
 
 def square(small, side, order=4, **changed):
@@ -126,7 +125,7 @@ def test_all_arrays_that_are_embossed_alike_count(small):
     assert doubt_of(small, lab, arrays=both) == pytest.approx(164 / 4**9)
 
 
-def test_at_an_edge_the_places_count_whose_border_agrees(small):
+def test_at_an_edge_the_places_count_whose_border_agrees(small, monkeypatch):
     lab = square(small, 8)
     # cells (0, 0) ... (2, 2) of a place at row 4, column 7: the left column of them alone is held
     assert doubt_of(small, lab, column=7) == pytest.approx(6 / 4**3 + 2 / 4**3)
@@ -135,10 +134,10 @@ def test_at_an_edge_the_places_count_whose_border_agrees(small):
     # all of them, where borders are not asked
     assert doubt_of(small, lab, column=7, borders=False) == pytest.approx(64 / 4**3)
     # a large lab is not gone through
-    large = ReaderSettings(hypotheses=HypothesisSettings(large=63))
-    assert doubt_of(small, lab, column=7, settings=large) == pytest.approx(64 / 4**3)
-    at_most = ReaderSettings(hypotheses=HypothesisSettings(large=64))
-    assert doubt_of(small, lab, column=7, settings=at_most) == pytest.approx(8 / 4**3)
+    monkeypatch.setattr(recognizer.touch.chance, "LARGE_LAB", 63)
+    assert doubt_of(small, lab, column=7) == pytest.approx(64 / 4**3)
+    monkeypatch.setattr(recognizer.touch.chance, "LARGE_LAB", 64)
+    assert doubt_of(small, lab, column=7) == pytest.approx(8 / 4**3)
 
 
 @pytest.mark.parametrize(("behind", "places"), [(0.0, 8), (3.9, 8), (4.1, 64)])
@@ -151,27 +150,26 @@ def test_a_place_that_itself_falls_behind_may_be_matched_over_a_bare_cell(small,
     scores[0, :4] = -12.0
     scores[0, label], scores[0, (label + 1) % 4] = -behind, 0.0
     fit = small.fit_of(cells, scores)
-    found = expected_matches(
-        [lab.embossed], lab.embossed, fit, Hypothesis(0, 4, 7, 0, 0.0), SETTINGS
-    )
+    found = expected_matches([lab.embossed], lab.embossed, fit, Hypothesis(0, 4, 7, 0, 0.0))
     # of the first cell two symbols score as well, of the second one does
     assert found == pytest.approx(places * 2 / 4 / 4)
 
 
-def test_scores_are_rounded_by_the_grain_that_is_set(small):
+def test_scores_are_rounded_by_the_grain_that_is_set(small, monkeypatch):
     lab = square(small, 8)
     scores = small.sure_of(lab.shows(4, 4, 0, SEEN))
     other = (lab.shows(4, 4, 0, SEEN)[0] + 1) % 4
     scores[0, other] = -0.3
     fit, place = small.fit_of(SEEN, scores), Hypothesis(0, 4, 4, 0, 0.0)
     for grain, symbols in ((0.25, 1), (0.5, 2)):
-        settings = ReaderSettings(belief=BeliefSettings(grain=grain))
-        found = expected_matches([lab.embossed], lab.embossed, fit, place, settings)
+        monkeypatch.setattr(recognizer.touch.chance, "GRAIN", grain)
+        monkeypatch.setattr(chance_of_match, "__defaults__", (grain,))
+        found = expected_matches([lab.embossed], lab.embossed, fit, place)
         assert found == pytest.approx(64 * symbols / 4**9)
 
 
 def test_the_limit_and_the_grain():
-    assert (SETTINGS.belief.doubt, SETTINGS.belief.grain) == (1e-4, 0.25)
+    assert (ReaderOptions().doubt, recognizer.touch.chance.GRAIN) == (1e-4, 0.25)
 
 
 def places_that_match(lab, cells, scores, held, anchor, behind):
@@ -192,20 +190,22 @@ def places_that_match(lab, cells, scores, held, anchor, behind):
 def by_border(small, monkeypatch):
     """The doubt of a hypothesis, shares of borders and of what is pressed as they are given."""
 
-    def doubt(lab, fit, place, arrays=None, share=1.0, pressed=1.0, settings=SETTINGS):
+    def doubt(lab, fit, place, arrays=None, share=1.0, pressed=1.0):
         monkeypatch.setattr(recognizer.touch.chance, "share_of_borders", lambda *_: share)
         monkeypatch.setattr(
             recognizer.touch.chance, "_pressed_share", lambda *_: np.full(len(fit.cells), pressed)
         )
         found = SimpleNamespace(embossed=lab.embossed, fit=fit, hypothesis=place)
-        return expected_by_border(arrays or [lab.embossed], found, 1.3, settings)
+        return expected_by_border(arrays or [lab.embossed], found, 1.3)
 
     return doubt
 
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize(("row", "column"), [(3, 4), (0, 4), (1, 0), (4, 2)])
-def test_places_are_counted_with_what_their_outlines_cost(small, by_border, seed, row, column):
+def test_places_are_counted_with_what_their_outlines_cost(
+    small, by_border, seed, row, column, monkeypatch
+):
     """A place may be matched that is bare where a symbol is seen, or bears one where none is."""
     rng, cells = np.random.default_rng(seed), [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0)]
     lab = square(small, 5)
@@ -213,16 +213,16 @@ def test_places_are_counted_with_what_their_outlines_cost(small, by_border, seed
     scores = -rng.exponential(4.0, (5, 5))
     scores[np.arange(5), held] = -rng.exponential(1.0, 5)
     scores -= scores.max(axis=1, keepdims=True)
-    fine = ReaderSettings(belief=BeliefSettings(grain=1e-2))
+    monkeypatch.setattr(recognizer.touch.chance, "GRAIN", 1e-2)
     fit, place = small.fit_of(cells, scores), Hypothesis(0, row, column, 0, 0.0)
-    bounded = bounded_scores(fit, fine.hypotheses).tolist()
+    bounded = bounded_scores(fit).tolist()
     anchor = next(n for n, label in enumerate(held) if label < lab.order)
     about = (lab, cells, bounded, held, anchor)
     truth, rounded = places_that_match(*about, 1e-9), places_that_match(*about, 0.05)
-    found = by_border(lab, fit, place, settings=fine)
+    found = by_border(lab, fit, place)
     assert truth * (1 - 1e-9) <= found <= rounded * (1 + 1e-9)
     assert truth * (1 - 1e-9) <= by_border(lab, fit, place) <= 5 * truth
-    assert by_border(lab, fit, place, share=0.1, settings=fine) == pytest.approx(found / 10)
+    assert by_border(lab, fit, place, share=0.1) == pytest.approx(found / 10)
 
 
 def sure_touch(small, lab, row, column):
@@ -246,7 +246,9 @@ def test_what_the_plate_does_not_press_is_no_border(small, by_border):
     assert by_border(lab, fit, place, pressed=0.2) == pytest.approx(6 / 4**3)
 
 
-def test_borders_count_in_arrays_that_are_embossed_alike_and_small_enough(small, by_border):
+def test_borders_count_in_arrays_that_are_embossed_alike_and_small_enough(
+    small, by_border, monkeypatch
+):
     lab, other = square(small, 8), square(small, 10)
     larger = SimpleNamespace(pitch_mm=8.0, height_mm=1.2, stroke_mm=1.4)
     both = [lab.embossed, replace(other.embossed, style=lab.embossed.style)]
@@ -257,5 +259,5 @@ def test_borders_count_in_arrays_that_are_embossed_alike_and_small_enough(small,
     assert by_border(lab, fit, place, unlike) == pytest.approx(36 / 4**9)
     assert by_border(lab, fit, place, letters) == pytest.approx(36 / 4**9)
     for large, told in ((163, math.inf), (164, 100 / 4**9)):
-        settings = ReaderSettings(hypotheses=HypothesisSettings(large=large))
-        assert by_border(lab, fit, place, both, settings=settings) == pytest.approx(told)
+        monkeypatch.setattr(recognizer.touch.chance, "LARGE_LAB", large)
+        assert by_border(lab, fit, place, both) == pytest.approx(told)

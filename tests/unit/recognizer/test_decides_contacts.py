@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from probe.frame import frame_from
-from recognizer.touch.contacts import cut_touches
 from recognizer.touch.lab import radii_of
+from recognizer.touch.source import cut_touches
 
 SHAPE = (16, 16)
 REST = np.zeros(SHAPE)

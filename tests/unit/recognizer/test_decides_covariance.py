@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from recognizer.touch.settings import ReaderSettings
-from recognizer.touch.symbols.covariance import covariances
+from recognizer.touch.options import ReaderOptions
+from recognizer.touch.symbols.fit import covariances
 
 SHAPE = (5, 6)
 USUAL = 0.15  # standard deviation of psi with which normal matrices are made
@@ -27,7 +27,7 @@ def asked(normal, *, hardens, form=(0.0, 0.0, 0.0, 0.0), away=None, noise=USUAL)
     pose[:, :3] = 5.0, -9.0, 1.0  # of no importance
     pose[:, 3:] = form
     image = SimpleNamespace(
-        pressing=SimpleNamespace(hardens=hardens), shape=SHAPE, settings=ReaderSettings()
+        pressing=SimpleNamespace(hardens=hardens), shape=SHAPE, options=ReaderOptions()
     )
     left = np.zeros((count, SHAPE[0] * SHAPE[1])) if away is None else away
     return covariances(image, SimpleNamespace(pose=pose, normal=normal), left, noise)

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from recognizer.touch.settings import DEFAULTS
-from recognizer.touch.symbols.deep_press import deep_gain
+from recognizer.touch.symbols.image import WHOLE, deep_gain
 from tests.unit.recognizer.test_decides_gain import COLUMN, PEAKS, SCALE, SIDE, SYMBOL, force, image
 
 GAIN = np.array([math.log(SCALE), 0.6, 0.25, -0.1])
@@ -60,7 +59,7 @@ def test_what_lies_beyond_the_edge_and_what_is_not_trusted_says_nothing():
 def test_amid_a_face_nothing_is_guessed(columns, guessed):
     loaded = np.isin(COLUMN, np.arange(columns)).ravel()
     forces = over_an_edge(loaded=loaded)
-    assert DEFAULTS.gain.whole == 0.95
+    assert WHOLE == 0.95
     assert (deep_gain(image(forces, loaded=loaded)) is not None) is guessed
 
 

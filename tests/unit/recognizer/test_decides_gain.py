@@ -9,11 +9,12 @@ import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.sensor_state import unknown_state
-from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.gain import (
+from recognizer.touch.symbols.image import (
     Image,
+    Pressing,
     bend_image,
     bounded_gain,
     first_gain,
@@ -21,7 +22,7 @@ from recognizer.touch.symbols.gain import (
     normalize_image,
     tilted_gain,
 )
-from recognizer.touch.symbols.pressing import Pressing
+from recognizer.touch.symbols.kernels import DEEPEST
 
 SIDE = 16
 HALF = SIDE / 2 - 0.5
@@ -42,7 +43,7 @@ def slope(depth):
     return 2 * (1 - depth) ** -3 + 1
 
 
-def image(forces, *, hardens=True, newtons=True, trust=None, falls=None, loaded=None):
+def image(forces, *, hardens=True, newtons=True, trust=None, falls=None, loaded=None, ink=0.5):
     y, x = np.indices((SIDE, SIDE)).reshape(2, -1)
     points = np.column_stack([x - HALF, HALF - y]).astype(float)
     return Image(
@@ -50,13 +51,11 @@ def image(forces, *, hardens=True, newtons=True, trust=None, falls=None, loaded=
         forces=np.asarray(forces, float).ravel(),
         trust=np.ones(SIDE * SIDE) if trust is None else np.asarray(trust, float).ravel(),
         shape=(SIDE, SIDE),
-        pressing=Pressing(
-            hardens=hardens, symbol=SYMBOL, deepest=ReaderSettings().gain.deepest, scale=SCALE
-        ),
+        pressing=Pressing(hardens=hardens, symbol=SYMBOL, deepest=DEEPEST, scale=SCALE),
         newtons=newtons,
         plane=np.column_stack([np.ones(len(points)), points / HALF]),
         falls=falls,
-        settings=ReaderSettings(),
+        template=SimpleNamespace(ink=ink),
         loaded=np.ones(SIDE * SIDE, np.bool_) if loaded is None else loaded,
     )
 
@@ -88,7 +87,7 @@ def test_symbols_all_over_give_the_plane_that_pressed_them(newtons, plane):
     forces = ink * (plane[0] + plane[1] * (x - HALF) / HALF + plane[2] * (HALF - y) / HALF)
     trust = np.ones((SIDE, SIDE))
     forces[3, 4], trust[3, 4] = 900.0, 0.0  # a bad tactel
-    found = first_gain(image(forces, newtons=newtons, trust=trust), ink)
+    found = first_gain(image(forces, newtons=newtons, trust=trust, ink=ink))
     scale = SCALE if newtons else plane[0] / force(0.25)
     assert found[0] == pytest.approx(math.log(scale))
     assert force(found[1]) * scale == pytest.approx(plane[0], rel=1e-3)
@@ -100,14 +99,14 @@ def test_symbols_all_over_give_the_plane_that_pressed_them(newtons, plane):
 
 def test_the_first_guess_is_not_steeper_than_nine_tenths_of_its_depth():
     x = (np.arange(SIDE) - HALF) / HALF
-    found = first_gain(image(np.tile(2.0 + 6.0 * x, (SIDE, 1))), 0.5)
+    found = first_gain(image(np.tile(2.0 + 6.0 * x, (SIDE, 1)), ink=0.5))
     assert found[2] == pytest.approx(0.9 * found[1])
     assert found[3] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_where_nothing_presses_there_is_no_gain():
-    assert first_gain(image(np.zeros((SIDE, SIDE))), 0.5) is None
-    assert first_gain(image(-np.ones((SIDE, SIDE))), 0.5) is None
+    assert first_gain(image(np.zeros((SIDE, SIDE)), ink=0.5)) is None
+    assert first_gain(image(-np.ones((SIDE, SIDE)), ink=0.5)) is None
 
 
 def psi(response):
@@ -183,9 +182,9 @@ def test_what_is_not_loaded_says_nothing_of_the_plane():
 def test_the_first_guess_is_made_of_what_is_loaded():
     half = loaded_half()
     forces = np.where(half, 2.0, 0.0)
-    found = first_gain(image(forces, loaded=half), 0.5)
+    found = first_gain(image(forces, loaded=half, ink=0.5))
     assert np.abs(found[2:]).max() < 1e-9  # as deep all over, not falling to the right
-    assert found[1] > first_gain(image(forces), 0.5)[1]
+    assert found[1] > first_gain(image(forces, ink=0.5))[1]
 
 
 def tilted(gain):
@@ -301,7 +300,7 @@ def test_an_image_of_a_signal_has_a_row_for_each_tactel():
     forces = np.arange(256.0).reshape(16, 16)
     trust = np.linspace(0, 1, 256).reshape(16, 16)
     signal = SimpleNamespace(forces=forces, trust=trust, newtons=True, state=None, noise=2.5)
-    found = image_of_signal(sensor, signal, 1.0, ReaderSettings())
+    found = image_of_signal(sensor, signal, None, 1.0)
     pitch = 1.5875
     assert found.points_mm.shape == (256, 2)
     # tactel (2, 5): columns to the right, rows down
@@ -322,7 +321,9 @@ def test_tips_that_stand_aside_look_from_where_they_are():
     aside[2, 5] = 0.1, -0.2
     state = replace(unknown_state(sensor), aside_mm=aside)
     plain = Signal(np.ones((16, 16)), np.ones((16, 16)), contact=True, newtons=False)
-    flat, known = (image_of_signal(sensor, replace(plain, state=one), 1.0) for one in (None, state))
+    flat, known = (
+        image_of_signal(sensor, replace(plain, state=one), None, 1.0) for one in (None, state)
+    )
     moved = known.points_mm - flat.points_mm
     np.testing.assert_allclose(moved[37], [0.1, -0.2], atol=1e-12)
     assert np.count_nonzero(moved) == 2
@@ -336,7 +337,7 @@ def test_a_round_face_falls_away_under_the_plate():
     flat = image_of_signal(
         sensor,
         Signal(np.ones((16, 16)), np.ones((16, 16)), contact=True, newtons=False),
-        1.0, ReaderSettings(),
+        1.0, ReaderOptions(),
     )  # fmt: skip
     height = sensor.overlay.height_mm
     raised = []
@@ -373,7 +374,7 @@ def test_tips_of_a_learned_sensor_stand_elsewhere_and_scatter_as_learned():
     signal = SimpleNamespace(
         forces=np.ones((16, 16)), trust=np.ones((16, 16)), newtons=False, state=state, noise=0.0
     )
-    found = image_of_signal(sensor, signal, 1.0, ReaderSettings())
+    found = image_of_signal(sensor, signal, None, 1.0)
     assert found.points_mm[37] - sensor.centres_mm().reshape(-1, 2)[37] == pytest.approx(
         [0.1, -0.2]
     )

@@ -7,7 +7,7 @@ import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.loaded_area import find_loaded_area
+from recognizer.touch.symbols.image import find_loaded_area
 
 SENSOR = SensorType()
 SHAPE = (SENSOR.rows, SENSOR.columns)

@@ -6,20 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from recognizer.touch import hypothesis
 from recognizer.touch.hypothesis import (
     Hypothesis,
     coincide,
+    find_hypotheses,
+    find_rivals,
     labels_at,
+    labels_of,
     log_likelihood,
     neighbours,
-    shown_at,
     under_centre,
 )
-from recognizer.touch.locate import find_hypotheses, find_rivals
-from recognizer.touch.settings import HypothesisSettings
 
-USUAL = HypothesisSettings()
-ALL = replace(USUAL, kept=10**6)
+ALL = 10**6
 SQUARE = [(i, j) for j in range(4) for i in range(4)]
 APART = [(0, 0), (2, 0), (0, 2), (2, 2), (4, 1)]  # no two in a window
 
@@ -79,7 +79,7 @@ def test_what_a_cell_costs(small, scores, seen, label, nats):
     held = {(5, 5): (0, label)} if label < 4 else {(0, 0): (0, 1)}
     lab = small.Lab(held)
     fit = small.fit_of([(0, 0)], [scores], seen, value=-50.0)
-    assert log_likelihood(lab.embossed, fit, at(5, 5), USUAL) == pytest.approx(nats - 50.0)
+    assert log_likelihood(lab.embossed, fit, at(5, 5)) == pytest.approx(nats - 50.0)
     assert cost(np.array(scores, float), seen, label) == nats
 
 
@@ -89,9 +89,9 @@ def test_what_cells_show_at_a_place(small, dense):
     cells = [(i, j) for i in range(-7, 8) for j in range(-7, 8)]
     for place in ((4, 4, 0), (10, 12, 1), (0, 0, 1), (0, 0, 0), (6, 2, 0)):
         truth = lab.shows(*place, cells)
-        assert labels_at(lab.embossed, at(*place), np.array(cells)).tolist() == truth
+        assert labels_of(lab.embossed, at(*place), np.array(cells)).tolist() == truth
     places = [at(4, 4, 0), at(10, 12, 1)]
-    shown = shown_at(lab.embossed, places)(np.array([cells, cells]))
+    shown = labels_at(lab.embossed, places)(np.array([cells, cells]))
     for one, own in zip(places, shown.tolist(), strict=True):
         labels = lab.shows(one.row, one.column, one.face, cells)
         assert own == [-1 if label == 4 else label for label in labels]
@@ -106,13 +106,13 @@ def test_the_place_of_a_clear_touch_is_found_with_its_likelihood(small, cells, p
     lab = small.two_faces()
     for seed in range(4):
         fit = soft(lab, place, cells, small, seed, spread=0.5)
-        found = find_hypotheses(lab.embossed, (fit,), USUAL)
+        found = find_hypotheses(lab.embossed, (fit,))
         every = sorted(((by_hand(lab, fit, one), one) for one in lab.places(cells)), reverse=True)
         assert (found[0].row, found[0].column, found[0].face) == every[0][1]
         for one in found:
             score = by_hand(lab, fit, (one.row, one.column, one.face))
             assert one.score == pytest.approx(score)
-            assert log_likelihood(lab.embossed, fit, one, USUAL) == pytest.approx(score)
+            assert log_likelihood(lab.embossed, fit, one) == pytest.approx(score)
         assert [one.score for one in found] == sorted((one.score for one in found), reverse=True)
 
 
@@ -171,7 +171,7 @@ def test_a_symbol_that_costs_as_much_as_any_cell_can_is_not_tried(small):
 def test_eight_places_of_each_fit_are_kept_and_know_which_fit_they_are_of(small):
     lab = small.two_faces()
     fits = tuple(soft(lab, (4, 3, 0), APART, small, seed, 3.0, -3.0) for seed in range(3))
-    found = find_hypotheses(lab.embossed, fits, USUAL)
+    found = find_hypotheses(lab.embossed, fits)
     assert [sum(one.fit == number for one in found) for number in range(3)] == [8, 8, 8]
     assert [one.score for one in found] == sorted((one.score for one in found), reverse=True)
     for number, fit in enumerate(fits):
@@ -199,7 +199,7 @@ def test_windows_are_looked_up_whose_every_cell_is_sure_by_six_nats(small, gap, 
     lab, _ = strip(small)
     cells, _, scores = window(np.array([[3, 3], [1, 1]]), 0, 2, small)
     scores[2:, 4 if against == "none" else 0] = -gap
-    found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)
+    found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))
     assert bool(found) is not looked_up  # the window is nowhere (no 3 is); label 1 is
 
 
@@ -213,7 +213,7 @@ def test_of_a_window_the_weakest_cell_may_be_read_wrong(small):
             scores[wrong] = -20.0
             scores[wrong, other], scores[wrong, own] = 0.0, -9.0
             scores[weak, 4] = -7.0  # the least sure
-            found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)
+            found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))
             assert ((4, 3, 0) in where(found)) is (weak == wrong)
 
 
@@ -230,24 +230,22 @@ def test_windows_of_arrays_of_fewer_or_more_symbols(small, order):
         scores[weak, others] = -9.0
         scores[weak, shown[weak]], scores[weak, others[0]] = -3.0, 0.0  # read wrong
         scores[weak, order] = -8.0
-        found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)
+        found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))
         assert (1, 4, 0) in where(found)
         scores[weak, others[0]] = -9.0
         scores[weak, shown[weak]] = 0.0
-        found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)
+        found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))
         assert (found[0].row, found[0].column) == (1, 4)
 
 
 def test_smaller_windows_are_not_looked_up_beside_larger_ones(small):
     lab, labels = strip(small)
     cells, _, scores = window(labels, 3, 2, small)
-    assert where(find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)) == {
-        (4, 3, 0)
-    }
+    assert where(find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))) == {(4, 3, 0)}
     cells, _, scores = window(labels, 3, 3, small)
     for wrong in (2, 5):  # both of the third column
         scores[wrong] = np.where(np.arange(5) == 3, 0.0, -12.0)
-    assert find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL) == []
+    assert find_hypotheses(lab.embossed, (small.fit_of(cells, scores),)) == []
 
 
 def test_upright_windows_are_looked_up_as_level_ones_are(small):
@@ -256,7 +254,7 @@ def test_upright_windows_are_looked_up_as_level_ones_are(small):
     lab = small.Lab(held)
     cells = [(i, -r) for r in range(3) for i in range(2)]
     fit = small.fit_of(cells, small.sure_of([labels[1 + r][i] for r in range(3) for i in range(2)]))
-    assert where(find_hypotheses(lab.embossed, (fit,), USUAL)) == {(3, 3, 0)}
+    assert where(find_hypotheses(lab.embossed, (fit,))) == {(3, 3, 0)}
 
 
 @pytest.mark.parametrize(("rank", "found"), [(3, True), (4, True), (5, False)])
@@ -273,7 +271,7 @@ def test_the_four_surest_windows_are_looked_up(small, rank, found):
         scores[column, 4] = -(7.0 + 0.1 * column)
     least = {3: 7.15, 4: 7.05, 5: 6.95}[rank]
     scores[6, 4] = -least
-    places = where(find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL))
+    places = where(find_hypotheses(lab.embossed, (small.fit_of(cells, scores),)))
     assert ((4, 2, 0) in places) is found
 
 
@@ -311,17 +309,19 @@ def test_if_no_two_agree_all_of_many_candidates_stay(small):
 @pytest.mark.parametrize(
     ("cells", "zeros", "followed"), [(7, 513, 512), (6, 513, 513), (7, 512, 512)]
 )
-def test_after_six_cells_512_candidates_go_on(small, cells, zeros, followed):
+def test_after_six_cells_512_candidates_go_on(small, monkeypatch, cells, zeros, followed):
     lab = line(small, [10 * n for n in range(zeros)])
     scores = [[0.0, -30, -30, -30, -30]] + [[-1, 0.0, -1, -1, -1]] * (cells - 1)
     fit = small.fit_of([(i, 0) for i in range(cells)], scores)
-    one = replace(ALL, anchors=1)
-    found = find_hypotheses(lab.embossed, (fit,), one)
+    monkeypatch.setattr(hypothesis, "ANCHORS", 1)
+    found = find_hypotheses(lab.embossed, (fit,), ALL)
     assert len({place.column for place in found}) == len(found) == followed
     assert np.isfinite([place.score for place in found]).all()
 
 
-def test_the_surest_and_most_seen_cells_come_first(small):
+def test_the_surest_and_most_seen_cells_come_first(small, monkeypatch):
+    for name, value in (("ANCHORS", 1), ("FIRST_CELLS", 2), ("FOLLOWED", 2)):
+        monkeypatch.setattr(hypothesis, name, value)
     # three candidates; the two best after two cells go on
     lab = line(small, [0, 100, 200], columns=300)
     lab.held[0, 101] = (0, 2)  # wrong at the second cell
@@ -338,8 +338,7 @@ def test_the_surest_and_most_seen_cells_come_first(small):
     ):
         scores = [anchor] + [[-by, 0.0, -by, -by, -by] for by, _ in (second, third)]
         fit = small.fit_of([(0, 0), (1, 0), (2, 0)], scores, [40.0, second[1], third[1]])
-        few = replace(ALL, anchors=1, first=2, followed=2)
-        found = find_hypotheses(lab.embossed, (fit,), few)
+        found = find_hypotheses(lab.embossed, (fit,), ALL)
         assert {one.column for one in found} == {0, 100, 200} - {dropped}
 
 
@@ -353,7 +352,7 @@ def test_in_a_lab_of_more_than_2_to_the_18_cells_a_window_must_be_whole(small, c
         labels=np.append(np.arange(cells) != 77, -1).astype(np.int8),
     )
     fit = small.fit_of([(0, 0), (5, 0)], [[0.0, -30, -30, -30, -30], [-2, -2, -2, -2, 0.0]])
-    found = find_hypotheses(large, (fit,), USUAL)
+    found = find_hypotheses(large, (fit,))
     assert [one.column for one in found] == [77] * places
 
 
@@ -379,7 +378,7 @@ def test_rivals_are_sought_from_two_cells_that_the_best_place_holds(small, seed)
     assert {one.fit for one in found} == {9}
     for one in found:
         assert one.score == pytest.approx(by_hand(lab, fit, (one.row, one.column, one.face)))
-    few = find_rivals(lab.embossed, fit, at(*best), 9, replace(USUAL, kept=3))
+    few = find_rivals(lab.embossed, fit, at(*best), 9, 3)
     kept = (
         3
         if best in anchored(lab, fit, bounded, sure, 2)

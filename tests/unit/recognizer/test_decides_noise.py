@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from reference.touch_loops import log_likelihoods
 
-from recognizer.touch.settings import NoiseSettings
-from recognizer.touch.symbols.noise import log_likelihoods, psi_deviation
+from recognizer.touch.symbols.linearize import psi_deviation
 
 
 def psi(response):
@@ -44,7 +44,7 @@ def asked(seen, tables, press, bare, trust, noise, faint=0.0):
     every[..., 3:] = 9.0  # what is fitted of the form is no noise
     felt = SimpleNamespace(
         psi=np.array(seen), press=np.array(press), bare=np.array(bare),
-        trust=np.array(trust), settings=NoiseSettings(), faint=np.full((b, n), faint),
+        trust=np.array(trust), faint=np.full((b, n), faint),
     )  # fmt: skip
     return log_likelihoods(felt, every, np.array(noise))
 
@@ -89,17 +89,17 @@ def test_a_tactel_by_hand(seen, value, nats):
 
 
 def test_slopes_count_by_the_square_of_how_far_tactels_are_displaced():
-    # 0.8, 0.6 and a slope of 2 over half a mm: the root of 0.64 + 0.36 + 1
+    # 0.8, 0.6 and a slope of 1 over a mm: the root of 0.64 + 0.36 + 1
     table = np.zeros((1, 1, 1, 6), np.float32)
-    table[..., 0], table[..., 1] = 0.6, 2.0
-    felt = SimpleNamespace(settings=NoiseSettings(displaced_mm=0.5), faint=np.zeros((1, 1)))
+    table[..., 0], table[..., 1] = 0.6, 1.0
+    felt = SimpleNamespace(faint=np.zeros((1, 1)))
     width = psi_deviation(felt, table, np.full((1, 1), 0.15))
     assert width[0, 0, 0] == pytest.approx(math.sqrt(2.0))
 
 
 @pytest.mark.parametrize(("faint", "counts"), [(0.0299, False), (0.0301, True)])
 def test_noise_of_readings_counts_from_three_hundredths_of_a_plateau(faint, counts):
-    felt = SimpleNamespace(settings=NoiseSettings(), faint=np.full((1, 1), faint))
+    felt = SimpleNamespace(faint=np.full((1, 1), faint))
     width = psi_deviation(felt, np.zeros((1, 1, 1, 6), np.float32), np.full((1, 1), 0.15))
     own = 3 / math.log(4) * faint / 0.15 if counts else 0.0
     assert width[0, 0, 0] == pytest.approx(math.hypot(0.8, own), rel=1e-5)

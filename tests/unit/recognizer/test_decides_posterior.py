@@ -8,14 +8,12 @@ import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import SymbolStyle, alphabet_named
-from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.options import DEFAULTS
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.blur import second_differences
-from recognizer.touch.symbols.explained import explained_share
-from recognizer.touch.symbols.gain import image_of_signal
-from recognizer.touch.symbols.posterior import fit_posterior
-from recognizer.touch.symbols.projection import project_template, values_of
-from recognizer.touch.symbols.refine import force_jacobian
+from recognizer.touch.symbols.fit import force_jacobian
+from recognizer.touch.symbols.image import image_of_signal
+from recognizer.touch.symbols.linearize import project_template, values_of
+from recognizer.touch.symbols.posterior import explained_share, fit_posterior, second_differences
 from recognizer.touch.symbols.template import template_of
 
 SENSOR = SensorType()

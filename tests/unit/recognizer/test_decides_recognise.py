@@ -9,30 +9,31 @@ import pytest
 
 import recognizer.touch.recognise
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.touch.cause import EXCHANGED, Cause
 from recognizer.touch.hypothesis import Hypothesis
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognise import (
+    read_touch,
     recognise,
-    recognise_with_hypothesis,
-    recognise_with_rivals,
 )
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     BY_CHANCE,
+    EXCHANGED,
     NO_CONTACT,
     NOT_ENCODED,
     OUTSIDE,
     TOO_FEW,
+    Cause,
 )
-from recognizer.touch.settings import ReaderSettings
+from recognizer.touch.signal import Signal
 from recognizer.touch.verdict import MANY_INLIERS, Evidence
 
 TOUCHED = SimpleNamespace(contact=True, state=None)
 READER = SimpleNamespace(
-    sensor=SensorType(), settings=ReaderSettings(), lab=SimpleNamespace(arrays=("one", "two"))
+    sensor=SensorType(), options=ReaderOptions(), lab=SimpleNamespace(arrays=("one", "two"))
 )
 #: Limits of margins, nats: 10 and 14 but for rounding.
-TEN, FOURTEEN = READER.settings.belief.margin, READER.settings.belief.margin_by_few
+TEN, FOURTEEN = READER.options.margin, READER.options.margin_by_few
 SURE = Evidence(
     log_likelihood_ratio=19.9,
     explained=0.95,
@@ -72,6 +73,7 @@ class Found:
     def coincides(self, other):
         return self.place == other.place and self.shift == other.shift
 
+    @property
     def evidence(self):
         return self.speaks
 
@@ -94,11 +96,11 @@ def test_limits_of_margins_are_reached_but_for_rounding():
     assert (TEN, FOURTEEN) == (10.0 - 1e-4, 14.0 - 1e-4)
 
 
-def wide_unless_sure(reader, signal, answer, judged, best, support):
+def wide_unless_sure(reader, signal, answer, judged, best):
     """Ask for the second try as under a pad: `test_first_look` has when it is asked for."""
-    assert (reader is READER, bool(best), bool(support)) in ((True,) * 3, (True, False, False))
+    assert reader is READER
     assert answer or judged is answer
-    return not (answer and support.inliers >= MANY_INLIERS)
+    return not (answer and best.evidence.inliers >= MANY_INLIERS)
 
 
 @pytest.fixture
@@ -113,26 +115,25 @@ def reads(small, lab, monkeypatch):
         tries = []
         doubts = doubt if isinstance(doubt, tuple) else (doubt, doubt)  # of the two tries
 
-        def matches(arrays, embossed, fit, hypothesis, settings, *, borders=True):
-            assert (arrays, settings) == (READER.lab.arrays, READER.settings)
+        def matches(arrays, embossed, fit, hypothesis, *, borders=True):
+            assert arrays == READER.lab.arrays
             judged = first if len(tries) == 1 else second
             best = judged[0]
             assert (embossed, fit, hypothesis) == (best.embossed, best.fit, best.hypothesis)
             return doubts[len(tries) - 1] if borders else named
 
-        def matches_by_border(arrays, best, tip_mm, settings):
-            assert (arrays, settings) == (READER.lab.arrays, READER.settings)
+        def matches_by_border(arrays, best, tip_mm):
+            assert arrays == READER.lab.arrays
             assert best is (first if len(tries) == 1 else second)[0]
             assert tip_mm == READER.sensor.overlay.tab_diameter_mm
             return by_border
 
-        def tells_more(reader, given, answer, judged, best, support):
+        def tells_more(reader, given, answer, judged, best):
             assert best is (first[0] if first else None)
-            return wide_unless_sure(reader, given, answer, judged, best, support)
+            return wide_unless_sure(reader, given, answer, judged, best)
 
-        def found(reader, given, effort):
-            assert reader is READER
-            assert given is signal
+        def found(touch, effort):
+            assert (touch.reader, touch.signal) == (READER, signal)
             tries.append(effort)
             return first if len(tries) == 1 else second
 
@@ -141,11 +142,12 @@ def reads(small, lab, monkeypatch):
         monkeypatch.setattr(recognizer.touch.recognise, "expected_by_border", matches_by_border)
         monkeypatch.setattr(recognizer.touch.recognise, "propose_next", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: None)
-        monkeypatch.setattr(recognizer.touch.recognise, "may_tell_more", tells_more)
-        monkeypatch.setattr(recognizer.touch.recognise, "leaves_much", lambda *_: False)
-        answer, judged = recognise_with_hypothesis(READER, signal, 7)
+        monkeypatch.setattr(recognizer.touch.recognise, "may_find_more", tells_more)
+        monkeypatch.setattr(recognizer.touch.recognise, "has_residual", lambda *_: False)
+        reading = read_touch(READER, signal, 7)
+        answer, judged = reading.answer, reading.best
         assert answer.seq == 7
-        assert tries == [READER.settings.first, READER.settings.thorough][: len(tries)]
+        assert tries == [READER.options.first, READER.options.thorough][: len(tries)]
         count = len(tries)
         tries.clear()
         assert recognise(READER, signal, 7).reason == answer.reason
@@ -168,8 +170,7 @@ def test_without_contact_nothing_is_tried(reads):
 def test_a_touch_that_is_not_numbered_is_the_first(reads):
     nothing = SimpleNamespace(contact=False)
     assert recognise(READER, nothing).seq == 0
-    assert recognise_with_hypothesis(READER, nothing)[0].seq == 0
-    assert recognise_with_rivals(READER, nothing)[0].seq == 0
+    assert read_touch(READER, nothing).answer.seq == 0
 
 
 @pytest.mark.parametrize(
@@ -386,27 +387,29 @@ def exchanged(reads, monkeypatch):
         asked = []
         best = reads.one(score=-100.0)
 
-        def verified(reader, given, effort):
-            if isinstance(given, int):
-                assert effort is READER.settings.first
-                asked.append(given)
-                return by_axis[given]
+        def verified(touch, effort):
+            if isinstance(touch.signal.forces, int):
+                assert effort is READER.options.first
+                asked.append(touch.signal.forces)
+                return by_axis[touch.signal.forces]
             return [best, reads.one("rival", -200.0)]
 
-        def leaves_much(found, settings):
-            assert (found, settings) == (best, READER.settings.exchanged)
+        def leaves_much(found):
+            assert found is best
             return leaves
 
         for name, value in (
-            ("verify_hypotheses", verified), ("leaves_much", leaves_much),
-            ("exchange_halves", lambda _, axis: axis), ("expected_matches", lambda *_, **__: 1e-9),
-            ("may_tell_more", lambda *_: False),
+            ("verify_hypotheses", verified), ("has_residual", leaves_much),
+            ("swap_halves", lambda _, axis: axis), ("expected_matches", lambda *_, **__: 1e-9),
+            ("may_find_more", lambda *_: False),
         ):  # fmt: skip
             monkeypatch.setattr(recognizer.touch.recognise, name, value)
-        touch = SimpleNamespace(contact=True, state=state)
+        image = np.zeros((2, 2))
+        touch = Signal(image, image, contact=True, newtons=False, state=state)
         for name in ("propose_next", "diagnose"):
             monkeypatch.setattr(recognizer.touch.recognise, name, lambda *_: None)
-        answer, judged = recognise_with_hypothesis(READER, touch, 7)
+        reading = read_touch(READER, touch, 7)
+        answer, judged = reading.answer, reading.best
         assert judged is best
         assert (answer.seq, answer.reason, answer.margin) in (
             (7, "", 100.0), (7, AMBIGUOUS, 0.0),
@@ -462,7 +465,7 @@ def test_a_print_is_posed_by_the_scale_that_is_felt(reads, monkeypatch):
     class Print:
         @staticmethod
         def pose(pose, covariance, felt):
-            assert felt == ("felt", READER.settings.refine.prior[6])
+            assert felt == ("felt", READER.options.scale_sd)
             return 2 * pose, 3 * covariance
 
     found = reads.one()

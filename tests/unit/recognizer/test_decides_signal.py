@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.touch.settings import SignalSettings
-from recognizer.touch.signal import noise_of, signal_limits, signal_of
+from recognizer.touch import signal
+from recognizer.touch.options import ReaderOptions
+from recognizer.touch.signal import contact_counts, noise_of, signal_of
 
 
 def rows_of(*sums, turned=False):
@@ -70,15 +71,15 @@ def test_a_contact_is_six_tactels_over_eight_counts_or_a_twentieth_newton(
 
 def test_the_sixth_highest_is_the_one_that_counts():
     image = np.arange(36.0).reshape(6, 6)  # the six highest: 30 ... 35
-    assert signal_of(image, floor=0.0, settings=SignalSettings(contact_counts=29.9)).contact
-    assert not signal_of(image, floor=0.0, settings=SignalSettings(contact_counts=30.0)).contact
+    assert signal_of(image, floor=0.0, options=ReaderOptions(contact_counts=29.9)).contact
+    assert not signal_of(image, floor=0.0, options=ReaderOptions(contact_counts=30.0)).contact
 
 
 @pytest.mark.parametrize("newtons", [False, True])
 def test_a_rise_that_is_given_is_taken(newtons):
-    low, high = (SignalSettings(contact_counts=rise, contact_n=rise) for rise in (0.01, 60.0))
-    assert signal_of(six(0.02), floor=0.0, settings=low, newtons=newtons).contact
-    assert not signal_of(six(50.0), floor=0.0, settings=high, newtons=newtons).contact
+    low, high = (ReaderOptions(contact_counts=rise, contact_n=rise) for rise in (0.01, 60.0))
+    assert signal_of(six(0.02), floor=0.0, options=low, newtons=newtons).contact
+    assert not signal_of(six(50.0), floor=0.0, options=high, newtons=newtons).contact
 
 
 def test_bad_tactels_count_neither_for_the_floor_nor_for_a_contact():
@@ -104,8 +105,8 @@ def test_nothing_is_felt_where_every_tactel_is_bad():
 def test_a_single_good_tactel_is_read():
     trust = np.zeros((3, 3))
     trust[1, 1] = 1.0
-    one = SignalSettings(contact_counts=1.0)
-    found = signal_of(np.full((3, 3), 5.0), trust=trust, floor=2.0, settings=one)
+    one = ReaderOptions(contact_counts=1.0)
+    found = signal_of(np.full((3, 3), 5.0), trust=trust, floor=2.0, options=one)
     assert found.forces[1, 1] == 3.0
     assert found.contact
 
@@ -168,17 +169,18 @@ def test_a_contact_on_any_scale_is_what_rises_out_of_its_own_noise(scale):
     assert not signal_of(scale * few).contact  # five tactels are spikes
 
 
-def test_the_rise_on_any_scale_is_the_given_number_of_deviations():
+def test_the_rise_on_any_scale_is_the_given_number_of_deviations(monkeypatch):
     image = 0.01 * np.random.default_rng(9).normal(0.0, 1.0, (16, 16))
     level = float(np.quantile(image, 0.05))
     image.ravel()[:6] = level + 0.08
     noise = noise_of(image.ravel())
     assert noise == pytest.approx(0.01, rel=0.2)
     for sigmas, contact in ((0.079 / noise, True), (0.081 / noise, False)):
-        assert signal_of(image, settings=SignalSettings(contact_sigmas=sigmas)).contact is contact
-    high = SignalSettings(contact_sigmas=1e9)
-    assert not signal_of(image, settings=high).contact
-    assert signal_of(200 * image, settings=high).contact  # eight counts are a contact all the same
+        monkeypatch.setattr(signal, "SCALE_SIGMAS", sigmas)
+        assert signal_of(image).contact is contact
+    monkeypatch.setattr(signal, "SCALE_SIGMAS", 1e9)
+    assert not signal_of(image).contact
+    assert signal_of(200 * image).contact  # eight counts are a contact all the same
 
 
 def test_noise_is_that_of_tactels_that_nothing_presses():
@@ -216,8 +218,8 @@ def test_a_contact_rises_by_seven_deviations_of_readings_on_a_scale(sigmas, cont
 
 
 def test_a_contact_rises_by_six_deviations_of_a_noisy_type():
-    assert signal_limits(SensorType(noise=4.0)).contact_counts == pytest.approx(24.0)
-    assert signal_limits(SensorType(noise=1.0)).contact_counts == pytest.approx(8.0)
+    assert contact_counts(SensorType(noise=4.0)) == pytest.approx(24.0)
+    assert contact_counts(SensorType(noise=1.0)) == pytest.approx(8.0)
 
 
 def rising(strong):

@@ -1,27 +1,24 @@
 """How far readings scatter: two parts told apart by one touch, worked by hand and by loops."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from recognizer.touch.settings import SpreadSettings
-from recognizer.touch.symbols.blur import second_differences
-from recognizer.touch.symbols.spread import TactelScatter, fit_spread, usual_spread
+from recognizer.touch.symbols import posterior
+from recognizer.touch.symbols.posterior import TactelScatter, fit_scatter, second_differences
 
-USUAL = SpreadSettings()
+USUAL = TactelScatter(0.08, 0.08)
 
 
 def test_variances_are_those_of_both_parts():
     parts = np.array([[1.0, 4.0, 0.0], [0.0, 2.0, 9.0]])
     assert TactelScatter(0.5, 0.1).variances(parts) == pytest.approx([0.25, 1.02, 0.09])
-    assert (usual_spread(USUAL).felt, usual_spread(USUAL).aside_mm) == (0.08, 0.08)
 
 
 def test_what_lies_far_out_weighs_little():
     left, parts, trust = np.array([0.0, 2.0, 20.0, 2.0]), np.ones((2, 4)), np.array([1.0, 1, 1, 0])
-    weights = TactelScatter(math.sqrt(3), 1.0).weights(left, parts, trust, 8.0)  # variance 4
+    weights = TactelScatter(math.sqrt(3), 1.0).weights(left, parts, trust)  # variance 4
     assert weights == pytest.approx([9 / 32, 9 / 36, 9 / 432, 0.0])
 
 
@@ -29,8 +26,8 @@ def test_the_log_likelihood_is_students():
     left, parts, trust = np.array([0.5, -3.0, 1.0]), np.ones((2, 3)), np.array([1.0, 1.0, 0.0])
     spread = TactelScatter(0.6, 0.8)  # variance 1
     expected = sum(-4.5 * math.log(1 + x * x / 8) for x in (0.5, -3.0))
-    assert spread.log_likelihood(left, parts, trust, 8.0) == pytest.approx(expected)
-    wider = TactelScatter(1.2, 1.6).log_likelihood(left, parts, trust, 8.0)
+    assert spread.log_likelihood(left, parts, trust) == pytest.approx(expected)
+    wider = TactelScatter(1.2, 1.6).log_likelihood(left, parts, trust)
     expected = sum(-4.5 * math.log(1 + x * x / 32) - math.log(2) for x in (0.5, -3.0))
     assert wider == pytest.approx(expected)
 
@@ -43,20 +40,20 @@ def touched(felt, aside, seed, count=256):
     return left, parts
 
 
-def told(left, parts, jacobian=None, settings=USUAL, trust=None, rounds=60):
+def told(left, parts, jacobian=None, trust=None, rounds=60):
     unknowns = np.zeros((len(left), 1)) if jacobian is None else jacobian
     known = np.eye(unknowns.shape[1]) * 1e-9
-    spread = usual_spread(settings)
+    spread = USUAL
     for _ in range(rounds):
         trusted = np.ones(len(left)) if trust is None else trust
-        spread = fit_spread(spread, left, parts, unknowns, known, trusted, settings)
+        spread = fit_scatter(spread, left, parts, unknowns, known, trusted)
     return spread
 
 
 @pytest.mark.parametrize(("felt", "aside"), [(0.05, 0.2), (0.03, 0.1), (0.08, 0.08)])
-def test_a_touch_tells_even_sensors_from_straight_ones(felt, aside):
-    little = replace(USUAL, touches=0.5)
-    found = [told(*touched(felt, aside, seed), settings=little) for seed in range(20)]
+def test_a_touch_tells_even_sensors_from_straight_ones(felt, aside, monkeypatch):
+    monkeypatch.setattr(posterior, "USUAL_WEIGHT", 0.5)
+    found = [told(*touched(felt, aside, seed)) for seed in range(20)]
     # Student's scale of normal errors is a little less than their deviation
     assert np.mean([one.felt for one in found]) == pytest.approx(0.93 * felt, rel=0.12)
     assert np.mean([one.aside_mm for one in found]) == pytest.approx(0.93 * aside, rel=0.25)

@@ -6,12 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from recognizer.touch.exchanged import exchange_halves, leaves_much
-from recognizer.touch.settings import DEFAULTS
-from recognizer.touch.signal import Signal
+from probe.surface.polygon import polygon
+from recognizer.touch.recognise import has_residual
+from recognizer.touch.signal import swap_halves
 from recognizer.touch.verdict import Evidence
 
-SETTINGS = DEFAULTS.exchanged
 PLAIN = Evidence(
     log_likelihood_ratio=40.0,
     explained=0.95,
@@ -25,7 +24,7 @@ SQUARE = (np.array([(0, 0), (40, 0), (40, 40), (0, 40)], float),)
 
 
 class Face:
-    polygon_mm = SQUARE
+    region = polygon(list(SQUARE))
 
     def __init__(self, round_):
         self.round = round_
@@ -39,15 +38,15 @@ def leaves(small, monkeypatch):
         points = np.full((120, 2), 20.0)
         points[:beyond, 0] = 40.0 + mm
         points[100:] = 60.0  # not pressed: never counted
-        monkeypatch.setattr("recognizer.touch.exchanged.points_on_face", lambda *_: points)
+        monkeypatch.setattr("recognizer.touch.recognise.points_on_face", lambda *_: points)
         felt = np.where(np.arange(120) < 100, forces, 0.1)
         image = SimpleNamespace(forces=felt, trust=np.full(120, trust), noise=noise)
         face = Face(round_)
         found = SimpleNamespace(
             image=image, embossed=SimpleNamespace(face=lambda _: face),
-            hypothesis=SimpleNamespace(face=0), evidence=lambda: replace(PLAIN, **speaks),
+            hypothesis=SimpleNamespace(face=0), evidence=replace(PLAIN, **speaks),
         )  # fmt: skip
-        return leaves_much(found, SETTINGS)
+        return has_residual(found)
 
     return ask
 
@@ -91,13 +90,8 @@ def test_soft_symbols_explain_little_for_noise(leaves):
 
 
 @pytest.mark.parametrize("axis", [0, 1])
-def test_exchanged_twice_nothing_is_changed(axis):
+def test_halves_are_swapped_along_an_axis_and_back(axis):
     forces = np.arange(256.0).reshape(16, 16)
-    trust = (forces % 7 > 0).astype(float)
-    signal = Signal(forces, trust, contact=True, newtons=False)
-    other = exchange_halves(signal, axis)
-    first = (slice(8, None), slice(None)) if axis == 0 else (slice(None), slice(8, None))
-    assert other.forces[0, 0] == forces[first][0, 0]
-    assert (exchange_halves(other, axis).forces == forces).all()
-    assert (exchange_halves(other, axis).trust == trust).all()
-    assert (other.trust == (other.forces % 7 > 0)).all()
+    swapped = swap_halves(forces, axis)
+    assert (swap_halves(swapped, axis) == forces).all()
+    assert swapped[0, 0] == (forces[8, 0] if axis == 0 else forces[0, 8])

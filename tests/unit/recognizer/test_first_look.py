@@ -7,13 +7,18 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from recognizer.touch.first_look import gap_share, may_tell_more, pressed_tactels, shows_strokes
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW, refusal
-from recognizer.touch.settings import ReaderSettings
+from recognizer.touch.search_gate import (
+    GAPS,
+    gap_share,
+    may_find_more,
+    pressed_tactels,
+    shows_strokes,
+)
 from recognizer.touch.signal import signal_of
 from recognizer.touch.verdict import Evidence
 
-SETTINGS = ReaderSettings()
 STROKES = ((np.indices((16, 16)) % 4) < 2).any(axis=0)
 
 
@@ -26,7 +31,7 @@ def reader(small, pitch=7.0, kind="tab", radii=()):
     )
     sensor = SensorType(overlay=Overlay(kind=kind))
     return SimpleNamespace(
-        sensor=sensor, settings=SETTINGS, lab=SimpleNamespace(arrays=(embossed,))
+        sensor=sensor, options=ReaderOptions(), lab=SimpleNamespace(arrays=(embossed,))
     )
 
 
@@ -39,9 +44,9 @@ def test_a_plate_shows_no_strokes_and_symbols_do(small):
     symbols = signal_of(np.where(STROKES, 200.0, 8.0))
     for spread in (0.05, 0.15):
         assert not shows_strokes(reader(small), plate(spread))
-    assert gap_share(symbols, SETTINGS.first_look) == pytest.approx(64 / 256, abs=0.05)
+    assert gap_share(symbols) == pytest.approx(64 / 256, abs=0.05)
     symbols = signal_of(np.where(STROKES & (np.indices((16, 16)).sum(axis=0) % 4 > 0), 200.0, 8.0))
-    assert gap_share(symbols, SETTINGS.first_look) > 0.3
+    assert gap_share(symbols) > 0.3
     assert shows_strokes(reader(small), symbols)
 
 
@@ -52,7 +57,7 @@ def test_where_gaps_were_not_measured_nothing_is_refused(small, given):
 
 def test_an_edge_of_a_plate_is_no_stroke(small):
     half = signal_of(np.where(np.indices((16, 16))[1] < 8, 200.0, 8.0))
-    assert gap_share(half, SETTINGS.first_look) < SETTINGS.first_look.gaps
+    assert gap_share(half) < GAPS
 
 
 def touch_of(tactels):
@@ -65,20 +70,17 @@ def touch_of(tactels):
 @pytest.fixture
 def asked(small):
     """Ask for a wide search after a first try; four symbols and 48 cells: three name one."""
-    best = SimpleNamespace(embossed=small.two_faces().embossed)
 
     def ask(*, tactels=160, reason=NOT_ENCODED, judged=None, lab=None, **speaks):
         answer = refusal(0, reason)
         if not reason:
             answer = replace(answer, object="Thing")
-        support = replace(
-            Evidence(5.0, 5, 0, explained=0.9),
-            **speaks,
+        found = SimpleNamespace(
+            embossed=small.two_faces().embossed,
+            evidence=replace(Evidence(5.0, 5, 0, explained=0.9), **speaks),
         )
         given = answer if judged is None else judged
-        return may_tell_more(
-            reader(small, **(lab or {})), touch_of(tactels), answer, given, best, support
-        )
+        return may_find_more(reader(small, **(lab or {})), touch_of(tactels), answer, given, found)
 
     return ask
 
@@ -88,7 +90,7 @@ LABS = ({}, {"radii": (20.0,)}, {"kind": "pad"})
 
 def test_few_pressed_tactels_can_name_no_place(asked):
     # 0.44 of the 19.4 tactels of a cell, three times: 25.7
-    assert pressed_tactels(touch_of(25), SETTINGS.first_look) == 25
+    assert pressed_tactels(touch_of(25)) == 25
     assert not asked(tactels=25)
     assert asked(tactels=26)
     assert asked(tactels=25, lab={"radii": (20.0,)})  # a strip of a round face
@@ -151,4 +153,4 @@ def test_an_answer_that_is_refused_is_sought_again_where_little_is_missing(asked
 
 def test_without_a_hypothesis_the_search_goes_on(small):
     nothing = refusal(0, NOT_ENCODED)
-    assert may_tell_more(reader(small), touch_of(10), nothing, nothing, None, None)
+    assert may_find_more(reader(small), touch_of(10), nothing, nothing, None)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from recognizer.touch.fusion import FUSION, fuse_poses
-from recognizer.touch.robot import ObjectPose
+from recognizer.touch.robot import ObjectPose, fuse_poses
 
 
 def pose_of(rotvec, at):
@@ -81,8 +80,8 @@ def test_an_object_that_lies_still_is_not_taken_for_moved():
     rng = np.random.default_rng(8)
     number = 600
     alarms = sum(fuse_poses(drawn(rng, 2 + k % 4)).moved for k in range(number))
-    assert alarms <= 4  # FUSION.chance of them, .6
-    assert FUSION.chance == 1e-3
+    assert alarms <= 4  # MOVED_CHANCE of them, .6
+    assert MOVED_CHANCE == 1e-3
 
 
 def test_one_pose_fused_is_itself():

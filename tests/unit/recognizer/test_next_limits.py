@@ -9,17 +9,17 @@ import pytest
 
 from encoded_objects.base.sensor_type import GEL_IMPRINT_MM, Overlay, SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
-from recognizer.touch.next_limits import next_limits
-from recognizer.touch.next_touch import propose_next
+from recognizer.touch.next_touch import next_limits, propose_next
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import TOO_FEW, refusal
-from recognizer.touch.settings import NextSettings, ReaderSettings
-from recognizer.touch.signal import signal_limits, signal_of
+from recognizer.touch.signal import signal_of
 
-USUAL = NextSettings()
+USUAL = next_limits(SensorType())
 
 
 def test_the_usual_sensor_keeps_every_number():
-    assert next_limits(SensorType()) == USUAL
+    assert (USUAL.lengths_mm, USUAL.force_n) == ((4.0, 7.0, 10.0, 14.0), 80.0)
+    assert (USUAL.clear_mm, USUAL.least_counts, USUAL.soft_counts) == (2.5, 16.0, 40.0)
     stiff = replace(SensorType(), overlay=replace(Overlay(), young_mpa=3.0))
     assert next_limits(stiff) == USUAL  # of a gel alone the material counts
 
@@ -68,10 +68,10 @@ def test_a_gel_at_an_edge_is_led_inwards_within_its_size(small):
     strokes = ((np.indices(gel.shape) % 5) < 2).any(axis=0)
     noise = np.random.default_rng(4).normal(0.0, gel.noise, gel.shape)
     counts = np.clip(np.where((x > 2.0) & strokes, 500.0, 0.0) + noise, 0, 4095)
-    signal = signal_of(np.rint(counts), sensor=gel, settings=signal_limits(gel))
+    signal = signal_of(np.rint(counts), sensor=gel)
     reader = SimpleNamespace(
         sensor=gel,
-        settings=ReaderSettings(),
+        options=ReaderOptions(),
         lab=SimpleNamespace(arrays=(small.two_faces().embossed,)),
     )
     found = propose_next(reader, signal, refusal(0, TOO_FEW), ())

@@ -8,22 +8,21 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.touch.felt_area import EarlierTouch
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import EncodedFace
-from recognizer.touch.next_touch import propose_next
+from recognizer.touch.next_touch import FORCE_N, EarlierTouch, propose_next
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, TOO_FEW, NextTouch, refusal
-from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.signal import signal_of
 
 SENSOR = SensorType()
-SETTINGS = ReaderSettings()
+SETTINGS = ReaderOptions()
 X, Y = SENSOR.centres_mm().reshape(16, 16, 2).transpose(2, 0, 1)
 
 
-def reader(small, settings=SETTINGS):
+def reader(small, options=SETTINGS):
     arrays = (small.two_faces().embossed,)
-    return SimpleNamespace(sensor=SENSOR, settings=settings, lab=SimpleNamespace(arrays=arrays))
+    return SimpleNamespace(sensor=SENSOR, options=options, lab=SimpleNamespace(arrays=arrays))
 
 
 def felt(where, counts=200.0, seed=1):
@@ -49,7 +48,7 @@ def test_a_step_goes_towards_the_loaded_half_and_stays_on_it(small, turn):
     assert across <= along
     assert (np.abs(step) < SENSOR.half_mm).all()  # there the face was felt
     assert "towards the loaded part" in found.why
-    assert found.force_n == SETTINGS.next.force_n
+    assert found.force_n == FORCE_N
 
 
 @pytest.mark.parametrize(("right", "up"), [(1, 1), (1, -1), (-1, 1), (-1, -1)])
@@ -85,7 +84,7 @@ def test_without_contact_the_same_place_is_pressed_harder(small):
     nothing = signal_of(np.full((16, 16), 8.0))
     found = propose_next(reader(small), nothing, refusal(0, NO_CONTACT), ())
     assert (found.dx_mm, found.dy_mm, found.turn_deg) == (0.0, 0.0, 0.0)
-    assert found.force_n == SETTINGS.next.force_n
+    assert found.force_n == FORCE_N
     assert "nothing is felt" in found.why
 
 

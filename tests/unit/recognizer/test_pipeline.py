@@ -8,9 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recognizer.touch.belief import weigh_cells
-from recognizer.touch.locate import find_hypotheses, find_rivals
-from recognizer.touch.settings import DEFAULTS, BeliefSettings
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
@@ -19,17 +16,25 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.simulate.registered import registered_surface
 from recognizer.touch.chance import expected_matches
-from recognizer.touch.hypothesis import Hypothesis, labels_at, log_likelihood
+from recognizer.touch.evidence import weigh_cells
+from recognizer.touch.hypothesis import (
+    Hypothesis,
+    find_hypotheses,
+    find_rivals,
+    labels_at,
+    log_likelihood,
+)
 from recognizer.touch.lab import open_lab
+from recognizer.touch.options import DEFAULTS, ReaderOptions
 from recognizer.touch.pose import inside_mm
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise, recognise_with_hypothesis
+from recognizer.touch.recognise import read_touch, recognise
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUTSIDE, TOO_FEW
 from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import psi, template_of
 from recognizer.touch.verdict import MANY_INLIERS, is_encoded
-from recognizer.touch.verify import verify_hypotheses
+from recognizer.touch.verify import TouchImages, verify_hypotheses
 from recognizer.validation.draw import FOREIGN, INSIDE_MM, draw_touch
 from recognizer.validation.touch_plan import TouchPlan, sensor_of
 from recognizer.validation.trial import trial
@@ -175,7 +180,7 @@ def test_nothing_pressed_is_no_contact(reader):
     found = recognise(reader, signal_of(np.full((16, 16), 9.0)), 2)
     assert not found
     assert found.reason == NO_CONTACT
-    assert recognise_with_hypothesis(reader, signal_of(np.full((16, 16), 9.0)))[1] is None
+    assert read_touch(reader, signal_of(np.full((16, 16), 9.0)))[1] is None
 
 
 def test_dead_rows_are_told_from_the_image(url, reader):
@@ -197,14 +202,14 @@ def test_contact_is_judged_in_its_own_unit():
 
 def test_the_reading_behind_an_answer(url, reader):
     signal = signal_of(felt(url, "Cube", "F3", Touch(28.0, 33.0, 2.0, 70.0)), newtons=True)
-    answer, hypothesis = recognise_with_hypothesis(reader, signal)
+    answer, hypothesis = read_touch(reader, signal)
     assert hypothesis.embossed.face(hypothesis.hypothesis.face).face == answer.face == "F3"
-    speaks = hypothesis.evidence()
+    speaks = hypothesis.evidence
     assert is_encoded(speaks)
     assert speaks.explained > 0.85
     assert speaks.inliers >= 9
     assert speaks.contradictions == speaks.strong_contradictions == 0
-    scores = [r.score for r in verify_hypotheses(reader, signal, reader.settings.first)]
+    scores = [r.score for r in verify_hypotheses(TouchImages(reader, signal), reader.options.first)]
     assert scores == sorted(scores, reverse=True)
 
 
@@ -306,7 +311,7 @@ def touches_at_the_rim(url, reader):
     """Clean touches ever nearer to an edge and a corner: recognition and what was judged."""
     for x, y in [(6.0, 30.0), (3.0, 30.0), (0.5, 30.0), (6.0, 6.0), (3.0, 5.0), (2.0, 1.0)]:
         forces = felt(url, "Cube", "F1", Touch(x, y, 0.5, 80.0))
-        yield recognise_with_hypothesis(reader, signal_of(forces, newtons=True))
+        yield read_touch(reader, signal_of(forces, newtons=True))
 
 
 def test_few_symbols_answer_only_if_they_can_name_a_place(coarse_url):
@@ -314,7 +319,7 @@ def test_few_symbols_answer_only_if_they_can_name_a_place(coarse_url):
     limits, arrays = reader.settings.belief, reader.lab.arrays
     seen = []
     for found, best in touches_at_the_rim(coarse_url, reader):
-        cells, at = best.evidence().inliers, (best.embossed, best.fit, best.hypothesis)
+        cells, at = best.evidence.inliers, (best.embossed, best.fit, best.hypothesis)
         seen.append((bool(found), cells))
         if found and cells < MANY_INLIERS:
             assert expected_matches(arrays, *at, reader.settings, borders=False) <= limits.named
@@ -324,7 +329,7 @@ def test_few_symbols_answer_only_if_they_can_name_a_place(coarse_url):
 
 def test_a_cell_that_says_hardly_anything_does_not_speak_for_a_place(url, reader):
     forces = felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0))
-    _, read = recognise_with_hypothesis(reader, signal_of(forces, newtons=True))
+    _, read = read_touch(reader, signal_of(forces, newtons=True))
     encoding, fit, place = read.embossed, read.fit, read.hypothesis
     told = weigh_cells(encoding, fit, place, DEFAULTS.belief).agree
     held = labels_at(encoding, place, fit.cells)
@@ -344,9 +349,9 @@ def test_a_cell_that_says_hardly_anything_does_not_speak_for_a_place(url, reader
 
 
 def test_few_symbols_must_leave_other_places_far_behind(url, reader):
-    strict = replace(reader, settings=replace(DEFAULTS, belief=BeliefSettings(margin_by_few=1e6)))
+    strict = replace(reader, settings=replace(DEFAULTS, belief=ReaderOptions(margin_by_few=1e6)))
     for found, best in touches_at_the_rim(url, strict):
-        assert not found or best.evidence().inliers >= MANY_INLIERS
+        assert not found or best.evidence.inliers >= MANY_INLIERS
         assert found or found.reason in (AMBIGUOUS, NOT_ENCODED, TOO_FEW)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,21 +14,19 @@ from generator.database.registered import Bend, Developable
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.surface.face import endless_face
-from recognizer.touch.lab import radii_of
-from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.lab import LEAST_RADIUS_MM, MOST_RADIUS_MM, RADIUS_FACTOR, radii_of
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.bends import guess_bends
-from recognizer.touch.symbols.gain import Image, bend_image, image_of_signal, normalize_image
+from recognizer.touch.symbols.curvature import guess_bends
+from recognizer.touch.symbols.image import Image, bend_image, image_of_signal, normalize_image
 
 SENSOR = SensorType()
-RADII = DEFAULTS.lab
 INK = 0.35  # about the mean response of the symbols of the default alphabet
 BARS = ((((-0.9, 0.9), (0.9, 0.9)), ((-0.9, -0.9), (0.9, -0.9))),)  # fmt: skip
 
 
 def image(forces: np.ndarray) -> Image:
     signal = Signal(forces, np.ones(forces.shape), contact=True, newtons=True)
-    return image_of_signal(SENSOR, signal, 1.0)
+    return image_of_signal(SENSOR, signal, SimpleNamespace(ink=INK), 1.0)
 
 
 class Rolled:
@@ -80,7 +79,7 @@ def test_beside_the_strip_nothing_is_expected():
 def test_forces_tell_along_which_line_a_cylinder_lies(radius, degrees):
     surface = Rolled(radius, math.radians(degrees))
     forces = press(surface, SENSOR, Touch(0, 0, 0, 60.0)).forces_n
-    found = guess_bends(image(forces), SENSOR, (20.0, 40.0, 80.0), INK, 3)
+    found = guess_bends(image(forces), SENSOR, (20.0, 40.0, 80.0), 3)
     assert 1 <= len(found) <= 3
     turns = [math.remainder(b.bend.towards_rad - math.radians(degrees), math.pi) for b in found]
     assert min(map(abs, turns)) < math.radians(12)
@@ -89,17 +88,17 @@ def test_forces_tell_along_which_line_a_cylinder_lies(radius, degrees):
 
 
 def test_no_forces_no_bend():
-    assert guess_bends(image(np.zeros((16, 16))), SENSOR, (40.0,), INK, 3) == []
+    assert guess_bends(image(np.zeros((16, 16))), SENSOR, (40.0,), 3) == []
 
 
 def test_radii_are_near_to_those_of_the_faces():
     tube = Developable("cylinder", (1, 2), 47.0, 0.0, True, False, 0.02)
     (radius,) = radii_of([tube])
-    assert 1 / RADII.finer < radius / 47.0 < RADII.finer
+    assert 1 / RADIUS_FACTOR < radius / 47.0 < RADIUS_FACTOR
     assert radii_of([replace(tube, concave=True)]) == ()
     wide, narrow = (radii_of([replace(tube, radius_mm=r)]) for r in (1e6, 0.5))
-    assert wide[0] == pytest.approx(RADII.most_mm, rel=RADII.finer - 1)
-    assert narrow == (RADII.least_mm,)
+    assert wide[0] == pytest.approx(MOST_RADIUS_MM, rel=RADIUS_FACTOR - 1)
+    assert narrow == (LEAST_RADIUS_MM,)
     cone = Developable("cone", (1, 2), 47.0, 0.4, True, False, 0.02)
     assert len(radii_of([cone])) > 3
-    assert radii_of([cone])[0] == RADII.least_mm
+    assert radii_of([cone])[0] == LEAST_RADIUS_MM

@@ -15,6 +15,7 @@ from recognizer.as_built.touches import measure_prints
 from recognizer.errors import AsBuiltError
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
+from recognizer.touch.source import TouchImage
 
 MIDDLE = np.array([20.0, 20.0])
 

@@ -9,14 +9,13 @@ from scipy.signal import fftconvolve
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import SymbolStyle, alphabet_named
-from recognizer.touch import template_cache
-from recognizer.touch.settings import DEFAULTS
-from recognizer.touch.symbols.gain import _percentiles_around
+from recognizer.touch import prepare
+from recognizer.touch.prepare import template_and_bank
+from recognizer.touch.symbols.image import _percentiles_around
 from recognizer.touch.symbols.search import bank_of
 from recognizer.touch.symbols.template import _convolved, template_of
-from recognizer.touch.template_cache import template_and_bank
 
-CASE = (alphabet_named("dense-4"), SymbolStyle(), SensorType(), DEFAULTS.template, DEFAULTS.search)
+CASE = (alphabet_named("dense-4"), SymbolStyle(), SensorType())
 
 
 def same(one, other):
@@ -28,15 +27,15 @@ def same(one, other):
 
 def test_kept_as_worked_out(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    felt = template_of(*CASE[:4])
-    bank = bank_of(felt, CASE[2], CASE[4])
+    felt = template_of(*CASE)
+    bank = bank_of(felt, CASE[2])
     for _ in range(2):
         template_and_bank.cache_clear()
         kept, kept_bank = template_and_bank(*CASE)
         same(kept, felt)
         same(kept_bank, bank)
         assert not kept.rimmed.flags.writeable
-        monkeypatch.setattr(template_cache, "template_of", None)  # the second time it is read
+        monkeypatch.setattr(prepare, "template_of", None)  # the second time it is read
     template_and_bank.cache_clear()
 
 

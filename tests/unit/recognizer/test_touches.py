@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from probe.frame import frame_from
-from recognizer.touch.contacts import ContactSettings, cut_touches, every_frame
+from recognizer.touch.source import ENOUGH, FEW, FRAGMENTS, cut_touches, every_frame
 
 RNG = np.random.default_rng(8)
 A, B, C = (np.where(RNG.random((16, 16)) < 0.35, RNG.uniform(60, 300, (16, 16)), 0.0)
            for _ in range(3))  # fmt: skip
 REST = np.zeros((16, 16))
-CUT = ContactSettings()
 DOWN = np.linspace(0.1, 0.9, 9)
 
 
@@ -37,10 +36,10 @@ def cut(*images, **named):
 def test_a_press_is_one_touch_read_where_it_rests():
     (touch,) = cut(*[REST] * 7, *pressed(A))
     assert touch.seq == 7
-    assert touch.frames == CUT.enough
+    assert touch.frames == ENOUGH
     assert touch.t_ns >= (7 + len(DOWN)) * 1000 - 1000
     assert touch.counts - 3 == pytest.approx(A, abs=0.02 * 300)
-    middle = touch.t_ns / 1000 + CUT.enough // 2
+    middle = touch.t_ns / 1000 + ENOUGH // 2
     assert touch.pose[0, 3] == middle
     assert touch.wrist[0] == pytest.approx(middle, abs=0.6)
 
@@ -52,12 +51,12 @@ def test_every_press_is_a_touch_also_at_the_same_place():
 def test_a_touch_is_told_as_soon_as_it_rests():
     frames = film(*pressed(A, hold=500))
     next(cut_touches(frames))
-    assert next(frames).seq <= len(DOWN) + CUT.enough + 1
+    assert next(frames).seq <= len(DOWN) + ENOUGH + 1
 
 
 def test_a_short_rest_is_read_when_the_contact_ends():
-    (touch,) = cut(*pressed(A, hold=CUT.few + 1))
-    assert CUT.few <= touch.frames <= CUT.few + 3
+    (touch,) = cut(*pressed(A, hold=FEW + 1))
+    assert FEW <= touch.frames <= FEW + 3
     assert touch.counts - 3 == pytest.approx(A, rel=0.08, abs=6)
 
 
@@ -95,7 +94,7 @@ def test_many_unlike_images_do_not_wait_for_the_end():
     frames = film(*images)
     reading = cut_touches(frames)
     next(reading)
-    assert next(frames).seq <= CUT.fragments + 2
+    assert next(frames).seq <= FRAGMENTS + 2
     assert len(list(reading)) == len(images) - 1 - 1  # one frame was taken out here
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW
-from recognizer.touch.settings import BeliefSettings
 from recognizer.touch.verdict import (
     Evidence,
     is_encoded,
@@ -17,7 +17,7 @@ from recognizer.touch.verdict import (
     reject_reason,
 )
 
-LIMITS = BeliefSettings()
+LIMITS = ReaderOptions()
 GOOD = Evidence(log_likelihood_ratio=20.0, explained=0.9, inliers=12, contradictions=0)
 #: Limits of margins, nats: 10 and 14 but for rounding.
 TEN, FOURTEEN = LIMITS.margin, LIMITS.margin_by_few
