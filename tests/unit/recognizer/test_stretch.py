@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from recognizer.touch.contacts import TouchImage
 
 from encoded_objects import encode
 from probe.contact.contract import Touch
