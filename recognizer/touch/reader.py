@@ -41,21 +41,14 @@ class Reader(PreparedLab):
 
     Examples
     --------
-    >>> import numpy as np, tempfile
-    >>> from generator.pipeline import encode
-    >>> from generator.spec import read_specs
-    >>> from probe.contact.contract import Touch
-    >>> from probe.contact.press import press
-    >>> from probe.simulate.registered import registered_surface
-    >>> from recognizer.touch.lab import open_lab
-    >>> folder = Path(tempfile.mkdtemp())
-    >>> _ = (folder / "cube.yaml").write_text("{name: Cube, shape: {cube: 40 mm}}")
-    >>> _ = encode(read_specs([folder / "cube.yaml"]), folder=folder, formats=("stl",),
-    ...            database=f"{folder}/lab.db")
-    >>> reader = Reader(open_lab(folder / "lab.db"))
-    >>> surface = registered_surface(f"{folder}/lab.db", "Cube", "F1").surface
-    >>> counts = 100 * press(surface, reader.sensor, Touch(20, 19, 0.4, force_n=80)).forces_n
-    >>> answer = reader.read(counts)
+    >>> import tempfile
+    >>> import numpy as np
+    >>> from encoded_objects import Reader, encode, open_lab, simulate
+    >>> lab = tempfile.mkdtemp() + "/lab.db"
+    >>> _ = encode({"name": "Cube", "shape": {"cube": "40 mm"}}, database=lab, formats=())
+    >>> touch = simulate(lab + "#Cube/F1", x=20, y=19, theta=23, force=80)
+    >>> reader = Reader(open_lab(lab))
+    >>> answer = reader.read(next(touch.frames()).counts)
     >>> answer.object, answer.face, round(answer.x_mm), round(answer.y_mm)
     ('Cube', 'F1', 20, 19)
     >>> str(reader.read(np.zeros((16, 16)))).split("; ")[:2]

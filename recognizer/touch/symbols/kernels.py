@@ -1,7 +1,7 @@
 """The compiled loops of reading: their library, what they are given, and the numbers they use.
 
 `recognize-object --version` and a run's provenance say that it is these that are in use. The forms
-in numpy are in `tests/reference/touch`.
+in numpy are in `tests/reference/touch_loops.py`.
 
 Noise: psi of a reading (`template.psi`) spreads in proportion to what is felt (gain, height and
 force law differ from tactel to tactel), to the slope of the template (tips stand aside), and little

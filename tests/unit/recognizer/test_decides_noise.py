@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from reference.touch_loops import log_likelihoods
 
+from recognizer.touch.symbols import linearize
 from recognizer.touch.symbols.linearize import psi_deviation
 
 
@@ -88,10 +89,11 @@ def test_a_tactel_by_hand(seen, value, nats):
     assert hung[0, 0, 0] == pytest.approx(-min(away**2 / 2, 8) - math.log(width), abs=1e-5)
 
 
-def test_slopes_count_by_the_square_of_how_far_tactels_are_displaced():
-    # 0.8, 0.6 and a slope of 1 over a mm: the root of 0.64 + 0.36 + 1
+def test_slopes_count_by_the_square_of_how_far_tactels_are_displaced(monkeypatch):
+    # 0.8, 0.6 and a slope of 2 over half a mm: the root of 0.64 + 0.36 + 1
+    monkeypatch.setattr(linearize, "DISPLACED_MM", 0.5)
     table = np.zeros((1, 1, 1, 6), np.float32)
-    table[..., 0], table[..., 1] = 0.6, 1.0
+    table[..., 0], table[..., 1] = 0.6, 2.0
     felt = SimpleNamespace(faint=np.zeros((1, 1)))
     width = psi_deviation(felt, table, np.full((1, 1), 0.15))
     assert width[0, 0, 0] == pytest.approx(math.sqrt(2.0))
