@@ -133,7 +133,8 @@ def reads(small, lab, monkeypatch):
             return wide_unless_sure(reader, given, answer, judged, best)
 
         def found(touch, effort):
-            assert (touch.reader, touch.signal) == (READER, signal)
+            assert touch.reader is READER
+            assert touch.signal is signal
             tries.append(effort)
             return first if len(tries) == 1 else second
 
@@ -146,6 +147,7 @@ def reads(small, lab, monkeypatch):
         monkeypatch.setattr(recognizer.touch.recognise, "has_residual", lambda *_: False)
         reading = read_touch(READER, signal, 7)
         answer, judged = reading.answer, reading.best
+        assert any(reading.found is tried for tried in (first, second)) or reading.found == []
         assert answer.seq == 7
         assert tries == [READER.options.first, READER.options.thorough][: len(tries)]
         count = len(tries)
@@ -390,6 +392,7 @@ def exchanged(reads, monkeypatch):
         def verified(touch, effort):
             if isinstance(touch.signal.forces, int):
                 assert effort is READER.options.first
+                assert touch.signal.trust == touch.signal.forces  # both are swapped
                 asked.append(touch.signal.forces)
                 return by_axis[touch.signal.forces]
             return [best, reads.one("rival", -200.0)]

@@ -74,6 +74,15 @@ def test_each_reason_in_its_order(changed, margin, reason):
     assert reject_reason(replace(GOOD, **changed), margin, LIMITS) == reason
 
 
+def test_the_bounds_are_those_that_are_given():
+    strict = ReaderOptions(margin=12.0, margin_by_few=16.0, least_inliers=6)
+    few = replace(GOOD, inliers=6)
+    assert [reject_reason(few, margin, strict) for margin in (12.0, 11.9)] == ["", AMBIGUOUS]
+    assert reject_reason(replace(few, inliers=5), 12.0, strict) == TOO_FEW
+    assert [reject_few(few, margin, 1.0, strict) for margin in (16.0, 15.9)] == ["", AMBIGUOUS]
+    assert [may_count_border(few, margin, strict) for margin in (16.0, 15.9)] == [True, False]
+
+
 @pytest.mark.parametrize(
     ("ratio", "best", "reason"),
     [(8.0, 8.0, ""), (7.9, 8.0, TOO_FEW), (2.9, 8.0, NOT_ENCODED), (2.9, 7.9, TOO_FEW)],
