@@ -22,6 +22,7 @@ import importlib.abc
 import importlib.machinery
 import json
 import os
+import re
 import resource
 import signal
 import sys
@@ -57,7 +58,7 @@ class Watched:
 
     module: str
     tests: tuple[str, ...]
-    within: tuple[str, ...] = ()  #: classes, functions and fields that decide; all by default
+    within: tuple[str, ...] = ()  #: classes, functions, fields and constants that decide; all by default
 
     def mutants(self) -> list[Mutant]:
         """Return every change of it."""
@@ -65,7 +66,8 @@ class Watched:
         return [
             m
             for m in every
-            if not self.within or {m.place.split(".")[0], m.before.split(":")[0]} & {*self.within}
+            if not self.within
+            or {m.place.split(".")[0], re.split(":| = ", m.before)[0]} & {*self.within}
         ]
 
     def state(self) -> str:

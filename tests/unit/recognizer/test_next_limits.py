@@ -9,7 +9,7 @@ import pytest
 
 from encoded_objects.base.sensor_type import GEL_IMPRINT_MM, Overlay, SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
-from recognizer.touch.next_touch import next_limits, propose_next
+from recognizer.touch.next_touch import NextLimits, next_limits, propose_next
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import TOO_FEW, refusal
 from recognizer.touch.signal import signal_of
@@ -18,8 +18,10 @@ USUAL = next_limits(SensorType())
 
 
 def test_the_usual_sensor_keeps_every_number():
-    assert (USUAL.lengths_mm, USUAL.force_n) == ((4.0, 7.0, 10.0, 14.0), 80.0)
-    assert (USUAL.clear_mm, USUAL.least_counts, USUAL.soft_counts) == (2.5, 16.0, 40.0)
+    assert NextLimits(
+        lengths_mm=(4.0, 7.0, 10.0, 14.0), clear_mm=2.5, force_n=80.0,
+        least_counts=16.0, soft_counts=40.0, gap=5,
+    ) == USUAL  # fmt: skip
     stiff = replace(SensorType(), overlay=replace(Overlay(), young_mpa=3.0))
     assert next_limits(stiff) == USUAL  # of a gel alone the material counts
 

@@ -16,13 +16,12 @@ from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, TOO_FEW, NextTou
 from recognizer.touch.signal import signal_of
 
 SENSOR = SensorType()
-SETTINGS = ReaderOptions()
 X, Y = SENSOR.centres_mm().reshape(16, 16, 2).transpose(2, 0, 1)
 
 
-def reader(small, options=SETTINGS):
-    arrays = (small.two_faces().embossed,)
-    return SimpleNamespace(sensor=SENSOR, options=options, lab=SimpleNamespace(arrays=arrays))
+def reader(small):
+    lab = SimpleNamespace(arrays=(small.two_faces().embossed,))
+    return SimpleNamespace(sensor=SENSOR, options=ReaderOptions(), lab=lab)
 
 
 def felt(where, counts=200.0, seed=1):

@@ -15,6 +15,7 @@ from generator.spec import read_specs
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.simulate.registered import registered_surface
+from recognizer.touch import verdict
 from recognizer.touch.chance import expected_matches
 from recognizer.touch.evidence import weigh_cells
 from recognizer.touch.hypothesis import (
@@ -216,7 +217,7 @@ def test_the_reading_behind_an_answer(url, reader):
 def test_the_index_of_windows_lists_every_window(reader):
     encoding = reader.lab.arrays[0]
     order = encoding.array.order
-    for windows in encoding.windows():
+    for windows in encoding.windows:
         down, right = windows.shape
         assert (np.diff(windows.codes) >= 0).all()
         for code, cell in list(zip(windows.codes, windows.cells, strict=True))[::97]:
@@ -231,7 +232,7 @@ def test_the_index_of_windows_lists_every_window(reader):
 
 def test_a_large_array_is_looked_up_like_a_small_one(reader):
     encoding = reader.lab.arrays[0]
-    sparse = replace(encoding, dense=None, known={}, indexed=[])
+    sparse = replace(encoding, dense=None, known={})
     rng = np.random.default_rng(2)
     rows = rng.integers(encoding.array.rows, size=500)
     columns = rng.integers(encoding.array.columns, size=500)
@@ -353,6 +354,23 @@ def test_few_symbols_must_leave_other_places_far_behind(url, reader):
     for found, best in touches_at_the_rim(url, strict):
         assert not found or best.evidence.inliers >= MANY_INLIERS
         assert found or found.reason in (AMBIGUOUS, NOT_ENCODED, TOO_FEW)
+
+
+def test_few_symbols_are_refused_by_what_they_name_first(url, reader, monkeypatch):
+    signal = signal_of(felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0)), newtons=True)
+    usual = read_touch(reader, signal)
+    best = usual.best
+    at = (best.embossed, best.fit, best.hypothesis)
+    by_symbols = expected_matches(reader.lab.arrays, *at, borders=False)
+    # its cells are few then
+    monkeypatch.setattr(verdict, "MANY_INLIERS", best.evidence.inliers + 1)
+    near = replace(reader, options=ReaderOptions(margin_by_few=1e6))
+    monkeypatch.setattr(verdict, "NAMED", by_symbols)
+    assert (usual.answer.face, read_touch(reader, signal).answer.face) == ("F1", "F1")
+    assert read_touch(near, signal).answer.reason == AMBIGUOUS
+    monkeypatch.setattr(verdict, "NAMED", 0.99 * by_symbols)
+    assert read_touch(reader, signal).answer.reason == TOO_FEW
+    assert read_touch(near, signal).answer.reason == TOO_FEW
 
 
 def test_a_point_in_a_face(reader):

@@ -30,7 +30,6 @@ from recognizer.touch.recognition import (
     refusal,
 )
 
-#: Constants that say how something is written or what a formula is, and decide nothing.
 AT = Touch(20.0, 19.0, math.radians(25), 80.0)
 
 
