@@ -131,7 +131,7 @@ def touched(reader, x, y, force_n=80.0):
     lab = reader.lab
     surface = registered_surface(lab.url, "Box", "F1").surface
     forces = press(surface, reader.sensor, Touch(x, y, 0.2, force_n=force_n)).forces_n
-    _, best = read_touch(reader, reader.signal(100 * forces))
+    best = read_touch(reader, reader.signal(100 * forces)).best
     pose = face_pose(best.embossed, lab.arrays[0].face(0), best.hypothesis, best.fit)
     assert pose[:2, 3] == pytest.approx((x, y), abs=0.2)
     return best

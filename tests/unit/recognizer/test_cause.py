@@ -197,7 +197,7 @@ def test_a_cause_is_said_beside_the_reason_it_led_to():
          "sharpness", "silent", "explained", "explained_anywhere",
          "symbols_anywhere", "slope", "width_mm", "variation", "columns"), 0.5
     )  # fmt: skip
-    codes = [value for name, value in vars(cause).items() if name.isupper() and name[0] != "_"]
+    codes = list(cause._WORDS)
     assert len(codes) == 12
     for code in codes:
         one = Cause(code, numbers)

@@ -9,7 +9,6 @@ import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend
-from recognizer.touch.options import ReaderOptions
 from recognizer.touch.sensor_state import unknown_state
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.image import (
@@ -337,7 +336,7 @@ def test_a_round_face_falls_away_under_the_plate():
     flat = image_of_signal(
         sensor,
         Signal(np.ones((16, 16)), np.ones((16, 16)), contact=True, newtons=False),
-        1.0, ReaderOptions(),
+        None, 1.0,
     )  # fmt: skip
     height = sensor.overlay.height_mm
     raised = []

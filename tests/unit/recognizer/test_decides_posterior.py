@@ -8,13 +8,13 @@ import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import SymbolStyle, alphabet_named
-from recognizer.touch.options import DEFAULTS
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.fit import force_jacobian
+from recognizer.touch.symbols import posterior
 from recognizer.touch.symbols.image import image_of_signal
-from recognizer.touch.symbols.linearize import project_template, values_of
+from recognizer.touch.symbols.kernels import FORM_SD
+from recognizer.touch.symbols.linearize import force_jacobian, project_symbols
 from recognizer.touch.symbols.posterior import explained_share, fit_posterior, second_differences
-from recognizer.touch.symbols.template import template_of
+from recognizer.touch.symbols.template import CROSS_TALK, template_of
 
 SENSOR = SensorType()
 STYLE = SymbolStyle(pitch_mm=7.0, height_mm=1.0, stroke_mm=1.4)
@@ -29,21 +29,20 @@ def shown(cells):
 
 @pytest.fixture(scope="module")
 def template():
-    return template_of(alphabet_named("dense-4"), STYLE, SENSOR, DEFAULTS.template)
+    return template_of(alphabet_named("dense-4"), STYLE, SENSOR)
 
 
 @pytest.fixture(scope="module")
 def touch(template):
     """Return a function that makes an image: a sensor with these errors at the true pose."""
     signal = Signal(np.ones((16, 16)), np.ones((16, 16)), contact=True, newtons=False)
-    plain = image_of_signal(SENSOR, signal, STYLE.height_mm)
+    plain = image_of_signal(SENSOR, signal, template, STYLE.height_mm)
 
     def made(seed=0, aside_mm=0.0, gain=0.0, offset=0.0, blur=(0.0, 0.0), pose=TRUE):
         rng = np.random.default_rng(seed)
         at = replace(plain, points_mm=plain.points_mm + aside_mm * rng.standard_normal((256, 2)))
-        under = project_template(at, template, pose[None], GAIN[None])
-        values = values_of(under, shown(under.cells))
-        force = force_jacobian(at, pose[None], GAIN[None], values, under.felt)[1][0]
+        felt, _, values = project_symbols(at, pose[None], GAIN[None], shown)
+        force = force_jacobian(at, pose[None], GAIN[None], values, felt)[1][0]
         force = force * np.exp(gain * rng.standard_normal(256)) + 1.5 * rng.standard_normal(256)
         rows, columns = (one[:, 0] for one in second_differences(force[:, None], (16, 16)))
         return replace(plain, forces=force + blur[0] * rows + blur[1] * columns + offset)
@@ -58,8 +57,8 @@ def near(rng):
     return pose, GAIN * (1 + rng.normal(0, 0.03, 4))
 
 
-def fit(template, image, seed=0):
-    return fit_posterior(image, template, *near(np.random.default_rng(100 + seed)), shown)
+def fit(image, seed=0):
+    return fit_posterior(image, *near(np.random.default_rng(100 + seed)), shown)
 
 
 def away(found):
@@ -68,136 +67,132 @@ def away(found):
 
 
 @pytest.mark.parametrize(("value", "presses"), [(0.0, False), (9e-7, False), (1.1e-6, True)])
-def test_what_rounding_leaves_of_no_symbol_presses_nothing(template, touch, value, presses):
+def test_what_rounding_leaves_of_no_symbol_presses_nothing(touch, value, presses):
     image, deep = touch(), GAIN + np.array([0.0, 0.9, 0.0, 0.0])  # so that the bare face is felt
-    under = project_template(image, template, TRUE[None], deep[None])
-    values = np.zeros_like(values_of(under, shown(under.cells)))
+    felt, _, values = project_symbols(image, TRUE[None], deep[None], shown)
+    values = np.zeros_like(values)
     values[0, 100, 0] = value
-    force = force_jacobian(image, TRUE[None], deep[None], values, under.felt)[1][0]
+    force = force_jacobian(image, TRUE[None], deep[None], values, felt)[1][0]
     assert bool(force[100] > 1.0) is presses
     assert force[100] < 1e-3 or presses
     assert not np.delete(force, 100).any()
 
 
 @pytest.mark.parametrize(("aside_mm", "gain"), [(0.03, 0.05), (0.08, 0.12), (0.2, 0.05)])
-def test_errors_are_as_large_as_the_covariance_says(template, touch, aside_mm, gain):
+def test_errors_are_as_large_as_the_covariance_says(touch, aside_mm, gain):
     squares, felt = [], []
     for seed in range(40):
-        found = fit(template, touch(seed, aside_mm, gain), seed)
+        found = fit(touch(seed, aside_mm, gain), seed)
         error = away(found)[:3]
         squares.append(error @ np.linalg.solve(found.covariance[:3, :3], error))
-        felt.append(found.spread.aside_mm)
+        felt.append(found.scatter.aside_mm)
     assert 1.6 < np.mean(squares) < 4.5  # of three numbers: 3, nearly
     assert np.mean(np.array(squares) < 7.815) >= 0.85
     assert np.mean(felt) == pytest.approx(aside_mm, abs=0.02 + 0.2 * aside_mm)
 
 
-def test_tips_that_stand_aside_widen_it_and_even_gains_do_not_hide_them(template, touch):
+def test_tips_that_stand_aside_widen_it_and_even_gains_do_not_hide_them(touch):
     widths = []
     for aside_mm in (0.02, 0.1, 0.25):
-        found = [fit(template, touch(seed, aside_mm), seed).covariance for seed in range(4)]
+        found = [fit(touch(seed, aside_mm), seed).covariance for seed in range(4)]
         widths.append(math.sqrt(np.mean([one[0, 0] for one in found])))
     assert widths[1] > 1.5 * widths[0]
     assert widths[2] > 1.5 * widths[1]
 
 
-def test_what_all_readings_have_too_much_is_told(template, touch):
-    plain, lifted = (fit(template, touch(2, 0.03, offset=offset)) for offset in (0.0, 12.0))
+def test_what_all_readings_have_too_much_is_told(touch):
+    plain, lifted = (fit(touch(2, 0.03, offset=offset)) for offset in (0.0, 12.0))
     assert lifted.pose[:3] == pytest.approx(plain.pose[:3], abs=0.01)
 
 
-def test_blur_of_rows_and_of_columns_is_told_and_flattens_slopes(template, touch):
-    plain = fit(template, touch(3, 0.05))
+def test_blur_of_rows_and_of_columns_is_told_and_flattens_slopes(touch):
+    plain = fit(touch(3, 0.05))
     assert plain.blur == pytest.approx((0.0, 0.0), abs=0.02)
     for blur in ((0.08, 0.0), (0.0, 0.08)):
-        found = fit(template, touch(3, 0.05, blur=blur))
+        found = fit(touch(3, 0.05, blur=blur))
         assert found.blur == pytest.approx(blur, abs=0.03)
         assert found.pose[:2] == pytest.approx(plain.pose[:2], abs=0.03)
         assert found.covariance[0, 0] > 0.9 * plain.covariance[0, 0]
 
 
-def test_much_blur_widens_it_beyond_least_squares(template, touch):
+def test_much_blur_widens_it_beyond_least_squares(touch, monkeypatch):
     image = touch(3, 0.05, blur=(0.1, 0.1))
-    settings = DEFAULTS.covariance
-    usual, twice = (
-        fit(template, replace(image, settings=replace(DEFAULTS, covariance=changed)))
-        for changed in (
-            replace(settings, size=1.0, blurred=0.0),
-            replace(settings, size=2.0, blurred=0.0),
-        )
-    )
-    np.testing.assert_allclose(twice.covariance, 2 * usual.covariance)
-    found = fit(template, image)
-    heard = DEFAULTS.template.cross_talk * (1 + found.pose[4]) + 2 * sum(found.blur)
-    assert heard > settings.usual_blur
-    factor = settings.size + settings.blurred * (heard - settings.usual_blur)
+    found = fit(image)
+    size, blurred, usual_blur = posterior.SIZE, posterior.BLURRED_SIZE, posterior.USUAL_BLUR
+    monkeypatch.setattr(posterior, "BLURRED_SIZE", 0.0)
+    monkeypatch.setattr(posterior, "SIZE", 1.0)
+    usual = fit(image)
+    heard = CROSS_TALK * (1 + found.pose[4]) + 2 * sum(found.blur)
+    assert heard > usual_blur
+    factor = size + blurred * (heard - usual_blur)
     np.testing.assert_allclose(found.covariance, factor * usual.covariance, rtol=1e-9)
-    even = fit(template, touch(3, 0.05))
-    assert DEFAULTS.template.cross_talk * (1 + even.pose[4]) + 2 * sum(even.blur) < 0.12
+    even = fit(touch(3, 0.05))
+    assert CROSS_TALK * (1 + even.pose[4]) + 2 * sum(even.blur) < 0.12
 
 
-def test_a_form_far_from_what_was_known_widens_it(template, touch):
-    changed = replace(DEFAULTS.covariance, form=0.0)
+def test_a_form_far_from_what_was_known_widens_it(touch, monkeypatch):
     far = np.array([*TRUE[:3], -1.2, 0.7, 0.4, 0.0])
     for pose, wider in ((TRUE, False), (far, True)):
         image = touch(3, 0.05, pose=pose)
-        other = replace(image, settings=replace(DEFAULTS, covariance=changed))
-        plain, found = (fit_posterior(each, template, pose, GAIN, shown) for each in (other, image))
-        strange = ((found.pose[3:6] / np.array(DEFAULTS.refine.prior[3:6])) ** 2).sum()
+        found = fit_posterior(image, pose, GAIN, shown)
+        with monkeypatch.context() as changed:
+            changed.setattr(posterior, "FORM_SIZE", 0.0)
+            plain = fit_posterior(image, pose, GAIN, shown)
+        strange = ((found.pose[3:6] / np.array(FORM_SD)) ** 2).sum()
         assert (strange > 5.0) == wider
         factor = 1 + 0.25 * max(0.0, strange - 5.0)
         np.testing.assert_allclose(found.covariance, factor * plain.covariance, rtol=1e-9)
 
 
-def test_tips_that_were_learned_scatter_less(template, touch):
+def test_tips_that_were_learned_scatter_less(touch):
     image = touch(3, 0.08)
     learned = np.where(np.arange(256) % 2 == 0, 0.01, 1.0)
     forces = np.where(np.arange(256) % 2 == 0, touch(3, 0.0).forces, image.forces)
     image = replace(image, forces=forces)  # every other tip stands where it is believed to
-    blind, told = fit(template, image), fit(template, replace(image, aside=learned))
+    blind, told = fit(image), fit(replace(image, aside=learned))
     assert told.covariance[0, 0] < 0.7 * blind.covariance[0, 0]
-    assert told.spread.aside_mm > blind.spread.aside_mm
+    assert told.scatter.aside_mm > blind.scatter.aside_mm
 
 
-def test_a_scale_is_told_with_its_covariance(template, touch):
+def test_a_scale_is_told_with_its_covariance(touch):
     errors, scaled = [], TRUE + np.array([0, 0, 0, 0, 0, 0, 0.004])
     for seed in range(30):
-        found = fit(template, touch(seed, 0.08, 0.1, pose=scaled), seed)
+        found = fit(touch(seed, 0.08, 0.1, pose=scaled), seed)
         errors.append((found.pose[6] - 0.004) / math.sqrt(found.covariance[3, 3]))
     assert abs(np.mean(errors)) < 0.5
     assert 0.6 < np.std(errors) < 1.25
 
 
-def test_dead_tactels_and_masked_ones_do_not_move_it(template, touch):
+def test_dead_tactels_and_masked_ones_do_not_move_it(touch):
     image = touch(6, 0.05)
     forces, trust = image.forces.copy(), image.trust.copy()
     forces[[40, 100, 170]] = 0.0
-    dead = fit(template, replace(image, forces=forces))
+    dead = fit(replace(image, forces=forces))
     trust[[40, 100, 170]] = 0.0
-    masked = fit(template, replace(image, forces=forces, trust=trust))
-    whole = fit(template, image)
+    masked = fit(replace(image, forces=forces, trust=trust))
+    whole = fit(image)
     assert masked.pose[:3] == pytest.approx(whole.pose[:3], abs=0.02)
     assert dead.pose[:3] == pytest.approx(masked.pose[:3], abs=0.02)
     # to leave tactels out costs information
     assert np.linalg.det(masked.covariance) > np.linalg.det(whole.covariance)
 
 
-def test_where_nothing_tells_a_place_it_is_wide(template, touch):
-    found = fit(template, replace(touch(7, 0.05), trust=np.zeros(256)))
+def test_where_nothing_tells_a_place_it_is_wide(touch):
+    found = fit(replace(touch(7, 0.05), trust=np.zeros(256)))
     assert np.isfinite(found.covariance).all()
     assert found.covariance[0, 0] > 1.0
 
 
-def test_what_noise_of_readings_leaves_is_not_left_unexplained(template, touch):
+def test_what_noise_of_readings_leaves_is_not_left_unexplained(touch):
     image = touch(8, 0.03)
     rng = np.random.default_rng(8)
-    clean = explained_share(image, template, TRUE, GAIN, shown)
+    clean = explained_share(image, TRUE, GAIN, shown)
     assert clean > 0.9
     loud = np.maximum(image.forces + 40 * rng.standard_normal(256), 0.0)  # of 200 on a plateau
     told = replace(image, forces=loud, noise=40.0)
-    plain = explained_share(replace(told, noise=0.0), template, TRUE, GAIN, shown)
+    plain = explained_share(replace(told, noise=0.0), TRUE, GAIN, shown)
     assert plain < 0.7
-    assert explained_share(told, template, TRUE, GAIN, shown) > plain + 0.15
+    assert explained_share(told, TRUE, GAIN, shown) > plain + 0.15
     # symbols that are not there explain no more for it
-    other = explained_share(told, template, TRUE, GAIN, lambda cells: (shown(cells) + 1) % 4)
+    other = explained_share(told, TRUE, GAIN, lambda cells: (shown(cells) + 1) % 4)
     assert other < 0.3

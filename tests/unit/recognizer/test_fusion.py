@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from recognizer.touch.robot import ObjectPose, fuse_poses
+from recognizer.touch.robot import MOVED_CHANCE, ObjectPose, fuse_poses
 
 
 def pose_of(rotvec, at):

@@ -33,13 +33,11 @@ from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUT
 from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import psi, template_of
-from recognizer.touch.verdict import MANY_INLIERS, is_encoded
+from recognizer.touch.verdict import MANY_INLIERS, NAMED, is_encoded
 from recognizer.touch.verify import TouchImages, verify_hypotheses
 from recognizer.validation.draw import FOREIGN, INSIDE_MM, draw_touch
 from recognizer.validation.touch_plan import TouchPlan, sensor_of
 from recognizer.validation.trial import trial
-
-PLACES = DEFAULTS.hypotheses
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +178,7 @@ def test_nothing_pressed_is_no_contact(reader):
     found = recognise(reader, signal_of(np.full((16, 16), 9.0)), 2)
     assert not found
     assert found.reason == NO_CONTACT
-    assert read_touch(reader, signal_of(np.full((16, 16), 9.0)))[1] is None
+    assert read_touch(reader, signal_of(np.full((16, 16), 9.0))).best is None
 
 
 def test_dead_rows_are_told_from_the_image(url, reader):
@@ -195,14 +193,15 @@ def test_dead_rows_are_told_from_the_image(url, reader):
 
 def test_contact_is_judged_in_its_own_unit():
     image = np.zeros((16, 16))
-    image[4:8, 4:8] = 2 * DEFAULTS.signal.contact_n
+    image[4:8, 4:8] = 2 * DEFAULTS.contact_n
     assert signal_of(image, floor=0.0, newtons=True).contact
     assert not signal_of(image, floor=0.0).contact
 
 
 def test_the_reading_behind_an_answer(url, reader):
     signal = signal_of(felt(url, "Cube", "F3", Touch(28.0, 33.0, 2.0, 70.0)), newtons=True)
-    answer, hypothesis = read_touch(reader, signal)
+    reading = read_touch(reader, signal)
+    answer, hypothesis = reading.answer, reading.best
     assert hypothesis.embossed.face(hypothesis.hypothesis.face).face == answer.face == "F3"
     speaks = hypothesis.evidence
     assert is_encoded(speaks)
@@ -255,16 +254,16 @@ def place_of(encoding, at=40):
 def test_a_sure_lattice_is_placed_and_a_wrong_cell_costs_its_cap(reader):
     encoding = reader.lab.arrays[0]
     place, fit = place_of(encoding)
-    best = find_hypotheses(encoding, (fit,), PLACES)[0]
+    best = find_hypotheses(encoding, (fit,))[0]
     assert (best.row, best.column, best.face) == (place.row, place.column, place.face)
     assert best.score == pytest.approx(-5.0)
-    assert log_likelihood(encoding, fit, place, PLACES) == pytest.approx(-5.0)
+    assert log_likelihood(encoding, fit, place) == pytest.approx(-5.0)
     scores = fit.scores.copy()
     middle = int(np.flatnonzero((fit.cells == 0).all(axis=1))[0])
     scores[middle] = [*np.roll(scores[middle][:-1], 1).tolist(), -30.0]
     spoiled = replace(fit, scores=scores)
-    assert log_likelihood(encoding, spoiled, place, PLACES) == pytest.approx(-5.0 - PLACES.cap)
-    best = find_hypotheses(encoding, (spoiled,), PLACES)[0]
+    assert log_likelihood(encoding, spoiled, place) == pytest.approx(-5.0 - PLACES.cap)
+    best = find_hypotheses(encoding, (spoiled,))[0]
     assert (best.row, best.column, best.face) == (place.row, place.column, place.face)
 
 
@@ -279,10 +278,10 @@ def test_a_place_that_fits_nearly_as_well_is_found_wherever_it_is(reader, other)
     scores = fit.scores.copy()
     scores[rows, shown] = np.maximum(scores[rows, shown], -0.25)
     alike = replace(fit, scores=scores)
-    found = find_rivals(encoding, alike, place, 3, PLACES)
+    found = find_rivals(encoding, alike, place, 3)
     best = found[0]
     assert (best.row, best.column, best.face, best.fit) == (row, column, second.face, 3)
-    assert best.score == pytest.approx(log_likelihood(encoding, alike, second, PLACES))
+    assert best.score == pytest.approx(log_likelihood(encoding, alike, second))
     assert all((p.row, p.column) != (place.row, place.column) for p in found)
 
 
@@ -311,27 +310,28 @@ def touches_at_the_rim(url, reader):
     """Clean touches ever nearer to an edge and a corner: recognition and what was judged."""
     for x, y in [(6.0, 30.0), (3.0, 30.0), (0.5, 30.0), (6.0, 6.0), (3.0, 5.0), (2.0, 1.0)]:
         forces = felt(url, "Cube", "F1", Touch(x, y, 0.5, 80.0))
-        yield read_touch(reader, signal_of(forces, newtons=True))
+        reading = read_touch(reader, signal_of(forces, newtons=True))
+        yield reading.answer, reading.best
 
 
 def test_few_symbols_answer_only_if_they_can_name_a_place(coarse_url):
     reader = Reader(open_lab(coarse_url), SensorType())
-    limits, arrays = reader.settings.belief, reader.lab.arrays
+    arrays = reader.lab.arrays
     seen = []
     for found, best in touches_at_the_rim(coarse_url, reader):
         cells, at = best.evidence.inliers, (best.embossed, best.fit, best.hypothesis)
         seen.append((bool(found), cells))
         if found and cells < MANY_INLIERS:
-            assert expected_matches(arrays, *at, reader.settings, borders=False) <= limits.named
+            assert expected_matches(arrays, *at, borders=False) <= NAMED
     assert any(told and cells < MANY_INLIERS for told, cells in seen)
     assert not all(told for told, _ in seen)
 
 
 def test_a_cell_that_says_hardly_anything_does_not_speak_for_a_place(url, reader):
     forces = felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0))
-    _, read = read_touch(reader, signal_of(forces, newtons=True))
+    read = read_touch(reader, signal_of(forces, newtons=True)).best
     encoding, fit, place = read.embossed, read.fit, read.hypothesis
-    told = weigh_cells(encoding, fit, place, DEFAULTS.belief).agree
+    told = weigh_cells(encoding, fit, place).agree
     held = labels_at(encoding, place, fit.cells)
     assert told.sum() >= MANY_INLIERS
     assert (held[told] < encoding.array.order).all()
@@ -340,16 +340,16 @@ def test_a_cell_that_says_hardly_anything_does_not_speak_for_a_place(url, reader
     scores[mute] = [0.0, -0.2, -0.2, -0.7, -0.5]  # looked at, and nearly as likely anything
     scores[torn] = -9.0
     scores[torn, [held[torn], (held[torn] + 1) % encoding.array.order]] = 0.0, -0.1
-    again = weigh_cells(encoding, replace(fit, scores=scores), place, DEFAULTS.belief)
+    again = weigh_cells(encoding, replace(fit, scores=scores), place)
     assert again.seen[mute]
     assert np.flatnonzero(told ^ again.agree).tolist() == [mute]
     scores[torn, (held[torn] + 1) % encoding.array.order] = 0.1
-    again = weigh_cells(encoding, replace(fit, scores=scores), place, DEFAULTS.belief)
+    again = weigh_cells(encoding, replace(fit, scores=scores), place)
     assert np.flatnonzero(told ^ again.agree).tolist() == sorted([mute, torn])
 
 
 def test_few_symbols_must_leave_other_places_far_behind(url, reader):
-    strict = replace(reader, settings=replace(DEFAULTS, belief=ReaderOptions(margin_by_few=1e6)))
+    strict = replace(reader, options=ReaderOptions(margin_by_few=1e6))
     for found, best in touches_at_the_rim(url, strict):
         assert not found or best.evidence.inliers >= MANY_INLIERS
         assert found or found.reason in (AMBIGUOUS, NOT_ENCODED, TOO_FEW)
