@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
-import typer
-
 from encoded_objects.base import console, output
+from encoded_objects.base.errors import UsageError
+from encoded_objects.base.options import Argument, Option, command
 
 if TYPE_CHECKING:
     from decoder.decoded import Candidate, Decoded
@@ -44,54 +44,57 @@ def run(arguments: list[str]) -> int:
     return console.run(NAME, lambda _: app, arguments)
 
 
-@app.command(help=HELP, epilog=EPILOG)
+@command(app, help=HELP, epilog=EPILOG)
 def decode(
-    rows: Annotated[list[str], typer.Argument(metavar="ROWS", help="The window.",
-                                              show_default=False)],
+    rows: Annotated[list[str], Argument("The window.", "ROWS")],
     profile: Annotated[
-        str, typer.Option(help="thesis, one-touch, product, large, fine; one-touch by default.",
-                          show_default=False)] = "",
+        str, Option("thesis, one-touch, product, large, fine; one-touch by default.")
+    ] = "",
     array: Annotated[
-        str, typer.Option("--array", metavar="JSON", show_default=False,
-                          help="An array's definition, as JSON or as a file, in place of a "
-                               "profile.")] = "",
+        str,
+        Option("An array's definition, as JSON or as a file, in place of a profile.", "JSON"),
+    ] = "",
     database: Annotated[
-        str, typer.Option(metavar="URL", show_default=False,
-                          help="A lab's database: its array, the registered cells as prior, and "
-                               "the object and face of the answer.")] = "",
+        str,
+        Option("A lab's database: its array, the registered cells as prior, and the object and "
+               "face of the answer.", "URL"),
+    ] = "",
     lab_key: Annotated[
-        str, typer.Option(metavar="KEY", show_default=False,
-                          help="Whose array of the profile; without it the published one, or the "
-                               "database's own.")] = "",
+        str,
+        Option("Whose array of the profile; without it the published one, or the database's own.",
+               "KEY"),
+    ] = "",
     method: Annotated[
-        str, typer.Option(help="table, serial, milestones, logarithm, likelihood.")] = "logarithm",
-    error: Annotated[
-        float, typer.Option(help="likelihood: how often a symbol is wrong.")] = 0.05,
+        str, Option("table, serial, milestones, logarithm, likelihood.")
+    ] = "logarithm",
+    error: Annotated[float, Option("likelihood: how often a symbol is wrong.")] = 0.05,
     doubt: Annotated[
-        float, typer.Option(help="likelihood: largest probability of a wrong answer.")] = 5e-4,
+        float, Option("likelihood: largest probability of a wrong answer.")
+    ] = 5e-4,
     blank: Annotated[
-        float, typer.Option(help="likelihood: probability that there is no code.")] = 0.01,
+        float, Option("likelihood: probability that there is no code.")
+    ] = 0.01,
     rotations: Annotated[
-        str, typer.Option(metavar="LIST", help="likelihood: quarter turns that may bring the "
-                                               "window upright, with commas between.")] = "0",
-    top: Annotated[int, typer.Option(min=0, help="List the K best candidates.")] = 0,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="PNG", show_default=False,
-                                  help="Draw the window on the array.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+        str,
+        Option("likelihood: quarter turns that may bring the window upright, with commas between.",
+               "LIST"),
+    ] = "0",
+    top: Annotated[int, Option("List the K best candidates.", least=0)] = 0,
+    plot: Annotated[Path | None, Option("Draw the window on the array.", "PNG")] = None,
+    as_json: Annotated[bool, Option("One JSON object on stdout.", names=("--json",))] = False,
 ) -> int:  # fmt: skip
     """Decode one window; `HELP` is what people see."""
     from decoder.any_method import METHODS, decode_on
     from decoder.window import parse_window
 
     if method not in METHODS:
-        raise typer.BadParameter(f"unknown method '{method}'; choose one of {', '.join(METHODS)}")
+        raise UsageError(f"unknown method '{method}'; choose one of {', '.join(METHODS)}")
     held: Registered | None = None
     if database:
         from decoder.registered import read_registered
 
         if array:
-            raise typer.BadParameter("both --array and --database were given; give one of them")
+            raise UsageError("both --array and --database were given; give one of them")
         held = read_registered(database, profile, lab_key)
     chosen = held.array if held else _array(profile, array, lab_key)
     window = parse_window(" ".join(rows), chosen.order)
@@ -119,14 +122,14 @@ def _array(profile_name: str, definition: str, lab_key: str) -> FoldedArray | Pr
         return array_of_profile(profile_name, lab_key)
     if profile_name or lab_key:
         given = "--profile" if profile_name else "--lab-key"
-        raise typer.BadParameter(f"both {given} and --array were given; give one of them")
+        raise UsageError(f"both {given} and --array were given; give one of them")
     try:
         text = definition if definition.lstrip().startswith("{") else Path(definition).read_text()
         values = json.loads(text)
     except (OSError, ValueError) as problem:
-        raise typer.BadParameter(f"--array cannot be read: {problem}") from None
+        raise UsageError(f"--array cannot be read: {problem}") from None
     if not isinstance(values, dict):
-        raise typer.BadParameter('--array must be a JSON object, as {"family": "prba", ...}')
+        raise UsageError('--array must be a JSON object, as {"family": "prba", ...}')
     return array_from(values)
 
 
@@ -134,7 +137,7 @@ def _turns(text: str) -> list[int]:
     try:
         return [int(part) for part in text.split(",")]
     except ValueError:
-        raise typer.BadParameter(f"--rotations {text}: give quarter turns as 0,1,2,3") from None
+        raise UsageError(f"--rotations {text}: give quarter turns as 0,1,2,3") from None
 
 
 def _answer_values(

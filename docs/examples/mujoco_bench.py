@@ -28,18 +28,22 @@ from PIL import Image, ImageDraw
 from scipy.spatial.transform import Rotation
 
 from encoded_objects import Reader, Scan, encode, open_lab
-from probe.arm.carried import SensorPose
-from probe.arm.inverse import inverse
-from probe.arm.links import Arm
+from probe.arm import Arm, SensorPose, inverse
 from probe.errors import ContactError, PoseError
 from probe.scan.kinesthetic import JointErrors
 from probe.scan.places import touch_at
 from probe.simulate.scene import Scene
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.sensor import LevelSensor, sample_sensor
-from probe.wrist.distances import counts_of, distances_at
-from probe.wrist.geometry import Wrist, WristPose, gripper_to_plate, plate_to_sensor
-from probe.wrist.springs import stiffness
+from probe.wrist import (
+    Wrist,
+    WristPose,
+    counts_of,
+    distances_at,
+    gripper_to_plate,
+    plate_to_sensor,
+    stiffness,
+)
 from recognizer.touch.robot import carried_pose, object_pose
 from recognizer.validation.touch_plan import written_surface
 

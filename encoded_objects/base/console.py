@@ -99,6 +99,7 @@ def run(
 
     from encoded_objects.base import output
     from encoded_objects.base.errors import EncodedObjectsError, UsageError
+    from encoded_objects.base.options import read_plain
 
     usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
     as_json = "--json" in arguments
@@ -110,7 +111,7 @@ def run(
         if any(word in HELP_OPTIONS for word in asked):
             action = _show_help(app, name, asked)
         else:
-            action = app(asked, prog_name=name, standalone_mode=False)
+            action = read_plain(app, asked) or app(asked, prog_name=name, standalone_mode=False)
         code = action() if callable(action) else int(action or 0)
         return BAD_INPUT if unsaid else code
     except Exit as leaving:

@@ -15,10 +15,14 @@ which hold for Python callers of an `Options` class too. The function returns th
 from __future__ import annotations
 
 import inspect
+import os
+import re
+import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache, partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from encoded_objects.base.errors import UsageError
@@ -27,6 +31,10 @@ if TYPE_CHECKING:
     from typer import Typer
 
 Work = Callable[..., int]
+Declared = dict[str, tuple[Any, "Option", Any]]  #: parameter -> type, option, default
+
+_COMMANDS: dict[Typer, dict[str, tuple[Declared, Callable[..., Any]]]] = {}
+_NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)(e-?\d{1,2})?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,10 +172,99 @@ def command(
         read.__signature__ = inspect.Signature(signature)  # type: ignore[attr-defined]
         read.__annotations__ = {one.name: one.annotation for one in signature}
         read.__doc__, read.__name__ = work.__doc__, work.__name__
+        _COMMANDS.setdefault(app, {})[name or work.__name__.replace("_", "-")] = declared, read
         app.command(name, help=help, epilog=epilog)(read)
         return work
 
     return register
+
+
+def read_plain(app: Typer, arguments: Sequence[str]) -> Callable[[], int] | None:
+    """Return what a plain command line does; None: it is left to typer, with every error.
+
+    To read options typer imports pydantic, a quarter of the start of `recognize-object`. Plain is
+    a line of known options with sound values.
+    """
+    commands, words = _COMMANDS.get(app, {}), list(arguments)
+    if len(app.registered_commands) > 1 or app.registered_groups or app.registered_callback:
+        if not words or words[0] not in commands:
+            return None
+        declared, read = commands[words.pop(0)]
+    elif len(commands) == 1:
+        [(declared, read)] = commands.values()
+    else:
+        return None
+    values = _plain_values(declared, words)
+    if values is None:
+        return None
+    action: Callable[[], int] = read(**values)
+    return action
+
+
+def _plain_values(declared: Declared, words: list[str]) -> dict[str, Any] | None:
+    """Return the values of a command line; None where it is not plain."""
+    values: dict[str, Any] = {name: default for name, (_, _, default) in declared.items()}
+    given: dict[str, list[str]] = {}
+    places = [name for name, (_, option, _) in declared.items() if isinstance(option, Argument)]
+    names = {
+        typed: name for name, (_, option, _) in declared.items()
+        if name not in places for typed in option.typed(name)
+    }  # fmt: skip
+    rest = []
+    while words:
+        word = words.pop(0)
+        typed, equals, text = word.partition("=") if word.startswith("--") else (word, "", "")
+        if not word.startswith("-"):
+            rest.append(word)
+        elif typed not in names or (bool(equals) and declared[names[typed]][0] is bool):
+            return None
+        elif declared[names[typed]][0] is bool:
+            values[names[typed]] = True
+        else:
+            if not equals and (not words or words[0].startswith("-")):
+                return None
+            given.setdefault(names[typed], []).append(text if equals else words.pop(0))
+    for name in places:
+        many = _plain_type(declared[name][0])[1]
+        if rest:
+            given[name], rest = (rest, []) if many else (rest[:1], rest[1:])
+    if rest:
+        return None
+    for name, (kind, option, default) in declared.items():
+        if name in given:
+            single, many = _plain_type(kind)
+            found = [_plain_value(single, option, text) for text in given[name]]
+            if None in found:
+                return None
+            values[name] = found if many else found[-1]
+        elif default is inspect.Parameter.empty or os.environ.get(option.variable or " "):
+            return None
+    return values
+
+
+def _plain_type(kind: Any) -> tuple[Any, bool]:
+    """Return the type of one value, and whether there may be several."""
+    if isinstance(kind, types.UnionType):
+        kind = next(one for one in typing.get_args(kind) if one is not type(None))
+    many = typing.get_origin(kind) is list
+    return (typing.get_args(kind)[0] if many else kind), many
+
+
+def _plain_value(kind: Any, option: Option, text: str) -> Any:
+    """Return a value of a type; None where typer has to say what is wrong with it."""
+    if kind is str:
+        return text
+    if kind is Path:
+        return Path(text) if text else None
+    if kind not in (int, float) or len(text) > 20 or not _NUMBER.fullmatch(text):
+        return None
+    if kind is int and not text.removeprefix("-").isdecimal():
+        return None
+    value = kind(text)
+    low, high = option.least, option.most
+    return (
+        None if (low is not None and value < low) or (high is not None and value > high) else value
+    )
 
 
 def _report_version(name: str, parts: Callable[[], Mapping[str, str]], as_json: bool) -> int:
@@ -187,10 +284,10 @@ def _option_classes(work: Work) -> dict[str, type[Any]]:
 
 
 @cache
-def _declared(source: Any) -> dict[str, tuple[Any, Option, Any]]:
+def _declared(source: Any) -> Declared:
     """Return type, option and default of each option of a function or a class, in their order."""
     hints = typing.get_type_hints(source, include_extras=True)
-    found: dict[str, tuple[Any, Option, Any]] = {}
+    found: Declared = {}
     for name, parameter in inspect.signature(source).parameters.items():
         kind = hints[name]
         if isinstance(kind, type) and is_dataclass(kind):

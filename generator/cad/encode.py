@@ -33,7 +33,7 @@ from generator.spec.problem import SPEC
 from generator.spec.read import SOURCE, spec_of, tree_from
 from generator.spec.resolved import ShapeSpec
 
-DIGITS = 6  #: of a coordinate (mm) by which two solids are told apart
+DIGITS = 6  #: of a coordinate (mm) at which two solids differ
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +206,7 @@ def encode(
 
 
 def _spec_source(given: str | Path | Mapping[str, Any], named: Mapping[str, Any]) -> Path | Tree:
-    """Return where the spec is read from; settings beside a YAML file are refused."""
+    """Return where the spec is read from; settings given with a YAML file are refused."""
     if isinstance(given, Mapping):
         return tree_from({**given, **{key: one for key, one in named.items() if one is not None}})
     if Path(given).suffix.lower() in (*MESHES, *STEP):
@@ -220,7 +220,7 @@ def _spec_source(given: str | Path | Mapping[str, Any], named: Mapping[str, Any]
 
 
 def _digest(polyhedron: Polyhedron) -> str:
-    """Return what tells two solids apart: their vertices, rounded, and their faces."""
+    """Return a digest of a solid: its vertices, rounded, and its faces."""
     vertices = (polyhedron.vertices.round(DIGITS) + 0.0).tolist()
     content = json.dumps([vertices, [face.loops for face in polyhedron.faces]])
     return hashlib.sha256(content.encode()).hexdigest()

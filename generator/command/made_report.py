@@ -46,7 +46,7 @@ def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
 
 
 def _alike(objects: Sequence[MadeObject], dry_run: bool) -> list[list[MadeObject]]:
-    """Return runs of objects of which the same is to be said but for their name: copies."""
+    """Return runs of objects whose text differs in their name alone: copies."""
     runs: list[list[MadeObject]] = []
     said = ""
     for made in objects:
@@ -60,7 +60,7 @@ def _alike(objects: Sequence[MadeObject], dry_run: bool) -> list[list[MadeObject
 
 
 def _group_text(alike: Sequence[MadeObject], dry_run: bool) -> str:
-    """Return a few lines on objects of which the same is to be said."""
+    """Return a few lines on objects whose text is equal but for their name."""
     first, last = alike[0].name, alike[-1].name
     text = _object_text(alike[0], dry_run)
     if len(alike) == 1:
@@ -96,7 +96,7 @@ def _object_text(made: MadeObject, dry_run: bool) -> str:
 
 
 def _face_lines(reports: Sequence[FaceReport]) -> list[str]:
-    """Return a line on each face, or one on all of which the same is to be said."""
+    """Return a line on each face; faces with equal text share one."""
     named: dict[str, list[str]] = {}
     for face in reports:
         if face.smallest_mm is None:
@@ -173,17 +173,17 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
 
 def rate_lines(faces: Sequence[FaceReport]) -> list[str]:
     """Return a line on an object, and one on each kind of face that answers too little."""
-    promised = [(face, face.promise) for face in faces if face.promise is not None]
-    if not promised:
+    rated = [(face, face.promise) for face in faces if face.promise is not None]
+    if not rated:
         return []
-    area = sum(face.area_mm2 for face, _ in promised)
-    share = sum(face.area_mm2 * promise.at_once for face, promise in promised) / area
-    later = [face.area_mm2 * promise.within_three for face, promise in promised
+    area = sum(face.area_mm2 for face, _ in rated)
+    share = sum(face.area_mm2 * promise.at_once for face, promise in rated) / area
+    later = [face.area_mm2 * promise.within_three for face, promise in rated
              if promise.within_three is not None]  # fmt: skip
     within = f", {_percent(sum(later) / area)} within three" if later else ""
     lines = [f"  {_percent(share)} of touches are answered at once{within}"]
     alike: dict[tuple[str, ...], list[FaceReport]] = {}
-    for face, promise in sorted(promised, key=lambda one: one[1].at_once):
+    for face, promise in sorted(rated, key=lambda one: one[1].at_once):
         if promise.at_once < LOW:
             key = f"{min(face.size_mm):.3g}", _why(face, promise), promise.remedy
             alike.setdefault(key, []).append(face)
@@ -203,7 +203,7 @@ def _why(face: FaceReport, promise: RecognitionRate) -> str:
 
 
 def _low_text(why: str, remedy: str, faces: Sequence[FaceReport]) -> str:
-    """Return what is said of faces as narrow as the first of them."""
+    """Return a line on faces as narrow as the first of them."""
     promises = [face.promise for face in faces if face.promise is not None]
     shares = [promise.at_once for promise in promises]
     share = f"{_range(shares)} of touches are answered at once"
@@ -216,7 +216,7 @@ def _low_text(why: str, remedy: str, faces: Sequence[FaceReport]) -> str:
 
 
 def face_values(face: FaceReport) -> dict[str, Any]:
-    """Return what is known of a face as plain values."""
+    """Return a face as plain values."""
     values = asdict(face)
     if face.promise is not None:
         values["promise"] = {

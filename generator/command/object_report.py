@@ -1,4 +1,4 @@
-"""What is said about registered objects and their lab: text for people, plain values for JSON."""
+"""Registered objects and their lab: as text for people, as plain values for JSON."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def print_object(
     *,
     as_json: bool,
 ) -> None:
-    """Say all about one object, and what its faces promise to a sensor."""
+    """Say all about one object, and the recognition rate of its faces for a sensor."""
     faces = _faces(held, sensor)
     if as_json:
         output.write_json(_object_values(held, faces, files) | {"database": without_password(url)})
@@ -114,7 +114,7 @@ def print_retired(entries: Sequence[ObjectEntry], done: str, url: str, *, as_jso
 
 
 def warning_before(entries: Sequence[ObjectEntry]) -> str:
-    """Return what is to be known before objects are removed."""
+    """Return the warning before objects are removed."""
     lines = [
         f"{e.name}: {e.faces} faces, {e.symbols} cells, registered {_minute(e.utc)} UTC"
         for e in entries

@@ -13,7 +13,7 @@ from encoded_objects.base import output
 from generator.pipeline.printed_check import PrintedObject
 from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, SymbolCheck
 
-_OFF = 0.1  # of the height, at which a person is told
+_OFF = 0.1  # share of the height from which a wrong height is reported
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,17 +6,19 @@ import hashlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import URL
 
-from generator.database.open import part_path
-from generator.database.registered import RegisteredPart
 from generator.errors import ShapeError
 from generator.polyhedron.read import file_content
-from generator.polyhedron.read.settings import MODEL
-from generator.polyhedron.read.stl import stl_triangles
+from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
+
+if TYPE_CHECKING:
+    from sqlalchemy import URL
+
+    from generator.database.registered import RegisteredPart
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,8 @@ class PartState:
 
 def part_state(url: URL, part: RegisteredPart) -> PartState:
     """Compare a part's file with the SHA-256 under which it is registered."""
+    from generator.database.open import part_path  # a part alone needs no database library
+
     path = part_path(url, part.file)
     try:
         with open(path, "rb") as file:
@@ -42,7 +46,7 @@ def part_state(url: URL, part: RegisteredPart) -> PartState:
     return PartState(part, path, state)
 
 
-LARGEST_BYTES = 84 + 50 * MODEL.most_part_triangles
+LARGEST_BYTES = 84 + 50 * MOST_PART_TRIANGLES
 
 
 def part_triangles(file: str | os.PathLike[str]) -> NDArray[np.float64]:
@@ -65,7 +69,7 @@ def part_triangles(file: str | os.PathLike[str]) -> NDArray[np.float64]:
     """
     place = str(file)
     content = file_content(Path(file), place, LARGEST_BYTES)
-    corners = stl_triangles(content, place, most=MODEL.most_part_triangles, padded=False)
+    corners = stl_triangles(content, place, most=MOST_PART_TRIANGLES, padded=False)
     if not len(corners):
         raise ShapeError("the file holds no triangle", fix="export the part again", place=place)
     return corners

@@ -30,9 +30,8 @@ from generator.database.round_face import round_face
 from generator.database.transaction import place_of
 from generator.errors import DatabaseError
 from generator.layout.placement import FaceLayout, Layout, Placement
-from generator.polyhedron.developable import Developable, developable_from
 from generator.polyhedron.frame import face_frame, face_polygon
-from generator.polyhedron.winged import Face, Polyhedron, WingedEdge
+from generator.polyhedron.winged import Developable, Face, Polyhedron, WingedEdge, developable_from
 
 
 def list_objects(connection: Connection) -> tuple[ObjectEntry, ...]:

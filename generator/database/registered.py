@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from generator.alphabet.outline import SymbolStyle
 from generator.database.round_face import Bend, RoundFace
 from generator.layout.placement import Layout, Placement
-from generator.polyhedron.developable import Developable
-from generator.polyhedron.winged import Polyhedron
+from generator.polyhedron.winged import Developable, Polyhedron
 
 
 def canonical(value: Any) -> str:

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.polyhedron.developable import Developable
 from generator.polyhedron.development import Development, development
-from generator.polyhedron.winged import Polyhedron
+from generator.polyhedron.winged import Developable, Polyhedron
 
 Array = NDArray[np.float64]
 

@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from encoded_objects.base.errors import require
 from generator.errors import GeneratorError, SolidError
 from generator.export.exact_crossing import cut_triangles, perhaps_folded
-from generator.polyhedron.read.settings import MODEL
-from generator.polyhedron.read.stl import stl_triangles
+from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
 from generator.solid import Part, round_volume, volume
 
 Floats = NDArray[np.float64]
@@ -182,7 +181,7 @@ def verify_fit(panels: Sequence[PanelFile], gap_mm: float) -> FitReport:
 def _solid(panel: PanelFile) -> Manifold:
     """Return a written panel as it stands in the object."""
     corners = stl_triangles(
-        panel.path.read_bytes(), str(panel.path), most=MODEL.most_part_triangles, padded=False
+        panel.path.read_bytes(), str(panel.path), most=MOST_PART_TRIANGLES, padded=False
     )
     points, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     T = panel.T_object_part

@@ -31,7 +31,7 @@ class Region:
 
     @property
     def tolerance(self) -> float:
-        """Length (mm) below which two places are the same."""
+        """Length (mm) below which two places are one."""
         return ROUNDING * float(np.abs(self.start).max())
 
 

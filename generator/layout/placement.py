@@ -58,7 +58,7 @@ class Layout:
 
 
 def object_code(layout: Layout, rows: int, columns: int) -> str:
-    """Return a short code that tells an object from all others on its array.
+    """Return a short code that no other object on the array has.
 
     It is the first cell that the object uses, counted row by row, in letters and digits that are
     not mistaken for each other. No cell is used twice, so no code is; for backs of small panels.

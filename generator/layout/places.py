@@ -72,7 +72,7 @@ def windows_in(free: NDArray[np.bool_], rows: int, columns: int) -> NDArray[np.b
     Parameters
     ----------
     free
-        Four axes, of which 0 and 2 are lattice rows and columns; 1 and 3 tell masks apart.
+        Four axes, of which 0 and 2 are lattice rows and columns; 1 and 3 number the masks.
     rows, columns
         Size of the window.
     """

@@ -117,7 +117,7 @@ class AnswerTable:
 
 @dataclass(frozen=True, slots=True)
 class AnsweredShare:
-    """How much a sensor type answers of what the usual one would of the same symbols, measured.
+    """Share that a sensor type answers of the touches that the usual sensor answers, measured.
 
     Logistic in the loaded share: larger sensors hang over borders, and membranes of gels bridge
     them.
@@ -394,7 +394,7 @@ def _area_within(
     """Return the area (P,) of polygons inside a rectangle about the origin.
 
     Minus the sum over edges a b of the integral of clamp(y) dx, x clamped too (Green's theorem):
-    what an edge does beside the rectangle adds up to nothing around a loop.
+    contributions of edges outside the rectangle cancel around a loop.
     """
     run = np.where(ax == bx, 1.0, bx - ax)
     ends = []

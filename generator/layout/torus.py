@@ -1,4 +1,4 @@
-"""Place pieces on the torus of the array, beside what is taken, without using a cell twice.
+"""Place pieces on the torus of the array, next to taken cells, without using a cell twice.
 
 Occupancy + masks (each with its allowed quarter turns) -> corner of each piece. Greedy, big
 pieces first: of all free positions the one with the most contact (taken cells next to the
@@ -173,7 +173,7 @@ class Board:
         return self._origins & ~(self._taken(form) >> self._stride + 1)
 
     def _most(self, form: Mask, free: int) -> tuple[int, int]:
-        """Return the first of the free origins with the most taken cells beside, and how many."""
+        """Return the first of the free origins with the most taken neighbours, and how many."""
         around = np.pad(form, 1)
         ring = around.copy()
         ring[1:] |= around[:-1]
@@ -183,12 +183,12 @@ class Board:
         touching = free & self._taken(ring)
         if touching == 0:
             return (free & -free).bit_length() - 1, 0
-        beside = np.argwhere(ring & ~around) @ (self._stride, 1)
-        beside = beside[:: -(-len(beside) // NEIGHBOURS)]
+        neighbours = np.argwhere(ring & ~around) @ (self._stride, 1)
+        neighbours = neighbours[:: -(-len(neighbours) // NEIGHBOURS)]
         origins = _positions(touching)
         contact = np.zeros(len(origins), np.int64)
         sheet = self._sheet.ravel()
-        for cell in beside.tolist():
+        for cell in neighbours.tolist():
             contact += sheet[origins + cell]
         k = int(contact.argmax())
         return int(origins[k]), int(contact[k])
@@ -239,7 +239,7 @@ def board_size(occupancy: Occupancy) -> tuple[int, int]:
 
 
 def _next_extent(extent: tuple[int, int], size: tuple[int, int]) -> tuple[int, int]:
-    """Return the next extent of the corner of an array, the same where it is the whole."""
+    """Return the next extent of the corner of an array, or the whole array."""
     rows, columns = extent
     if columns == size[1] or (rows <= columns and rows < size[0]):
         return min(_step(rows), size[0]), columns

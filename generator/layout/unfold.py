@@ -123,7 +123,7 @@ def _surface(polyhedron: Polyhedron) -> _Surface:
 
 
 def _trees(polyhedron: Polyhedron, surface: _Surface, seed: int) -> Iterator[tuple[int, Priority]]:
-    """Yield the face to begin with and the order of folds, promising ones first."""
+    """Yield the face to begin with and the order of folds, likely ones first."""
     areas = [float(np.sum(triangle_areas(triangles))) for triangles in surface.triangles]
     roots = sorted(range(len(areas)), key=lambda face: (-round(areas[face], 6), face))
     for root in roots[:BREADTH_ROOTS]:

@@ -36,7 +36,7 @@ from generator.spec.resolved import AUTO, SMALLEST
 
 LARGER = 4  # sizes tried beyond `large`
 FINER_SHARES = (0.9, 0.8)
-"""Pitches tried where faces stay blank, over that which the sensor proposes: 4.5 and 4 mm."""
+"""Pitches tried where faces stay blank, over the one the sensor proposes: 4.5 and 4 mm."""
 FIRST = 0.5  # of an array's room that its first objects may fill
 
 

@@ -26,8 +26,7 @@ from generator.layout.layout import Clearances, Outlines
 from generator.polyhedron import Polyhedron, dihedral, face_polygon
 from generator.polyhedron.development import Development, development
 from generator.polyhedron.front import Loop, covered_parts
-from generator.polyhedron.round import ROUND_SHAPES
-from generator.polyhedron.shapes import SHAPES
+from generator.polyhedron.shapes import ROUND_SHAPES, SHAPES
 from generator.printers import Printer
 from generator.solid.mitre import symbol_clearance_mm
 from generator.solid.part import edge_numbers

@@ -14,13 +14,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 from generator.export.atomic import Staging
 from generator.export.bed import Plate, arrange_plates
+from generator.export.drawing import draw_boxes
 from generator.export.set_files import PackedPart, can_draw, overview_pdf, packing_csv
-from generator.export.sheet.drawing import draw_boxes
-from generator.export.sheet.page import sheet_html
-from generator.export.sheet.values import BuildSheet, Rows
+from generator.export.sheet import Figure, Mark, Section, sheet_html
 from generator.export.threemf import PrintFile, SlicerSettings, print_file
 from generator.layout.placement import Layout, object_code
 from generator.pipeline.files import parts_of, settings_of
@@ -28,7 +28,7 @@ from generator.pipeline.make import MakeJob
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, part_of_progress
-from generator.pipeline.sheet import layers_text, lies_text, material_text
+from generator.pipeline.sheet import Rows, layers_text, lies_text, material_text
 from generator.printers import Printer
 from generator.solid import Part, box, volume
 
@@ -231,26 +231,15 @@ def _set_sheet(
         what = ", ".join(objects[one][0].plan.spec.name for one in held)
         if len(printers) > 1:
             what = f"{plate.printer.name}: {what}"
-        drawings.append(
-            (
-                f"{name}-plate-{number}.3mf",
-                what + (f"; {cost}" if cost else ""),
-                draw_boxes(
-                    [(p.name, p.size_mm[:2]) for p in plate.parts],
-                    plate.plate,
-                    plate.printer.bed_mm,
-                ),
-            )
-        )
-    listed = tuple(
-        (
-            job.plan.spec.name,
-            object_code(layout, job.plan.array.rows, job.plan.array.columns),
-            ", ".join(on),
-            Path(os.path.relpath(build_sheet_path(job), folder)).as_posix(),
-        )
-        for (job, layout), on in zip(objects, lying, strict=True)
-    )
+        boxes = [(p.name, p.size_mm[:2]) for p in plate.parts]
+        drawing = draw_boxes(boxes, plate.plate, plate.printer.bed_mm)
+        text = what + (f"; {cost}" if cost else "")
+        drawings.append(Figure(drawing, text, f"{name}-plate-{number}.3mf"))
+    listed = []
+    for (job, layout), on in zip(objects, lying, strict=True):
+        link = Path(os.path.relpath(build_sheet_path(job), folder)).as_posix()
+        code = object_code(layout, job.plan.array.rows, job.plan.array.columns)
+        listed.append((job.plan.spec.name, Mark(code), ", ".join(on), Mark(link, quote(link))))
     facts = _facts(objects, plates, costs, printers)
     sort = (
         "Every back names its object, or bears the object's short code: sort the parts by object "
@@ -260,7 +249,15 @@ def _set_sheet(
         "The plates above hold everything. Each folder has plates of its object alone, too: for "
         "one that is printed again."
     )
-    return sheet_html(BuildSheet(name, facts, tuple(drawings), notes=(sort, again), objects=listed))
+    head = ("object", "short code", "plates", "sheet")
+    return sheet_html(
+        f"{name}: build sheet",
+        [
+            Section(rows=facts),
+            Section("Objects and their codes", head=head, rows=listed),
+            Section("Print", figures=drawings, wide=True, notes=(sort, again)),
+        ],
+    )
 
 
 def _facts(

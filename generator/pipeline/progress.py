@@ -1,4 +1,4 @@
-"""How long work tells how far it is."""
+"""Progress callbacks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ Progress = Callable[[str, float], None]  #: what is being done, and the share of
 
 
 def no_progress(_what: str, _share: float) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 def part_of_progress(progress: Progress, start: float, end: float) -> Progress:

@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.export.bed import Plate
-from generator.export.sheet.drawing import draw_back, draw_front, draw_plate, draw_step, is_panel
-from generator.export.sheet.page import sheet_html
-from generator.export.sheet.values import BuildSheet, Check, GlueStep, PartCard, Rows
+from generator.export.drawing import draw_back, draw_front, draw_plate, draw_step, is_panel
+from generator.export.sheet import Figure, Section, sheet_html
 from generator.layout.placement import FaceLayout, Layout, object_code
 from generator.pipeline.made import overhang_of
 from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon
-from generator.polyhedron.assembly import AssemblyStep, assembly_order, telling_faces
+from generator.polyhedron.assembly import AssemblyStep, assembly_order, distinct_faces
 from generator.polyhedron.frame import face_frame
 from generator.printers import Printer
 from generator.solid import Part, box, volume
@@ -32,6 +31,19 @@ Floats = NDArray[np.float64]
 
 PLA_G_CM3 = 1.24
 PICTURES_MAX = 60  # steps of gluing that are drawn
+_PARTS = (
+    "Left: from the front, edges with their numbers. Right: the back, as engraved. A panel lies "
+    "on its back, symbols up."
+)
+_GLUE = (
+    "Edges with the same number meet. Put the panels together dry first: all marks must name the "
+    "same object."
+)
+_MIXED = (
+    " Another object: a panel of another copy is glued in. Another face: panels are exchanged. "
+    "A turn of a quarter or more: the panel sits turned."
+)
+Rows = Sequence[tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,23 +61,29 @@ def build_sheet(
     """Return the page of one object."""
     panelled = is_panel(parts[0])
     code = object_code(layout, plan.array.rows, plan.array.columns)
-    sheet = BuildSheet(
-        title=plan.spec.name,
-        facts=_facts(plan, layout, code, parts, plates),
-        files=tuple(
-            (
-                plate.file,
+    sections = [Section(rows=_facts(plan, layout, code, parts, plates))]
+    if plates:
+        figures = [
+            Figure(
+                draw_plate(parts, plate.plate, plan.printer.bed_mm),
                 f"{len(plate.plate.places)} part{'s' * (len(plate.plate.places) != 1)}"
                 + (f"; {plate.cost}" if plate.cost else ""),
-                draw_plate(parts, plate.plate, plan.printer.bed_mm),
+                plate.file,
             )
             for plate in plates
-        ),
-        cards=tuple(_card(plan, part, face) for face, part in enumerate(parts)) if panelled else (),
-        steps=_steps(plan) if panelled else (),
-        checks=_checks(plan, layout),
-    )
-    return sheet_html(sheet)
+        ]
+        sections.append(Section("Print", figures=figures, wide=True))
+    if panelled:
+        cards = [_card(plan, part, face) for face, part in enumerate(parts)]
+        sections += [
+            Section("Parts", _PARTS, figures=cards),
+            Section("Glue", _GLUE, figures=_steps(plan)),
+        ]
+    if checks := _checks(plan, layout):
+        title = f"Check by {'three touches' if len(checks) == 3 else 'touch'}"
+        text = "recognize-object or open-bench, 20 N or more." + (_MIXED if panelled else "")
+        sections.append(Section(title, text, ("", "touch", "must answer"), checks))
+    return sheet_html(f"{plan.spec.name}: build sheet", sections)
 
 
 def layers_text(printer: Printer) -> str:
@@ -115,7 +133,7 @@ def _facts(
     return tuple(rows)
 
 
-def _card(plan: ObjectPlan, part: Part, face: int) -> PartCard:
+def _card(plan: ObjectPlan, part: Part, face: int) -> Figure:
     polyhedron = plan.polyhedron
     inverse = np.linalg.inv(part.T_object_part)
     edges = []
@@ -127,10 +145,11 @@ def _card(plan: ObjectPlan, part: Part, face: int) -> PartCard:
     mark = " / ".join(line for line in lines if not line.isdecimal())
     x, y, z = np.ptp(np.array(box(part)), axis=0).tolist()
     size = f"{x:.1f} x {y:.1f} x {z:.1f} mm, {part.symbols} symbols"
-    return PartCard(part.name, mark or "no mark", size, draw_front(part, edges), draw_back(part))
+    drawings = draw_front(part, edges) + draw_back(part)
+    return Figure(drawings, size, part.name, mark or "no mark", small=True)
 
 
-def _steps(plan: ObjectPlan) -> tuple[GlueStep, ...]:
+def _steps(plan: ObjectPlan) -> list[Figure]:
     polyhedron = plan.polyhedron
     order = assembly_order(polyhedron)
     names = [face.name for face in polyhedron.faces]
@@ -140,15 +159,15 @@ def _steps(plan: ObjectPlan) -> tuple[GlueStep, ...]:
     kinds = [0] * len(names)
     down = face_frame(polyhedron, order[0].face)[:3, 2]
     found = []
-    for step in order:
+    for number, step in enumerate(order, 1):
         kinds[step.face] = 2
         normal = face_frame(polyhedron, step.face)[:3, 2]
         drawing = ""
         if len(order) <= PICTURES_MAX:
             drawing = draw_step(polygons, kinds, names, _eye(down, normal))
-        found.append(GlueStep(_step_text(plan, step, names), drawing))
+        found.append(Figure(drawing, f"{number}. {_step_text(plan, step, names)}"))
         kinds[step.face] = 1
-    return tuple(found)
+    return found
 
 
 def _step_text(plan: ObjectPlan, step: AssemblyStep, names: Sequence[str]) -> str:
@@ -179,7 +198,7 @@ def _eye(down: Floats, normal: Floats) -> Floats:
     return np.stack([right, np.cross(eye, right), eye])
 
 
-def _checks(plan: ObjectPlan, layout: Layout) -> tuple[Check, ...]:
+def _checks(plan: ObjectPlan, layout: Layout) -> Rows:
     round_faces = {surface.carrier for surface in plan.polyhedron.surfaces}
     by_face = {
         face.face: face
@@ -189,8 +208,8 @@ def _checks(plan: ObjectPlan, layout: Layout) -> tuple[Check, ...]:
     numbers = {
         (edge.start, edge.end): number + 1 for number, edge in enumerate(plan.polyhedron.edges)
     }
-    found = []
-    for face in telling_faces(plan.polyhedron, sorted(by_face)):
+    found: list[tuple[str, ...]] = []
+    for face in distinct_faces(plan.polyhedron, sorted(by_face)):
         name = plan.polyhedron.faces[face].name
         loop = plan.polyhedron.faces[face].loops[0]
         first = numbers.get((loop[0], loop[1])) or numbers[loop[1], loop[0]]
@@ -199,8 +218,8 @@ def _checks(plan: ObjectPlan, layout: Layout) -> tuple[Check, ...]:
         if plan.spec.parts == "panels":
             where += f", the sensor's lower side along edge {first}"
             answer += ", turned by 0 degrees"
-        found.append(Check(where, answer))
-    return tuple(found)
+        found.append((f"{len(found) + 1}.", where, answer))
+    return found
 
 
 def _middle_cell(plan: ObjectPlan, face: FaceLayout) -> str:

@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from generator.polyhedron.frame import face_frame, face_polygon
+from generator.polyhedron.frame import face_area, face_normal
 from generator.polyhedron.winged import Polyhedron
 
 
@@ -27,7 +26,7 @@ def assembly_order(polyhedron: Polyhedron) -> tuple[AssemblyStep, ...]:
     """Return all faces in order; the first has no edges."""
     vertices = polyhedron.vertices
     lengths = [float(np.linalg.norm(vertices[e.end] - vertices[e.start])) for e in polyhedron.edges]
-    areas = [face_area_mm2(polyhedron, face) for face in range(len(polyhedron.faces))]
+    areas = [face_area(polyhedron, face) for face in range(len(polyhedron.faces))]
     first = max(range(len(areas)), key=lambda face: (round(areas[face], 6), -face))
     steps = [AssemblyStep(first, ())]
     there = {first}
@@ -49,26 +48,12 @@ def assembly_order(polyhedron: Polyhedron) -> tuple[AssemblyStep, ...]:
     return tuple(steps)
 
 
-def telling_faces(polyhedron: Polyhedron, faces: list[int]) -> tuple[int, ...]:
+def distinct_faces(polyhedron: Polyhedron, faces: list[int]) -> tuple[int, ...]:
     """Return up to three of `faces` that look in different directions, the largest first."""
-    normals = {face: _normal(polyhedron, face) for face in faces}
+    normals = {face: face_normal(polyhedron, face) for face in faces}
     chosen: list[int] = []
-    for face in sorted(faces, key=lambda f: (-round(face_area_mm2(polyhedron, f), 6), f)):
+    for face in sorted(faces, key=lambda f: (-round(face_area(polyhedron, f), 6), f)):
         if all(abs(float(normals[face] @ normals[other])) < 0.95 for other in chosen):
             chosen.append(face)
     rest = [face for face in faces if face not in chosen]
     return tuple((chosen + rest)[:3])
-
-
-def face_area_mm2(polyhedron: Polyhedron, face: int) -> float:
-    """Return the area of a face without its holes, mm2."""
-    total = 0.0
-    for loop in face_polygon(polyhedron, face):
-        x, y = loop.T
-        total += float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
-    return total
-
-
-def _normal(polyhedron: Polyhedron, face: int) -> NDArray[np.float64]:
-    normal: NDArray[np.float64] = face_frame(polyhedron, face)[:3, 2]
-    return normal

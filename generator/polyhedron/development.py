@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.polyhedron.developable import Developable
 from generator.polyhedron.frame import face_frame
-from generator.polyhedron.winged import Polyhedron
+from generator.polyhedron.winged import Developable, Polyhedron
 
 Points = NDArray[np.float64]
 

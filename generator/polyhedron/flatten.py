@@ -14,7 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.plane.polygon import area_vector, plane_axes
-from generator.polyhedron.settings import SOLID
+
+PLANAR_EXACTLY = 2e-15  #: share of the size: vertices this near to their planes stay as they are
+PLANAR_ENOUGH = 1e-10  #: the same where there are many equations: a tenth of what parts allow
+DENSE_EQUATIONS = 3000  #: more are solved as a sparse system
+MOST_EQUATIONS = 30000  #: beyond this the coordinates are left as given: bounds the time
+FLATTEN_STEPS = 6  #: at most
 
 Points = NDArray[np.float64]
 Entries = list[tuple[NDArray[np.intp], Points]]  # columns and values, one for each row
@@ -37,22 +42,22 @@ def flatten_faces(
     face_of, vertex_of = _incidences(faces)
     moved = vertices
     best = np.abs(_residual(vertices, faces, face_of, vertex_of)[0]).max()
-    large = len(face_of) > SOLID.dense_equations
-    if best <= (SOLID.planar_enough if large else SOLID.planar_exactly) * size:
+    large = len(face_of) > DENSE_EQUATIONS
+    if best <= (PLANAR_ENOUGH if large else PLANAR_EXACTLY) * size:
         return vertices.copy(), 0.0
-    if len(face_of) > SOLID.most_equations:
+    if len(face_of) > MOST_EQUATIONS:
         return vertices.copy(), 0.0
-    for _ in range(SOLID.flatten_steps):
+    for _ in range(FLATTEN_STEPS):
         trial = _step(moved, faces, face_of, vertex_of, size)
         with np.errstate(invalid="ignore"):  # a face that shrank to a point has no plane
             worst = np.abs(_residual(trial, faces, face_of, vertex_of)[0]).max()
         if not worst < 0.5 * best:
             break
         moved, best = trial, worst
-        if best <= SOLID.planar_exactly * size:
+        if best <= PLANAR_EXACTLY * size:
             break
     distance = float(np.linalg.norm(moved - vertices, axis=1).max())
-    if distance > 1e-3 * size or (large and best > SOLID.planar_enough * size):
+    if distance > 1e-3 * size or (large and best > PLANAR_ENOUGH * size):
         return vertices.copy(), 0.0
     return moved.copy(), distance
 
@@ -99,7 +104,7 @@ def _step(
         tilt = np.einsum("ij,ij->i", offset, axes[face_of, k])
         entries.append((3 * (count + face_of) + k, tilt / size))
     entries.append((3 * (count + face_of) + 2, np.full(len(row), -1.0)))
-    solve = _least if len(row) <= SOLID.dense_equations else _least_sparse
+    solve = _least if len(row) <= DENSE_EQUATIONS else _least_sparse
     change = solve(entries, (len(row), 3 * count + 3 * len(faces)), height)
     return vertices - change[: 3 * count].reshape(-1, 3)
 

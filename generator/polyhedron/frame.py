@@ -17,7 +17,7 @@ from generator.plane.polygon import (
     signed_area,
     signed_volume,
 )
-from generator.polyhedron.surface import face_axes
+from generator.polyhedron.check import face_axes
 from generator.polyhedron.winged import Polyhedron
 
 Matrix = NDArray[np.float64]

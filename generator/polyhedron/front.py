@@ -16,8 +16,11 @@ from manifold3d import CrossSection, FillRule, OpType
 from numpy.typing import NDArray
 
 from generator.polyhedron.frame import face_area, face_frame, face_normal, face_polygon, size
-from generator.polyhedron.settings import SOLID
 from generator.polyhedron.winged import Polyhedron
+
+TOUCHING = 1e-6  #: nearer than this share of the size, nothing is in front of a face
+FACING = -0.01  #: greatest cosine between faces that look at each other: not those at right angles
+NEGLIGIBLE = 1e-6  #: share of a face's area below which it is not covered
 
 Loop = NDArray[np.float64]  #: (k, 2) mm
 
@@ -49,7 +52,7 @@ def covered_parts(
     for edge in polyhedron.edges:
         beside[edge.left].add(edge.right)
         beside[edge.right].add(edge.left)
-    touching = SOLID.touching * size(polyhedron)
+    touching = TOUCHING * size(polyhedron)
     found = {}
     for face in faces:
         T_object_face = face_frame(polyhedron, face)
@@ -60,7 +63,7 @@ def covered_parts(
         high = np.maximum.reduceat(local[corner], start)
         outline = face_polygon(polyhedron, face)
         near = (high[:, 2] > touching) & (low[:, 2] < distance_mm)
-        near &= (normals @ T_object_face[:3, 2] < SOLID.facing) & (
+        near &= (normals @ T_object_face[:3, 2] < FACING) & (
             (low[:, :2] < outline[0].max(axis=0)) & (high[:, :2] > outline[0].min(axis=0))
         ).all(axis=1)
         near[[face, *beside[face]]] = False
@@ -71,7 +74,7 @@ def covered_parts(
         if over:
             parts = CrossSection.batch_boolean(over, OpType.Add)
             parts = parts ^ CrossSection(list(outline), FillRule.EvenOdd)
-            if parts.area() > SOLID.negligible * face_area(polyhedron, face):
+            if parts.area() > NEGLIGIBLE * face_area(polyhedron, face):
                 found[face] = tuple(np.asarray(loop)[::-1].copy() for loop in parts.to_polygons())
     return found
 

@@ -1,4 +1,4 @@
-"""The solids that a person can name: cube, box, prisms, pyramids, three regular solids.
+"""The solids that a person can name: cube, box, prisms, pyramids, regular solids, round ones.
 
 Lengths in mm. Prisms and pyramids stand on z = 0 with their axis on z; the base runs
 counter-clockwise seen from above, its first edge in front (y < 0) along +x. Octahedron
@@ -9,6 +9,13 @@ lie above them; F1 is the base, F2 to Fn+1 the sides in order (F2 in front), Fn+
 On a side the frame's origin is its lower left corner seen from outside, x level, y up.
 Pyramid: vertices 1 to n are the base, n + 1 the apex; F1 is the base, F2 to Fn+1 the sides.
 
+Cylinder and cone: F1 is the base, F2 the side (its facets go on as F2.2, F2.3, ...
+counter-clockwise seen from above, the first in front), F3 the top. The facets are not inscribed:
+their lines lie so far out that the unrolled side has the width 2 pi r of the round one (a cone:
+its angle 2 pi sin(half angle)). Lines then stand a little outside the round side and the middles
+of facets inside; the greatest distance of both is the chord error, pi^2 r / (3 N^2) to first
+order, which sets the number N of facets.
+
 Thesis 6.3, figures 6.14 to 6.19: C, B and D name the vertices of cube, parallelepiped and
 triangular prism. Its screens show the faces C2C3C6C7, B5B6B7B8 and D1D2D4D5, which are
 F3, F6 and F2 here; A for the tetrahedron is ours, the thesis shows none.
@@ -18,13 +25,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from generator.errors import ShapeError
-from generator.polyhedron.settings import SOLID
-from generator.polyhedron.winged import FaceLike, Polyhedron, polyhedron
+from generator.polyhedron.winged import Developable, Face, FaceLike, Polyhedron, polyhedron
+
+SHORTEST_MM, LONGEST_MM = 1.0, 5000.0  #: lengths of a named shape
+LENGTH_RATIO = 200.0  #: most a length may exceed another one of the same solid
+MOST_SIDES = 64  #: of a prism or pyramid
+#: Of a round face's facets: a tenth of a printed layer; also of round faces that are read.
+CHORD_ERROR_MM = 0.02
+FACETS = (24, 240)  #: fewest and most to a full circle; also of round faces that are read
 
 VERTEX_LETTERS = {"tetrahedron": "A", "box": "B", "cube": "C", "triangular_prism": "D"}
 
@@ -187,9 +201,9 @@ def _cap(points: NDArray[np.float64], normal: NDArray[np.float64]) -> tuple[int,
 
 def _side(shape: str, sides: int, side: float | None, radius: float | None) -> float:
     """Return the side of a regular polygon of which the side or the circumradius is given."""
-    if isinstance(sides, bool) or not isinstance(sides, int) or not 3 <= sides <= SOLID.most_sides:
+    if isinstance(sides, bool) or not isinstance(sides, int) or not 3 <= sides <= MOST_SIDES:
         fix = "give a whole number; a cylinder needs no more than 64 sides"
-        raise ShapeError(f"{shape} has 3 to {SOLID.most_sides} sides, not {sides!r}", fix=fix)
+        raise ShapeError(f"{shape} has 3 to {MOST_SIDES} sides, not {sides!r}", fix=fix)
     if side is not None and radius is None:
         return side
     if radius is not None and side is None:
@@ -204,16 +218,88 @@ def check_lengths(shape: str, **lengths: float) -> None:
     for name, length in lengths.items():
         if isinstance(length, bool) or not isinstance(length, int | float | np.floating):
             raise ShapeError(f"{shape}: {name} is {length!r}, not a length", fix="write 60 mm")
-        if not SOLID.shortest_mm <= length <= SOLID.longest_mm:
+        if not SHORTEST_MM <= length <= LONGEST_MM:
             raise ShapeError(
-                f"{shape}: {name} is {length:.6g} mm; allowed are {SOLID.shortest_mm:g} to "
-                f"{SOLID.longest_mm:g} mm",
+                f"{shape}: {name} is {length:.6g} mm; allowed are {SHORTEST_MM:g} to "
+                f"{LONGEST_MM:g} mm",
                 fix=f"give {name} in that range, with its unit",
             )
     short, long = min(lengths, key=lengths.__getitem__), max(lengths, key=lengths.__getitem__)
-    if lengths[long] > SOLID.length_ratio * lengths[short]:
+    if lengths[long] > LENGTH_RATIO * lengths[short]:
         raise ShapeError(
             f"{shape}: {long} of {lengths[long]:.6g} mm is more than "
-            f"{SOLID.length_ratio:g} times {short} of {lengths[short]:.6g} mm",
-            fix=f"set {short} to {lengths[long] / SOLID.length_ratio:.4g} mm or more",
+            f"{LENGTH_RATIO:g} times {short} of {lengths[short]:.6g} mm",
+            fix=f"set {short} to {lengths[long] / LENGTH_RATIO:.4g} mm or more",
         )
+
+
+def cylinder(diameter: float, height: float) -> Polyhedron:
+    """Return a cylinder: F1 base, F2 side, F3 top."""
+    check_lengths("cylinder", diameter=diameter, height=height)
+    radius = diameter / 2.0
+    count = _count(radius)
+    out = radius * (math.pi / count) / math.sin(math.pi / count)
+    error = max(out - radius, radius - out * math.cos(math.pi / count))
+    return _solid_of_rings("cylinder", count, (out, 0.0), (out, height), (radius, 0.0, error))
+
+
+def cone(diameter: float, height: float, top_diameter: float = 0.0) -> Polyhedron:
+    """Return a cone, or its lower part up to `top_diameter`: F1 base, F2 side, F3 top."""
+    lengths = {"diameter": diameter, "height": height}
+    check_lengths("cone", **lengths, **({"top_diameter": top_diameter} if top_diameter else {}))
+    if top_diameter >= diameter:
+        raise ShapeError(
+            f"cone: top_diameter of {top_diameter:g} mm is not less than diameter of "
+            f"{diameter:g} mm",
+            fix="turn the cone upside down, or write shape: {cylinder: ...}",
+        )
+    radius, top = diameter / 2.0, top_diameter / 2.0
+    count = _count(radius)
+    sine = (radius - top) / math.hypot(radius - top, height)
+    # Facets around the apex open by 2 pi sine / N each, so their lines lie at this angle.
+    leaning = math.asin(math.sin(math.pi * sine / count) / math.sin(math.pi / count))
+    apex = radius / math.tan(math.asin(sine))  # height of the tip
+    rings = [((apex - z) * math.tan(leaning), z) for z in (0.0, height)]
+    if top == 0.0:
+        rings[1] = (0.0, height)
+    middle = rings[0][0] * math.cos(math.pi / count)
+    error = max(rings[0][0] - radius, radius - middle)
+    return _solid_of_rings("cone", count, rings[0], rings[1], (radius, math.asin(sine), error))
+
+
+def _count(radius: float) -> int:
+    """Return the number of facets, a multiple of four."""
+    wanted = math.pi * math.sqrt(radius / (3.0 * CHORD_ERROR_MM))
+    return min(max(4 * math.ceil(wanted / 4.0), FACETS[0]), FACETS[1])
+
+
+def _solid_of_rings(
+    kind: str,
+    count: int,
+    low: tuple[float, float],
+    high: tuple[float, float],
+    surface: tuple[float, float, float],
+) -> Polyhedron:
+    """Return the solid between two rings (radius, z); a ring of radius 0 is one point."""
+    radius, half_angle, error = surface
+    angles = -math.pi / 2.0 - math.pi / count + 2.0 * math.pi / count * np.arange(count)
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    base = np.column_stack([low[0] * circle, np.full(count, low[1])])
+    ahead = [*range(1, count), 0]
+    if high[0] == 0.0:
+        top = np.array([[0.0, 0.0, high[1]]])
+        sides: list[tuple[int, ...]] = [(k, ahead[k], count) for k in range(count)]
+    else:
+        top = np.column_stack([high[0] * circle, np.full(count, high[1])])
+        sides = [(k, ahead[k], count + ahead[k], count + k) for k in range(count)]
+    faces = [Face("F1", (tuple(range(count))[::-1],))]
+    faces += [Face(f"F2.{k + 1}" if k else "F2", (loop,)) for k, loop in enumerate(sides)]
+    if high[0] > 0.0:
+        faces.append(Face("F3", (tuple(range(count, 2 * count)),)))
+    solid = polyhedron(kind, np.concatenate([base, top]), faces)
+    facets = tuple(range(1, count + 1))
+    side = Developable(kind, facets, radius, half_angle, True, False, error)
+    return replace(solid, surfaces=(side,))
+
+
+ROUND_SHAPES: dict[str, Callable[..., Polyhedron]] = {"cylinder": cylinder, "cone": cone}

@@ -16,18 +16,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from generator.errors import ShapeError
 from generator.plane.polygon import signed_volume
-from generator.polyhedron.check_edges import edge_problems, number_problems
-from generator.polyhedron.check_faces import crossing_problems, face_problems
-from generator.polyhedron.developable import Developable
-from generator.polyhedron.flatten import flatten_faces
-from generator.polyhedron.settings import SOLID
-from generator.polyhedron.surface import (
+from generator.polyhedron.check import (
     Loops,
     Surface,
+    crossing_problems,
     directed_edges,
+    edge_problems,
     euler_characteristic,
+    face_problems,
+    number_problems,
     raise_problems,
 )
+from generator.polyhedron.flatten import flatten_faces
+
+LEAST_VOLUME = 1e-7  #: least volume of a solid, as a share of the cube of its size
+NOTED_MOVE = 2e-7  #: vertices moved farther than this share of the size are reported
 
 Loop = tuple[int, ...]
 
@@ -59,6 +62,41 @@ class WingedEdge:
     right_next: int  #: edge after this one around the right face
 
 
+@dataclass(frozen=True, slots=True)
+class Developable:
+    """One round face of a polyhedron: a run of narrow planar facets, trapezoids or triangles.
+
+    Unrolled about the lines between them the facets fill one polygon of the plane, and unrolling
+    changes no length on any facet. The whole face has the name, the frame and the symbols of its
+    first facet: the plane of that one is where all unroll to. The others are F2.2, F2.3, ...
+    """
+
+    kind: str  #: cylinder, cone
+    facets: tuple[int, ...]  #: faces of the polyhedron; each lies to the right of the one before
+    radius_mm: float  #: of the round face; of a cone the largest
+    half_angle_rad: float  #: of a cone, between axis and side; 0 for a cylinder
+    closed: bool  #: whether the last facet meets the first
+    concave: bool  #: whether it is the wall of a hole
+    chord_error_mm: float  #: greatest distance of the facets from the round face
+
+    @property
+    def carrier(self) -> int:
+        """The facet under whose number the whole face is laid out and registered."""
+        return self.facets[0]
+
+    def definition(self) -> dict[str, Any]:
+        """Return the face as plain values, for the database."""
+        return {
+            "kind": self.kind,
+            "facets": list(self.facets),
+            "radius_mm": round(self.radius_mm, 9),
+            "half_angle_rad": round(self.half_angle_rad, 12),
+            "closed": self.closed,
+            "concave": self.concave,
+            "chord_error_mm": round(self.chord_error_mm, 9),
+        }
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Polyhedron:
     """A closed, oriented solid with planar faces."""
@@ -81,6 +119,11 @@ class Polyhedron:
     def genus(self) -> int:
         """Number of through holes: 0 for a cube, 1 for a frame."""
         return 1 - self.euler_characteristic // 2
+
+
+def developable_from(definition: dict[str, Any]) -> Developable:
+    """Return the face that `Developable.definition` describes."""
+    return Developable(**{**definition, "facets": tuple(definition["facets"])})
 
 
 FaceLike = Face | Sequence[int] | Sequence[Sequence[int]]
@@ -126,7 +169,7 @@ def polyhedron(kind: str, vertices: ArrayLike, faces: Sequence[FaceLike]) -> Pol
 
     notes = []
     volume = signed_volume(points, surface.faces)
-    if abs(volume) <= SOLID.least_volume * surface.size**3:
+    if abs(volume) <= LEAST_VOLUME * surface.size**3:
         raise ShapeError(
             f"the solid is flat: its volume is {abs(volume):.2g} mm^3",
             fix="give it a thickness",
@@ -138,7 +181,7 @@ def polyhedron(kind: str, vertices: ArrayLike, faces: Sequence[FaceLike]) -> Pol
         )
         notes.append("all faces pointed inward and were turned outward")
     points, moved = flatten_faces(points, loops_of)
-    if moved > SOLID.noted_move * surface.size:
+    if moved > NOTED_MOVE * surface.size:
         notes.append(f"vertices were moved by up to {moved:.2g} mm to make every face planar")
     raise_problems(crossing_problems(Surface(points, surface.names, loops_of)))
 

@@ -3,7 +3,7 @@
 Files -> `ObjectSpec` values. All problems of all files are reported at once.
 
 Settings from a Python script are written as YAML and read as a file is, so that a script and a
-file understand the same words and get the same messages; the place is `encode():line:column`.
+file take equal words and give equal messages; the place is `encode():line:column`.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def read_specs(
                     problems.append(_too_many(tree))
             except ValidationError as error:
                 problems += explain_errors(error, tree, ObjectSettings)
-                problems += _problems_beside(error, tree)
+                problems += _problems_of_read_blocks(error, tree)
             except SpecError as error:
                 problems += error.problems
     if not problems:
@@ -200,10 +200,10 @@ def _origin(path: Path | str | Tree, source: Tree) -> str:
     return "" if isinstance(path, Tree) else Path(path).stem
 
 
-def _problems_beside(error: ValidationError, tree: Tree) -> list[Problem]:
-    """Return what blocks without a misread value mean wrongly, so that it is told at once.
+def _problems_of_read_blocks(error: ValidationError, tree: Tree) -> list[Problem]:
+    """Return the problems of blocks that were read, to be reported in one go with misread ones.
 
-    Where symbols or what they depend on are misread, nothing is concluded from defaults.
+    Where symbols or settings they depend on are misread, nothing is concluded from defaults.
     """
     misread = {item["loc"][0] if item["loc"] else "" for item in error.errors(include_url=False)}
     if not isinstance(tree.value, dict) or not misread <= {"shape", "name", "copies", "output"}:
@@ -323,9 +323,9 @@ def _shared_problems(found: Sequence[ObjectSpec], database: str | None) -> list[
                     mark_of(spec.source, "name"),
                 )
             )
-        path, beside = "", first
+        path, other_spec = "", first
         if spec.profile != AUTO and spec.encoding != on_array.encoding:
-            path, what, beside = "profile, encoding", "array", on_array
+            path, what, other_spec = "profile, encoding", "array", on_array
             one, two = spec.profile, on_array.profile
         elif database is None and spec.database != first.database:
             path, what = "output.database", "database"
@@ -334,7 +334,7 @@ def _shared_problems(found: Sequence[ObjectSpec], database: str | None) -> list[
             path, what = "output.lab_key", "lab key"
             one, two = spec.lab_key or "none", first.lab_key or "none"
         if path:
-            cause = f"'{spec.name}' is on another {what} ({one}) than '{beside.name}' ({two})"
+            cause = f"'{spec.name}' is on another {what} ({one}) than '{other_spec.name}' ({two})"
             fix = f"run encode-object once for each {what}"
             problems.append(Problem(cause, fix, mark_of(spec.source, path)))
     return problems

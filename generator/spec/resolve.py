@@ -161,7 +161,7 @@ def resolve(
 
 
 def folder_name(name: str) -> str:
-    """Return the folder of an object's files: names that give the same one are told apart badly."""
+    """Return the folder of an object's files: names with one folder are too alike."""
     return re.sub(r"[\s-]+", "-", name.lower())
 
 
@@ -249,7 +249,7 @@ def _whole_layers_mm(height_mm: float, printer: Printer) -> float:
 def _coarser(
     settings: NamedSettings, defaults: SymbolDefaults, alphabet: Alphabet, printer: Printer
 ) -> SymbolStyle | None:
-    """Return the finest style that prints of those which the defaults allow beside their own."""
+    """Return the finest style that prints at one of the coarser pitches of the defaults."""
     for pitch in defaults.coarser_mm:
         style = _style(settings, replace(defaults, pitch_mm=pitch), printer)
         found = _printable(alphabet, style, printer, settings.symbols.draft is None)
@@ -292,7 +292,7 @@ def _printable(
 
 
 def _refuse_style(error: AlphabetError, refuse: Refuse) -> None:
-    """Point at the number that the message starts with, or at what is written of the others."""
+    """Refuse a style at the setting that the message starts with, or at another written one."""
     names = ("stroke", "pitch", "height", "draft", "chamfer")
     first = [name for name in names if re.match(rf"(a )?{name}\b", error.cause)]
     written = [f"symbols.{name}" for name in (*first, *names)]
@@ -420,7 +420,7 @@ def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeS
 
 
 def _similar_model(path: Path) -> str:
-    """Return a fix that names models like `path` beside it."""
+    """Return a fix that names similar models in the folder of `path`."""
     from generator.polyhedron.read import MESHES, STEP
 
     try:

@@ -44,7 +44,7 @@ class ShapeSpec:
     ============================================  ===============================================
 
     All but `file` and `solid` are what the functions of `generator.polyhedron.shapes.SHAPES`
-    and `generator.polyhedron.round.ROUND_SHAPES` take.
+    and `generator.polyhedron.shapes.ROUND_SHAPES` take.
     """
 
     kind: str
@@ -84,8 +84,8 @@ class ObjectSpec:
     def meaning(self) -> dict[str, Any]:
         """What a spec means, as plain values; equal specs mean the same object.
 
-        Comments, key order, units, names, folders, formats, the database and what robots are
-        told do not count; a default counts as if it had been written; a file counts by its
+        Comments, key order, units, names, folders, formats, the database and settings for
+        robots do not count; a default counts as if it had been written; a file counts by its
         content.
         """
         gap = {} if self.gap_mm == GAP_MM else {"gap_mm": self.gap_mm}  # older specs had none

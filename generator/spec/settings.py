@@ -108,7 +108,7 @@ def database_url(value: Any) -> str:
 
 
 def sensor_type_name(value: Any) -> str:
-    """Return the name of a sensor type, or of its file; which ones there are is told later."""
+    """Return the name of a sensor type, or of its file; unknown names are refused later."""
     if not isinstance(value, str) or not value.strip() or not value.isprintable():
         raise refuse("a sensor type is a name or a file", "write, for example, gel-24x32")
     return value

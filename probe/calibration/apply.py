@@ -84,20 +84,20 @@ def calibrate_image(
     found = _conductances(counts, c)
     g, noise = found.conductance_s, found.sigma_s
     bad = c.bad | np.isnan(g) | (counts >= c.full)
-    felt = ~bad & (g > SIGMAS * noise)
-    safe = np.where(felt, g, np.where(c.bad, 1.0, np.maximum(SIGMAS * noise, np.nan_to_num(g))))
+    clear = ~bad & (g > SIGMAS * noise)
+    safe = np.where(clear, g, np.where(c.bad, 1.0, np.maximum(SIGMAS * noise, np.nan_to_num(g))))
     with np.errstate(invalid="ignore", over="ignore"):
         over = (safe / c.gain_s) ** (1.0 / c.exponent)
         variance = (over * noise / (c.exponent * safe)) ** 2
         variance += _of_the_law(over, c) + (c.repeat * over) ** 2
-        force = np.where(felt, np.maximum(c.break_n + over, 0.0), 0.0)
+        force = np.where(clear, np.maximum(c.break_n + over, 0.0), 0.0)
         silent = np.maximum(c.break_n, 0.0) + over / SIGMAS
-        sigma = np.where(bad, np.inf, np.where(felt, np.sqrt(variance), silent))
+        sigma = np.where(bad, np.inf, np.where(clear, np.sqrt(variance), silent))
     return CalibratedImage(force, sigma, bad, "N")
 
 
 def expected_counts(forces_n: ArrayLike, calibration: Calibration) -> Image:
-    """Return what the calibrated sensor reads under forces: the inverse of `calibrate_image`.
+    """Return the readings of the calibrated sensor under forces: inverse of `calibrate_image`.
 
     Parameters
     ----------
@@ -190,15 +190,15 @@ def drift_of(
         worst = float(np.abs(shift[moved]).max())
         said.append(f"the bias of {tactel_words(moved)} moved by up to {worst:.3g} counts")
     ratios = [_ratios(calibration, load) for load in loads]
-    felt = np.concatenate(ratios) if ratios else np.zeros(0)
-    gain = float(np.median(felt)) - 1.0 if felt.size else float("nan")
-    if felt.size and abs(gain) > DRIFT_GAIN:
+    clear = np.concatenate(ratios) if ratios else np.zeros(0)
+    gain = float(np.median(clear)) - 1.0 if clear.size else float("nan")
+    if clear.size and abs(gain) > DRIFT_GAIN:
         said.append(f"the gain changed by {100 * gain:+.0f} %")
     return Drift(shift, gain, "; ".join([*said, "calibrate again"]) if said else "")
 
 
 def _ratios(calibration: Calibration, load: CalibrationLoad) -> Image:
-    """Return measured over known force, of the tactels that tell it well."""
+    """Return measured over known force, of the tactels that read it clearly."""
     read = calibrate_image(load.read.mean, calibration)
     well = ~read.bad & (load.forces_n > 0) & (read.values > 5.0 * read.sigma)
     ratios: Image = read.values[well] / load.forces_n[well]

@@ -34,7 +34,7 @@ REPEAT = 0.05  #: share of a force that hysteresis and creep leave open (1 sigma
 
 
 def common_bias(rest: Average) -> float:
-    """Return what most tactels read at rest, counts."""
+    """Return the median reading at rest, counts."""
     return float(np.median(rest.mean))
 
 

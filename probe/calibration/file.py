@@ -35,7 +35,7 @@ DIGITS = 7  #: significant digits of every number that is kept
 
 
 class Condition(IntEnum):
-    """What is the matter with a tactel; the letter is the file's."""
+    """Condition of a tactel; the letter is the file's."""
 
     SOUND = 0
     DEAD = 1
@@ -99,7 +99,7 @@ class Calibration:
 
     @property
     def bad(self) -> NDArray[np.bool_]:
-        """(rows, columns) tactels that tell no force: dead, stuck or hidden."""
+        """(rows, columns) tactels that give no force: dead, stuck or hidden."""
         return ~np.isin(self.condition, (Condition.SOUND, Condition.PRELOADED))
 
 

@@ -84,7 +84,7 @@ def calibration_from(
     Raises
     ------
     CalibrationError
-        If the loads do not tell, or do not determine, the law of a tactel that is alive.
+        If the loads do not determine the law of a live tactel.
     """
     rest = average_frames(rest_counts, "rest")
     for load in loads:
@@ -201,7 +201,7 @@ def fit_laws(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.boo
     """
     weight = np.where(used, 1.0 / error_s, 0.0)
     firm = used & (read_s > FIRM * error_s) & (force_n > 0)
-    least = np.where(firm, force_n, np.inf).min(axis=0)  # smallest force that is clearly felt
+    least = np.where(firm, force_n, np.inf).min(axis=0)  # smallest force that is clearly read
     least = np.where(np.isfinite(least), np.maximum(least, TINY_N), 1.0)
     theta = _best_start(force_n, read_s, weight, firm, least, preloaded)
     damping, cost = np.full(least.size, 1e-3), _cost(theta, force_n, read_s, weight, least)
@@ -257,7 +257,7 @@ def _linearise(theta: Array, force: Array, read: Array, weight: Array, least: Ar
     """Return (L + 1, T, 3) slopes and (L + 1, T) residuals, in errors.
 
     The last row holds the break force where it is known to be: below the smallest force that
-    is felt, which counts as an even prior.
+    is read, which counts as an even prior.
     """
     gain, exponent, broken = np.exp(theta[:, 0]), theta[:, 1], theta[:, 2]
     over = np.maximum(force - broken, TINY_N)

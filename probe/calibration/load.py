@@ -32,7 +32,7 @@ class Average:
     mean: Image  #: (rows, columns) counts
     noise: Image  #: (rows, columns) counts, standard deviation of one frame
     sigma: Image  #: (rows, columns) counts, standard deviation of the mean
-    highest: Image  #: (rows, columns) counts, median: what tells saturation
+    highest: Image  #: (rows, columns) counts, median, for saturation
     frames: int
 
 
@@ -149,7 +149,7 @@ def even_load(
 
 
 def describe_load(counts: NDArray[np.uint16], rest: NDArray[np.uint16] | None) -> str:
-    """Return how many tactels felt a load, how much, and whether it stood still.
+    """Return in words how many tactels a load pressed, how much, and whether it was steady.
 
     Parameters
     ----------

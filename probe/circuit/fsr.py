@@ -49,11 +49,11 @@ class Fsr:
 
     gain_s: Image  #: (rows, columns) S at 1 N above the break force; > 0
     exponent: Image  #: (rows, columns) > 0
-    break_n: Image  #: (rows, columns) N, least force that is felt
+    break_n: Image  #: (rows, columns) N, least force that is read
     preload_n: Image  #: (rows, columns) N, pressed by the assembly itself
     series_ohm: Image  #: (rows, columns) least resistance
     stuck_s: Image  #: (rows, columns) S, held whatever the force; 0 where the tactel moves
-    dead: NDArray[np.bool_]  #: (rows, columns) open: leaks, feels nothing
+    dead: NDArray[np.bool_]  #: (rows, columns) open: leaks, reads no force
     leak_s: float = LEAK_S  #: S, unloaded
     hysteresis: float = 0.10  #: reading on the way back over the way up, less 1
     drift: float = 0.05  #: rise of the conductance per decade of time under load
@@ -89,7 +89,7 @@ class Fsr:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilmState:
-    """What the tactels remember from one frame to the next; shape of the forces."""
+    """Memory of the tactels from one frame to the next; shape of the forces."""
 
     effective_n: Image  #: N, the force that the film shows (play operator)
     age_s: Image  #: s under load, mean over the load
@@ -106,7 +106,7 @@ def fsr_of(rows: int = _USUAL.rows, columns: int = _USUAL.columns) -> Fsr:
 def conductances(
     fsr: Fsr, forces_n: ArrayLike, state: FilmState | None = None, elapsed_s: float = 0.0
 ) -> tuple[Image, FilmState]:
-    """Return the conductance of every tactel, and what it remembers.
+    """Return the conductance of every tactel, and its new state.
 
     Parameters
     ----------

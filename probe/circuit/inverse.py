@@ -1,12 +1,12 @@
-"""Counts -> conductances, with their uncertainty, and what cannot be known from them.
+"""Counts -> conductances, with their uncertainty, and the tactels that are lost.
 
     grounded, virtual   closed form, g = y / (1 - column_ohm sum of y) down the column; with
                         a row resistance, Newton on the network
     floating            the convex problem of `network.solve_floating`
 
 Noise goes through the derivative of the same equations. A tactel whose conductance comes out
-below its own standard deviation is `lost`: the reading bounds it (by a few sigma) and tells
-no more. A saturated reading is a lower bound only.
+below its own standard deviation is `lost`: the reading only bounds it (by a
+few sigma). A saturated reading is a lower bound only.
 """
 
 from __future__ import annotations

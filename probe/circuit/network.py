@@ -194,7 +194,7 @@ def checked_conductances(conductance_s: ArrayLike) -> Image:
 
 
 def _sources(shares: Image) -> NDArray[np.float64]:
-    """Return what 1 A into each row and out of each column injects into the rows."""
+    """Return the currents in the rows, of 1 A into each row and out of each column."""
     rows = shares.shape[-2]
     injected = np.repeat(-shares[..., :, None, :], rows, axis=-2)
     index = np.arange(rows)

@@ -4,7 +4,7 @@ The thread starts the stream, starts it again after silence or a reboot, and ope
 again after it went away. The buffer between the two is bounded: when the consumer is slow,
 the oldest frame is dropped and counted; with `buffer=1` the newest wins. A recording waits
 for its consumer instead, for it can. A frame reaches the consumer one frame later than it
-came, when its neighbour has confirmed it (`probe.client.order`).
+came, when its neighbour has confirmed it (`probe.client.receiver`).
 """
 
 from __future__ import annotations
@@ -12,29 +12,36 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from typing import Self
 
 from encoded_objects.base.errors import EncodedObjectsError
-from probe.client.diagnosis import no_probe
-from probe.client.receiver import Receiver
-from probe.client.settings import CLIENT
-from probe.client.statistics import ClientStatistics
-from probe.closing import Closing
+from probe.client.receiver import ClientStatistics, Receiver
 from probe.errors import PortError, ProbeError
 from probe.frame import Frame
 from probe.port.address import Port
 from probe.port.url import open_port
 from probe.protocol import (
+    VERSION,
     Command,
+    Damage,
     IdentPacket,
     StatisticsPacket,
     bits_command,
     sensor_command,
 )
 
+_BUFFER = 2048  #: frames, about 2 MB and 20 s
+_SILENCE_S = 0.5  #: after so long without a packet the stream is started again
+_ANSWER_S = 5.0  #: a probe that has a boot loader answers within that
+_SLICE_S = 0.05  #: longest wait for bytes; a frame without successor is held so long
+_GATHER_S = 0.006  #: pause after few bytes, so that each byte does not wake the thread
+_FEW = 4096  #: bytes of one read, below which that pause is made
+_NOTICES = 256  #: kept for whoever asks
 
-class Client(Closing):
+
+class Client:
     """A conversation with a probe. Use it with `with`, and iterate over `frames()`.
 
     Parameters
@@ -43,7 +50,7 @@ class Client(Closing):
         Of a port, see `probe.port.url`. It is opened at once.
     sensor, bits
         The sensor to select (0 ... 7) and the readings' width (8 or 10); as the device has
-        them if not given. Both are told again after a reboot.
+        them if not given. Both are sent again after a reboot.
     buffer
         Frames that wait for the consumer at most; 1: always the newest.
     reopen_s
@@ -63,9 +70,9 @@ class Client(Closing):
         *,
         sensor: int | None = None,
         bits: int | None = None,
-        buffer: int = CLIENT.buffer,
+        buffer: int = _BUFFER,
         reopen_s: float = 30.0,
-        answer_s: float = CLIENT.answer_s,
+        answer_s: float = _ANSWER_S,
     ) -> None:
         if buffer < 1:
             raise PortError(f"a buffer of {buffer} frames, it holds at least 1", fix="take 1")
@@ -75,7 +82,7 @@ class Client(Closing):
         self._waits = url.startswith("file:")
         self._ready = threading.Condition()
         self._frames: deque[Frame] = deque()
-        self._notices: deque[str] = deque(maxlen=CLIENT.notices)
+        self._notices: deque[str] = deque(maxlen=_NOTICES)
         self._receiver = Receiver()
         self._reopenings = self._overruns = 0
         self._outbox = b""
@@ -87,6 +94,12 @@ class Client(Closing):
         self._port: Port = open_port(url)
         self._thread = threading.Thread(target=self._run, name=f"client of {url}", daemon=True)
         self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def frames(self, timeout_s: float | None = None) -> Iterator[Frame]:
         """Yield trusted frames until the client is closed, or a recording ends.
@@ -192,20 +205,16 @@ class Client(Closing):
             elif self._take(data, now_ns):
                 heard_s = now_s
             # After a torn packet: a reset, whose ident was joined to what was being sent.
-            anew, torn = heard_s > asked_s, self._receiver.torn
-            if now_s - max(heard_s, asked_s) > (
-                CLIENT.slice_s if anew and torn else CLIENT.silence_s
-            ):
-                if anew and not torn:
-                    self._tell(
-                        f"nothing came for {CLIENT.silence_s:g} s; the stream is started again"
-                    )
+            since, torn = heard_s > asked_s, self._receiver.torn
+            if now_s - max(heard_s, asked_s) > (_SLICE_S if since and torn else _SILENCE_S):
+                if since and not torn:
+                    self._tell(f"nothing came for {_SILENCE_S:g} s; the stream is started again")
                 self._send(self._greeting())
                 asked_s = now_s
             if not self._receiver.packets and now_s - began_s > self._answer_s:
-                raise no_probe(self._receiver.damages, self._answer_s, self._port.url)
-            if 0 < len(data) < CLIENT.few:
-                time.sleep(CLIENT.gather_s)
+                raise diagnose_silence(self._receiver.damages, self._answer_s, self._port.url)
+            if 0 < len(data) < _FEW:
+                time.sleep(_GATHER_S)
 
     def _exchange(self) -> bytes:
         """Send what waits to be sent; return what came."""
@@ -213,7 +222,7 @@ class Client(Closing):
             with self._ready:
                 outbox, self._outbox = self._outbox, b""
             self._port.write(outbox)
-        return self._port.read(CLIENT.slice_s)
+        return self._port.read(_SLICE_S)
 
     def _take(self, data: bytes, now_ns: int) -> bool:
         """Take bytes; tell whether a packet was among them."""
@@ -281,3 +290,27 @@ class Client(Closing):
     def _tell(self, notice: str) -> None:
         with self._ready:
             self._notices.append(notice)
+
+
+def diagnose_silence(damages: Mapping[Damage, int], waited_s: float, url: str) -> PortError:
+    """Return the error for a port at which no probe answered.
+
+    Parameters
+    ----------
+    damages
+        How many blocks failed, and why.
+    waited_s
+        How long a packet was waited for.
+    url
+        Of the port.
+    """
+    if damages[Damage.VERSION]:
+        cause = f"the device speaks another version of the protocol, not {VERSION}"
+        fix = "flash the firmware that belongs to this programme"
+    elif any(damages.values()):
+        cause = "what comes from the device are no packets of a probe"
+        fix = "try another baud rate; if that does not help, it has not the probe's firmware"
+    else:
+        cause = f"the device was silent for {waited_s:g} s"
+        fix = "try another baud rate, and see whether it has power and the probe's firmware"
+    return PortError(cause, fix=fix, place=url)

@@ -9,17 +9,19 @@ from __future__ import annotations
 import queue
 import threading
 import time
+from typing import Self
 
 from encoded_objects.base.errors import EncodedObjectsError
 from probe.client.client import Client
-from probe.client.settings import CLIENT
-from probe.closing import Closing
 from probe.frame import Frame
 from probe.port.url import address_of
 from probe.protocol import IdentPacket
 
+_WAITING = 2048  #: frames between the threads; beyond, the client counts overruns
+_IDENT_S = 2.0  #: for which a stream waits for the description of the probe
 
-class Stream(Closing):
+
+class Stream:
     """The frames of a probe; a context manager that lets go of the port too.
 
     Parameters
@@ -39,7 +41,7 @@ class Stream(Closing):
         if sensor is not None:
             self.client.select_sensor(sensor)  # so that the ident tells of the sensor selected
         self.ended = False  #: whether there will be no more frames
-        self._queue: queue.Queue[Frame | None] = queue.Queue(CLIENT.waiting)
+        self._queue: queue.Queue[Frame | None] = queue.Queue(_WAITING)
         self._failure: EncodedObjectsError | None = None
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._feed, name="frames", daemon=True)
@@ -50,6 +52,12 @@ class Stream(Closing):
         self._closed.set()
         self.client.close()
         self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def take(self, timeout_s: float) -> list[Frame]:
         """Return all frames that wait; none if none came in `timeout_s`, or at the end.
@@ -69,7 +77,7 @@ class Stream(Closing):
         except queue.Empty:
             return frames
         if self._failure is not None:
-            if frames:  # the failure is told by the next call
+            if frames:  # the next call raises the failure
                 self._queue.put(None)
                 self.ended = False
                 return frames
@@ -78,7 +86,7 @@ class Stream(Closing):
 
     def ident(self) -> IdentPacket | None:
         """Return what the device is, after a short wait for its answer."""
-        until_s = time.monotonic() + CLIENT.ident_s
+        until_s = time.monotonic() + _IDENT_S
         while time.monotonic() < until_s:
             ident = self.client.ident
             if ident is not None and self._asked in (None, ident.sensor):

@@ -70,10 +70,10 @@ def _uncertainty(found: Calibration, force_n: float) -> tuple[float, float, floa
     """Return a force, and its relative error in one frame: median, and 95 % of the tactels."""
     forces = np.full(found.shape, force_n)
     read = calibrate_image(expected_counts(forces, found), found)
-    told = (read.sigma / force_n)[~read.bad]
-    if not told.size:
+    errors = (read.sigma / force_n)[~read.bad]
+    if not errors.size:
         return force_n, math.inf, math.inf
-    return force_n, float(np.median(told)), float(np.quantile(told, 0.95))
+    return force_n, float(np.median(errors)), float(np.quantile(errors, 0.95))
 
 
 def places(where: NDArray[np.bool_]) -> str:

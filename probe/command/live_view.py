@@ -1,4 +1,4 @@
-"""The live view as a picture of characters: heat map at the left, counts beside it.
+"""The live view as a picture of characters: heat map at the left, counts at the right.
 
 A tactel is a block of two characters, or, in a terminal that is too low for that, half a
 character: two rows of tactels share a line.
@@ -22,7 +22,7 @@ from probe.command.live_state import LiveState
 from probe.protocol import IdentPacket
 
 LEVELS = 64
-AROUND = 6  #: lines of the view beside those of the image; in fewer a tactel is half a character
+AROUND = 6  #: lines of the view besides those of the image; in fewer a tactel is half a character
 KEYS = "q quit  space pause  0-7 sensor  b bias  m median  s save  r record"
 #: black, violet, red, orange, pale yellow: rises in brightness, also without hue
 _ANCHORS = ((8, 6, 16), (74, 12, 107), (165, 44, 96), (237, 105, 37), (251, 180, 26),

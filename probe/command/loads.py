@@ -54,7 +54,7 @@ def loads_given(words: list[str]) -> list[LoadRecording]:
 
 
 def write_list(path: Path, given: Iterable[LoadRecording]) -> None:
-    """Write loads as a table; names are those of files beside it."""
+    """Write loads as a table; names are those of files in its folder."""
     with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS_OF_LIST[:2])

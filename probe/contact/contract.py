@@ -26,7 +26,7 @@ STEEPEST_RAD = 0.35  #: largest tilt of the plate; beyond, tilts are not small
 
 @dataclass(frozen=True, slots=True)
 class WristStiffness:
-    """How the wrist holds the plate. Zero tilt stiffness leaves the plate free to turn."""
+    """Stiffness of the wrist. Zero leaves the plate free to turn."""
 
     tilt_x_nmm_rad: float = 3000.0  #: moment about x per turn about x, N mm / rad
     tilt_y_nmm_rad: float = 3000.0
@@ -34,7 +34,7 @@ class WristStiffness:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """Where the sensor stands over a surface, and how it is pressed on.
+    """Pose, force and wrist of the sensor over a surface.
 
     A point (x, y) of the sensor lies over the surface's point
 
@@ -61,7 +61,7 @@ class Touch:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """What the sensor feels, and where the plate came to rest."""
+    """Forces on the tactels, and the plate at rest."""
 
     forces_n: NDArray[np.float64]  #: (rows, columns) on each tactel
     z_mm: float  #: height of the centre of the tips' plane over the surface frame; inf: no contact
@@ -79,9 +79,9 @@ def heights_at(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
     ContactError
         For heights that are no numbers, or +inf.
     """
-    asked = touch.on_surface(points_mm.reshape(-1, 2))
-    heights = np.asarray(surface.heights_mm(asked), np.float64)
-    if heights.shape != (len(asked),) or not heights.max(initial=-np.inf) < np.inf:  # NaN, too
+    points = touch.on_surface(points_mm.reshape(-1, 2))
+    heights = np.asarray(surface.heights_mm(points), np.float64)
+    if heights.shape != (len(points),) or not heights.max(initial=-np.inf) < np.inf:  # NaN, too
         raise ContactError(
             "the surface gives heights that are no numbers",
             fix="give a finite height at each point, or -inf where there is no matter",

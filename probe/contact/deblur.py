@@ -1,4 +1,4 @@
-"""What presses on top of a pad, out of what arrives at its base, as far as it can be known.
+"""Forces on top of a pad, from the forces at its base, as far as they can be known.
 
 Forces on the tactels under a pad (N) -> forces on the pad's top over each tactel (N). A wave
 of pressure arrives at the base as B(q h) (`layer_influence`); at the tactels' Nyquist frequency
@@ -8,7 +8,7 @@ by its inverse, so
 - below `LEAST_SHARE` at Nyquist (h >= 4 mm at the usual pitch) it is refused;
 - above, forces f >= 0 are sought for which |K f - m|^2 + (sigma/tau)^2 |f|^2 is least: K is
   the layer's blur from tactel to tactel, m the readings, sigma their noise, tau the root mean
-  square of m. What lies under the noise is left out, not invented, and its extent is told.
+  square of m. Signal under the noise is left out, not invented, and counted.
 
 Nothing pulls on a pad, so f >= 0 is no assumption. What arrives beyond the matrix counts for the
 outermost tactels, as in `layer_influence`. Thesis 4.2.
@@ -40,7 +40,7 @@ CELLS = 4  # of the layer, per tactel: finer than the blur
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DeblurredImage:
-    """What presses on the top of the pad."""
+    """Forces on the top of the pad."""
 
     forces_n: Array  #: (rows, columns) over each tactel, >= 0
     noise_n: float  #: standard deviation of one of them, root mean square
@@ -131,7 +131,7 @@ def _fit_pressures(blur: Array, read: Array, share: float) -> Array:
 def blur_of(sensor: SensorType) -> tuple[Array, Array]:
     """Return the blur (n, n) from tactel to tactel, and its singular values (n,).
 
-    Column k is what the tactels feel of 1 N that presses evenly on the square of tactel k.
+    Column k is what the tactels read of 1 N that presses evenly on the square of tactel k.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def blur_of(sensor: SensorType) -> tuple[Array, Array]:
         )
     )
     s = 2 * math.pi * height / dx * np.hypot(down[:, None], right)
-    # Of a cell pressed evenly and felt as a whole: its own wave, and all shorter ones as one.
+    # A cell is pressed evenly and read as a whole: its own wave, and all shorter ones as one.
     own = np.square(np.sinc(down)[:, None] * np.sinc(right))
     beyond = base_ratio(np.array(2 * math.pi * height / dx), sensor.overlay.poisson)
     passed = base_ratio(s, sensor.overlay.poisson) * own + float(beyond) * (1 - own)
@@ -159,10 +159,10 @@ def blur_of(sensor: SensorType) -> tuple[Array, Array]:
     for tactel, (row, column) in enumerate(np.ndindex(sensor.rows, sensor.columns)):
         force = np.zeros(grid.domain)
         force[1 + row * n : 1 + (row + 1) * n, 1 + column * n : 1 + (column + 1) * n] = 1 / n**2
-        felt = scipy.fft.irfft2(scipy.fft.rfft2(force) * passed, s=grid.domain)
+        arrived = scipy.fft.irfft2(scipy.fft.rfft2(force) * passed, s=grid.domain)
         for axis, (order, starts) in enumerate(orders):
-            felt = np.add.reduceat(felt.take(order, axis=axis), starts, axis=axis)
-        blur[:, tactel] = felt.ravel()
+            arrived = np.add.reduceat(arrived.take(order, axis=axis), starts, axis=axis)
+        blur[:, tactel] = arrived.ravel()
     strengths: Array = np.asarray(np.linalg.svd(blur, compute_uv=False), np.float64)
     blur.setflags(write=False)
     strengths.setflags(write=False)

@@ -118,9 +118,9 @@ def elements(
             f"{touch.force_n:g} N press the surface {deepest:.3g} mm into a pad of {height:g} mm",
             fix="press with less force, or on more of the surface",
         )
-    felt = pad.felt(found.forces)
-    pressed = np.maximum(felt, 0.0)  # far from the contact the base pulls a little: nobody feels it
-    pressed *= felt.sum() / pressed.sum()
+    base = pad.base_forces(found.forces)
+    pressed = np.maximum(base, 0.0)  # far from the contact the base pulls a little
+    pressed *= base.sum() / pressed.sum()
     return Contact(pressed, z, tilt_x, tilt_y, "elements", found.iterations)
 
 
@@ -199,9 +199,9 @@ def _element_boundaries(
         apart = np.abs(lines - wall) > NEAR * size
         held = (np.abs(lines[:, None] - firm) <= TINY * size).any(axis=1)
         lines = np.append(lines[apart | held], wall)
-        for beside in (wall - WALL_LINES * size, wall + WALL_LINES * size):
-            if 0 < beside < lines.max() and np.abs(lines - beside).min() > NEAR * size:
-                lines = np.append(lines, beside)
+        for near in (wall - WALL_LINES * size, wall + WALL_LINES * size):
+            if 0 < near < lines.max() and np.abs(lines - near).min() > NEAR * size:
+                lines = np.append(lines, near)
     lines = np.sort(lines)
     return np.asarray(lines[np.append(True, np.diff(lines) > TINY * size)])
 
@@ -278,12 +278,12 @@ def refuse_unseen(
         asked = points[..., ::-1] if swapped else points
         found = heights_at(surface, touch, asked)
         after = np.searchsorted(along, fine)
-        # What a node beside it bears is no more than an edge that is not on a line of the mesh.
+        # A neighbouring node bears no more than an edge that is not on a line of the mesh.
         around = _neighbour_maximum(top)
         hidden = found > np.maximum(around[:, after - 1], around[:, after]) + slack_mm
         # A node that stands out of both of its neighbours has at least its place's share there.
-        beside = np.pad(seen, ((0, 0), (1, 1)), constant_values=-np.inf)
-        lower = np.maximum(beside[:, :-2], beside[:, 2:])
+        near = np.pad(seen, ((0, 0), (1, 1)), constant_values=-np.inf)
+        lower = np.maximum(near[:, :-2], near[:, 2:])
         ridge = bearing & (seen > lower + slack_mm)
         nearest = np.searchsorted((along[1:] + along[:-1]) / 2, fine)
         starts = np.searchsorted(nearest, np.arange(along.size))

@@ -89,7 +89,7 @@ class Quadratic:
 def quadratic(boundaries: Array) -> Quadratic:
     """Return the integrals over elements between ascending boundaries (n + 1,), mm."""
     f, one = line_bases(boundaries, 2, 0)
-    beside = f.points - one.places[:, None]
+    offset = f.points - one.places[:, None]
     return Quadratic(
         nodes=f.places,
         lengths=np.diff(boundaries),
@@ -98,11 +98,11 @@ def quadratic(boundaries: Array) -> Quadratic:
         mixed=integral(lambda u, v: u * v.grad[0], f, f),
         average=(
             integral(lambda u, q: u * q, f, one),
-            integral(lambda u, q: u * q, f, one, beside),
+            integral(lambda u, q: u * q, f, one, offset),
         ),
         slope=(
             integral(lambda u, q: u.grad[0] * q, f, one),
-            integral(lambda u, q: u.grad[0] * q, f, one, beside),
+            integral(lambda u, q: u.grad[0] * q, f, one, offset),
         ),
     )
 
@@ -164,7 +164,7 @@ class PadLines:
         return (2 * self.x.size - 1) * (2 * self.y.size - 1)
 
     def bytes_needed(self, tactels: int) -> int:
-        """Return what `condense` holds at its peak, for so many tactels on the quarter."""
+        """Return the peak memory of `condense`, for a number of tactels on the quarter."""
         right = self.top_nodes + tactels
         block = 12 * (2 * self.y.size - 1) * (self.z.size - 1)
         sweep = 5 * block * block + 3 * block * right + 2 * right * right
@@ -213,7 +213,7 @@ class CondensedPad:
             found += sign[:, None] * matrix[quarter[:, None], quarter] * sign
         return found
 
-    def felt(self, forces: Array) -> Array:
+    def base_forces(self, forces: Array) -> Array:
         """Return the force on each tactel (rows, columns), N: the base stress over its square."""
         total = np.zeros((self.rows, self.columns))
         for (px, py), matrix in zip(PARITIES, self.tactels, strict=True):
@@ -260,10 +260,10 @@ def condense(
     compliance, tactels = [], []
     for px, py in PARITIES:
         take = sp.kron(to_tactels[0][px], to_tactels[1][py])
-        load_response, felt = _parity(stiffness, place, shape, (px, py), take)
+        load_response, reaction = _parity(stiffness, place, shape, (px, py), take)
         compliance.append(load_response / 4)
-        felt = felt.reshape(to_tactels[0][px].shape[0], to_tactels[1][py].shape[0], -1)
-        tactels.append(np.ascontiguousarray(felt.transpose(1, 0, 2)) / 4)
+        reaction = reaction.reshape(to_tactels[0][px].shape[0], to_tactels[1][py].shape[0], -1)
+        tactels.append(np.ascontiguousarray(reaction.transpose(1, 0, 2)) / 4)
     whole = [mirror(part.nodes) for part in along[:2]]
     return CondensedPad(
         whole[0], whole[1], tuple(compliance), tuple(tactels), rows, columns, lines.unknowns

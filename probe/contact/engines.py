@@ -30,7 +30,7 @@ if TYPE_CHECKING:  # a command's help names the engines and needs nothing of the
 
 @dataclass(frozen=True, slots=True)
 class EngineEntry:
-    """Where an engine is, and what can be said of it without loading it."""
+    """Module of an engine, and a description that needs no loading."""
 
     module: str
     left_out: str  #: of what happens between a tip and a surface, in plain words

@@ -2,7 +2,7 @@
 
 Surface + sensor + touch -> depth of the imprint under each pixel, as the force of the gel there.
 The gel is a bed of springs, E / height, on which the plate comes to rest (`plate`). Its surface
-follows what is pressed into it, but a membrane bridges beside it: the imprint is the least
+follows what is pressed into it, but a membrane bridges around it: the imprint is the least
 w >= d, d the depth of the surface under the plate, with
 
     w - l^2 laplace(w) = 0  where w > d,
@@ -122,8 +122,8 @@ def bridge(depth_mm: Array, way: float) -> tuple[Array, int]:
     number = 0
     while number < MOST_STEPS:
         number += 1
-        beside = padded[:-2, 1:-1] + padded[2:, 1:-1] + padded[1:-1, :-2] + padded[1:-1, 2:]
-        after = np.maximum(depth_mm, beside * (pull / (1 + 4 * pull)))
+        around = padded[:-2, 1:-1] + padded[2:, 1:-1] + padded[1:-1, :-2] + padded[1:-1, 2:]
+        after = np.maximum(depth_mm, around * (pull / (1 + 4 * pull)))
         change = float(np.abs(after - inside).max())
         inside[:] = after
         if change <= tolerance:
@@ -132,7 +132,7 @@ def bridge(depth_mm: Array, way: float) -> tuple[Array, int]:
 
 
 def _grid(sensor: SensorType, step: float) -> Array:
-    """Return the places (n, m, 2) at which the surface is asked."""
+    """Return the sample points (n, m, 2) of the surface."""
     rows, columns = sensor.rows * FINE, sensor.columns * FINE
     x = (np.arange(columns) - (columns - 1) / 2) * step
     y = ((rows - 1) / 2 - np.arange(rows)) * step

@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 DEEPEST = 0.5  #: mean indentation, of the pad's height, beyond which strains are not small
 THINNEST = 1.5  # points of a cell that meet a stroke, on the mean, below which that is chance
-FEW = 2  # cells on a step, from which on `THINNEST` is asked; one may be a sharp corner
+FEW = 2  # cells on a step, from which on `THINNEST` holds; one may be a sharp corner
 TURNED = 0.05  # of the indentation: change by a turn across a cell that may remain
 LEAST = 2e-3  # of a cell: indentations below are not resolved
 PASSES = 25  # over the surface, each with the plate of the last
@@ -116,12 +116,12 @@ def press_patch(patch: LayerPatch, touch: Touch) -> Contact:
 def _find_rest(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[LayerContact, PlatePose]:
     """Return the contact and the plate at rest.
 
-    Cells and points far below the foreseen plate are left out. Those that turn out to be run
-    through are taken in, and where the plate turned the levels are taken anew; what was taken
-    in once stays, so the passes end. A plate that falls far over has too few levels below it:
+    Cells and points far below the predicted plate are left out. Those that would be run through are
+    taken in, and where the plate turned the levels are computed again; cells once taken in stay, so
+    the passes end. A plate that falls far over has too few levels below it:
     it goes a part of the way, and looks again.
     """
-    pose, depth = _foresee_rest(patch, touch)
+    pose, depth = _predict_rest(patch, touch)
     looks: list[DepthWindow] = []
     floor = -depth
     for _ in range(PASSES):
@@ -168,11 +168,11 @@ def _press_levels(levels: Levels, touch: Touch) -> tuple[LayerContact, bool]:
     return descend(pressed, plate.held(levels.reach_mm)), True
 
 
-def _foresee_rest(patch: LayerPatch, touch: Touch) -> tuple[PlatePose, float]:
-    """Return about where the plate comes to rest, and how deep (mm) it stands in the pad.
+def _predict_rest(patch: LayerPatch, touch: Touch) -> tuple[PlatePose, float]:
+    """Return a prediction of the plate at rest, and its depth (mm) in the pad.
 
-    The plate is put on springs that do not know of each other: about what a stroke of one
-    tactel's width feels.
+    The plate is put on independent springs, as stiff as the pad under a stroke of one tactel's
+    width.
     """
     pad = patch.sensor.overlay
     matter = np.flatnonzero(patch.highest_mm > -math.inf)

@@ -215,7 +215,7 @@ class ContactSystem:
 
 
 def plate_of(touch: Touch, levels: Levels) -> RigidPlate:
-    """Return what holds the plate of a touch."""
+    """Return force and wrist of a touch, seen from the plane of the levels."""
     plane, reach = levels.plane, levels.reach_mm
     turns = touch.tilt_x_rad - plane.tilt_x_rad, touch.tilt_y_rad - plane.tilt_y_rad
     stiffness = np.array([0.0, touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad])

@@ -75,16 +75,16 @@ class Influence:
         """Return the force (N) that arrives at each tactel under pressures (rows, columns), MPa.
 
         The sum is the force on the pad. The slight pull of the base far away from the contact
-        (below 1e-3 of the force) is felt by no tactel.
+        (below 1e-3 of the force) is read by no tactel.
         """
         stress = self._filtered(pressure, self.base, self.domain[0])
         n = self.cells_per_tactel
         rows = nearest_tactel(self.domain[0], self.rows, n)
         columns = nearest_tactel(self.domain[1], self.columns, n)
-        felt = np.add.reduceat(stress[rows[0]], rows[1], axis=0)
-        felt = np.maximum(np.add.reduceat(felt[:, columns[0]], columns[1], axis=1), 0.0)
-        total = felt.sum()
-        return felt * (pressure.sum() * self.dx_mm**2 / total) if total > 0 else felt
+        forces = np.add.reduceat(stress[rows[0]], rows[1], axis=0)
+        forces = np.maximum(np.add.reduceat(forces[:, columns[0]], columns[1], axis=1), 0.0)
+        total = forces.sum()
+        return forces * (pressure.sum() * self.dx_mm**2 / total) if total > 0 else forces
 
     def _filtered(self, pressure: Array, spectrum: Array, rows: int) -> Array:
         """Return the first rows of the cyclic convolution; zero rows are not transformed."""

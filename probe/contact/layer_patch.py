@@ -36,10 +36,10 @@ Array = NDArray[np.float64]
 Cells = NDArray[np.intp]
 Number = TypeVar("Number", np.float64, np.bool_)
 
-COARSE = 4  # points per cell of the first look
-SAMPLES = (16, 64, 256)  # points per cell of the second, to choose from
+COARSE = 4  # first samples per cell
+SAMPLES = (16, 64, 256)  # per cell that is sampled in full
 LEVEL_MM = 1e-9  # heights that differ less are level
-SEARCH_STEP_MM = 0.01  # along the lines that look for what the first look missed
+SEARCH_STEP_MM = 0.01  # along the lines that search for strokes between the samples
 SEARCH_LINES = 16  # across the matrix, each way
 MOST_LEVELS = 8  #: of a cell that stands on a step; one where all that counts is flat
 ONE_LEVEL = 1e-12  # mm, or of the greatest depth; depths that differ less are one level
@@ -48,15 +48,15 @@ LEAST_SHARE = 1e-3  # of a bell, below which a cell meets nothing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LayerPatch:
-    """What lies under the matrix: cells in flat numbers, row * columns + column, row 0 on top."""
+    """Heights under the matrix: cells in flat numbers, row * columns + column, row 0 on top."""
 
     surface: HeightMap
     sensor: SensorType
     touch: Touch  #: its x, y and theta; force, tilt and wrist have no meaning here
     cells_per_tactel: int
     offsets_mm: Array  #: (samples, 2) points of a cell from its centre, sensor frame
-    coarse_mm: Array  #: (all cells,) height of the first of the points looked at
-    highest_mm: Array  #: (all cells,) of the points looked at
+    coarse_mm: Array  #: (all cells,) height of the first sample
+    highest_mm: Array  #: (all cells,) of the samples
     level: NDArray[np.bool_]  #: (all cells,) the cell and its neighbours are level
     cells: Cells  #: (n,) cells sampled in full, ascending
     heights_mm: Array  #: (samples, n) their heights
@@ -106,7 +106,7 @@ def patch_under(
     cells_per_tactel: int = 4,
     samples: int = 16,
 ) -> LayerPatch:
-    """Return the first look at what lies under the matrix; no cell is sampled in full yet.
+    """Return the first samples under the matrix; no cell is sampled in full yet.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def _refuse_hidden(
 ) -> None:
     """Refuse a surface whose top is under the matrix and was seen by no point.
 
-    Asked only when the surface has a top that the first look did not meet: a blank place, strokes
+    Checked only where the first samples did not meet the top of the surface: a blank place, strokes
     thinner than the points are apart, or the top of something round. The last rises over the
     highest point seen about it by less than what was seen there differs.
     """
@@ -248,7 +248,7 @@ class Levels:
     levers: Array  #: (3, n) R = [1, y/L, -x/L] at their centres
     shares: Array  #: (levels, n) of the bell, their sum is at most 1
     depths_mm: Array  #: (levels, n) mean depth; -inf where the share is 0
-    left_out_mm: Array  #: (grid cells,) greatest depth of matter below the look
+    left_out_mm: Array  #: (grid cells,) greatest depth of matter below the window
 
     @property
     def reach_mm(self) -> float:
@@ -264,7 +264,7 @@ class Levels:
 
 @dataclass(frozen=True, slots=True)
 class DepthWindow:
-    """What was looked at: matter that stands over a plane that lies deeper by the floor."""
+    """Depth window below a plane."""
 
     plane: PlatePose  #: about where the plate comes to rest
     floor_mm: float  #: seen from the plane, <= 0
@@ -278,7 +278,7 @@ class DepthWindow:
 
 
 def levels_of(
-    patch: LayerPatch, grid: Influence, look: DepthWindow, earlier: Sequence[DepthWindow] = ()
+    patch: LayerPatch, grid: Influence, window: DepthWindow, earlier: Sequence[DepthWindow] = ()
 ) -> Levels:
     """Return the levels of the cells of a patch that were sampled in full.
 
@@ -288,14 +288,14 @@ def levels_of(
         Heights under the matrix.
     grid
         The pad's cells: those of the patch and a ring about them.
-    look
+    window
         Points below are left out.
     earlier
-        What these saw is one more level where it lies deeper than the look.
+        Matter in these, deeper than the window, is one more level.
     """
-    depth = look.depths_mm(patch)
+    depth = window.depths_mm(patch)
     top = float(depth.max())
-    floor_mm = min(look.floor_mm, top)
+    floor_mm = min(window.floor_mm, top)
     step = max(top - floor_mm, ONE_LEVEL * max(1.0, abs(top))) / MOST_LEVELS
     near = depth >= floor_mm
     number = np.where(near, np.clip((depth - floor_mm) / step, 0, MOST_LEVELS - 1), MOST_LEVELS + 1)
@@ -325,13 +325,13 @@ def levels_of(
     depths = np.divide(moments, shares, out=none, where=shares > 0)
 
     left_out = np.full(grid.rows * grid.columns, -np.inf)
-    seen = patch.highest_mm - look.plane.heights_mm(patch.centres_mm)
+    seen = patch.highest_mm - window.plane.heights_mm(patch.centres_mm)
     seen[patch.cells] = np.where(near, -np.inf, depth).max(axis=0)
     left_out.reshape(grid.rows, -1)[1:-1, 1:-1] = seen.reshape(patch.shape)
     x, y = centres_mm(grid.rows, grid.columns, grid.dx_mm)[cells].T / grid.sensor.reach_mm
     return Levels(
         grid=grid,
-        plane=look.plane,
+        plane=window.plane,
         cells=cells,
         levers=np.stack([np.ones_like(x), y, -x]),
         shares=shares,

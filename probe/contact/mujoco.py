@@ -73,7 +73,7 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
     touch
         Pose, force and wrist.
     tips
-        How finely the tips are asked (7 points are enough here), and their defects.
+        Sampling (7 points are enough here) and defects of the tips.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Balance:
-    """What a pose of the plate leaves over, and what every point bears."""
+    """Imbalance at a pose of the plate, and the force on every point."""
 
     wrong_n: Array  #: (1 to 3,) force and moments (over the half width) that do not balance
     forces_n: Array  #: (n,)
@@ -219,14 +219,14 @@ def _scene(
     )  # fmt: skip
     model = spec.compile()
     data = mujoco.MjData(model)
-    asked = points.shape[0] * points.shape[1]
+    count = points.shape[0] * points.shape[1]
 
     def depths(plate: Array) -> Array:
         z, tilt_x, tilt_y = plate
         data.mocap_pos[0] = [1e-3 * touch.x_mm, 1e-3 * touch.y_mm, 1e-3 * z]
         data.mocap_quat[0] = _quaternion(touch.theta_rad, float(tilt_x), float(tilt_y))
         mujoco.mj_forward(model, data)
-        deep: Array = 1e3 * np.asarray(data.sensordata[:asked], dtype=np.float64)
+        deep: Array = 1e3 * np.asarray(data.sensordata[:count], dtype=np.float64)
         return deep
 
     return depths, float(corners[:, 2].max())
@@ -265,7 +265,7 @@ def triangles_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> tup
 
 
 def mesh_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> Mesh:
-    """Return what lies under the sensor: corners (n, 3) and triangles (m, 3).
+    """Return the surface under the sensor: corners (n, 3) and triangles (m, 3).
 
     Raises
     ------
@@ -281,7 +281,7 @@ def mesh_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> Mesh:
 
 
 def cut_under(solid_mm: Array, sensor: SensorType, touch: Touch) -> Mesh:
-    """Return what of a body (m, 3, 3) lies under the sensor; raises as `mesh_under`."""
+    """Return the part of a body (m, 3, 3) under the sensor; raises as `mesh_under`."""
     from manifold3d import Manifold
 
     reach = max(sensor.half_mm) + AROUND_MM
@@ -297,7 +297,7 @@ def cut_under(solid_mm: Array, sensor: SensorType, touch: Touch) -> Mesh:
 def mesh_heights_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> Mesh:
     """Return the heights under the sensor as a body; raises as `mesh_under`.
 
-    Heights are asked twice as densely as they are kept; grooves between beads, narrower than a
+    Heights are sampled twice as densely as they are kept; grooves between beads, narrower than a
     cell, are filled, as rubber does not enter them. Where there is no matter, and below
     `deep_mm`, the body has a floor.
     """

@@ -41,7 +41,7 @@ FAR_TURNED_RAD = 0.2  # beyond, the message says that the plate tips
 HULL_SLACK = 1e-12  # of the half width, by which a centre of pressure may miss the hull
 MOST_STEPS = 100  # of Newton's method
 SINGULAR = 1e-14  # eigenvalue of the scaled system, of the largest
-LEAST_PIVOT = 1e-6  # of the scaled system, below which its eigenvalues are asked
+LEAST_PIVOT = 1e-6  # of the scaled system, below which its eigenvalues are computed
 NEAR_LIMIT = 0.95  # share of the way to a law's limit that one step may go
 WHOLE_SLOPE = 0.5  # of the first slope that a whole step may leave
 SEARCHED_SLOPE = 0.1  # of the first slope that a searched step may leave
@@ -52,7 +52,7 @@ _NONE = np.zeros(0)
 
 @dataclass(frozen=True, slots=True)
 class PlateLoad:
-    """What acts on the plate at the centre of its frame."""
+    """Load on the plate at the centre of its frame."""
 
     force_n: float  #: along -z
     wrist: WristStiffness = field(default_factory=WristStiffness)  #: inf holds a turn fast
@@ -64,7 +64,7 @@ class PlateLoad:
 
 @dataclass(frozen=True, slots=True)
 class PlatePose:
-    """Where the plate stands."""
+    """Pose of the plate."""
 
     z_mm: float  #: height of its centre over the surface frame
     tilt_x_rad: float
@@ -87,7 +87,7 @@ class PlateRest:
 
 
 def load_of(touch: Touch) -> PlateLoad:
-    """Return what a touch asks of the plate."""
+    """Return the load of a touch."""
     return PlateLoad(touch.force_n, touch.wrist, touch.tilt_x_rad, touch.tilt_y_rad)
 
 
@@ -98,7 +98,7 @@ def rest(
     load: PlateLoad,
     *,
     columns: Columns | None = None,
-    foreseen: PlatePose | None = None,
+    start: PlatePose | None = None,
     tolerance: float = 1e-12,
 ) -> PlateRest:
     """Return where the plate comes to rest.
@@ -116,9 +116,8 @@ def rest(
         Force, moments and wrist.
     columns
         What stands behind the tips; none: they are fixed to the plate.
-    foreseen
-        About where the plate comes to rest, to begin there; columns are foreseen by their
-        own field.
+    start
+        Predicted pose, to begin there; that of columns is their own field.
     tolerance
         Largest residual force, as a share of the forces that balance.
 
@@ -138,7 +137,7 @@ def rest(
             fix="move the sensor over the object",
         )
     problem = _pose_problem(points_mm, heights_mm, law, columns, load)
-    state, iterations = newton(problem, _unknowns(problem, load, foreseen), tolerance)
+    state, iterations = newton(problem, _unknowns(problem, load, start), tolerance)
     a = np.zeros(3)
     a[problem.free] = state.a
     half = problem.half_mm
@@ -265,7 +264,7 @@ class Columns:
     law: Law
     starts: NDArray[np.intp]  #: (g,) first point of each group
     of_point: NDArray[np.intp]  #: (n,) group of each point
-    foreseen_mm: Array  #: (g,) about the compression where the plate is foreseen
+    start_mm: Array  #: (g,) predicted compression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -285,7 +284,7 @@ class PlateProblem:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NewtonState:
-    """Where the plate and the columns stand, and how far from balance."""
+    """State of plate and columns, and their imbalance."""
 
     a: Array  # (m,)
     v: Array  # (g,) compression of the columns
@@ -320,7 +319,7 @@ def _first_state(problem: PlateProblem, a: Array) -> NewtonState:
     if columns is None:
         return _evaluate_at(problem, a, _NONE)
     v = np.maximum.reduceat(pressed, columns.starts) + (back - NEAR_LIMIT * limit)
-    v = np.maximum(columns.foreseen_mm, v)
+    v = np.maximum(columns.start_mm, v)
     return _evaluate_at(problem, a, np.minimum(v, NEAR_LIMIT * columns.law.limit_mm))
 
 

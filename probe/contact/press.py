@@ -69,7 +69,7 @@ def press(
     Parameters
     ----------
     surface, sensor, touch
-        What is touched, with what, where and how.
+        Surface, sensor, pose and force.
     accuracy
         "auto" holds `AUTO_ERROR`; a number is the error to hold (0.003: 0.3 %); a name
         takes that level: footprint, tabs, tabs-7, tabs-19, tabs-61, layer, layer-2 ... layer-16,
@@ -203,11 +203,11 @@ def footprint(
     surface
         Heights in the surface frame.
     sensor
-        With tabs the round tips are asked, with a pad the whole squares of the tactels.
+        Tabs are sampled on their round tips, a pad on the whole squares of the tactels.
     touch
-        Pose and force; the wrist is not asked.
+        Pose and force; the wrist has no effect.
     tips
-        How finely the tips are asked; 19 points each without it (a pad: 16).
+        Sampling of the tips; 19 points each by default (a pad: 16).
     depth_mm
         How far below the highest place, against the wrist's tilt, the surface counts; a
         quarter of the overlay's height without it.

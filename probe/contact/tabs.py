@@ -56,7 +56,7 @@ FINER = (61, 217, 817)  # points on a tip, for thin strokes
 BY_CHANCE = 2  # points of a tip that may meet a stroke by chance
 ON_STEP = 0.5  # share of the tabs, at most, that may stand on a step
 CORNER_TABS = 4  # fewer tabs are on a corner, which is sharp for any pattern
-# Turn of the plate under the whole moment, beyond which springs first tell whether it stands.
+# Turn of the plate under the whole moment, beyond which springs are checked first.
 HOPELESS_RAD = 10.0
 MARGIN = 0.1  # of the predicted depth, further down which points are still computed
 CRUSHED = 1.4  # power by which partial cover stiffens more at the usual strains
@@ -75,7 +75,7 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
     touch
         Pose, force and wrist. No force gives an exactly zero image.
     tips
-        How finely the tips are asked, their dome and defects; 19 points each without it.
+        Sampling, dome and defects of the tips; 19 points each by default.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
     heights = heights_under(surface, touch, points) - drop
     stiffness = min(touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad)
     if touch.force_n * sensor.reach_mm > HOPELESS_RAD * stiffness > 0:
-        # Springs tell for any force whether it would turn the plate over.
+        # Linear springs show whether the force would turn the plate over.
         law = Linear(overlay.young_mpa * math.prod(sensor.step_mm) / overlay.height_mm)
         _require_stable(rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, HOPELESS_RAD)
     found, forces = tabs_at_rest(points, heights, overlay, load)
@@ -169,17 +169,17 @@ def tabs_at_rest(
 ) -> tuple[PlateRest, Array]:
     """Return the plate at rest and the force (n,) of each tab; what hangs free is left out.
 
-    The plate's rest is foreseen, and points of (n, q) that lie well below it are not computed.
-    Should one of them touch after all, it is taken in and the plate comes to rest anew.
+    The plate's rest is predicted, and points of (n, q) well below it are not computed. If one of
+    them touches after all, it is taken in and the rest is computed again.
     """
     n, q = heights_mm.shape
     skin, column = tip_laws(overlay, q)
-    foreseen, depth = foreseen_pose(points_mm, heights_mm, overlay, load)
+    predicted, depth = predicted_pose(points_mm, heights_mm, overlay, load)
     points, heights = points_mm.reshape(-1, 2), heights_mm.ravel()
-    pressed = heights - foreseen.heights_mm(points)
+    pressed = heights - predicted.heights_mm(points)
     kept = pressed >= min(-MARGIN * depth, float(pressed.max()))
     if min(load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad) == 0:
-        kept = heights > -math.inf  # whether a free plate stands is for all of them to tell
+        kept = heights > -math.inf  # the hull of all points decides whether a free plate stands
     while True:
         some = np.flatnonzero(kept)
         of_tab = some // q
@@ -187,11 +187,11 @@ def tabs_at_rest(
         first[0] = True
         np.not_equal(of_tab[1:], of_tab[:-1], out=first[1:])
         starts = np.flatnonzero(first)
-        compressed = columns_foreseen(pressed[some], starts, q, overlay)
+        compressed = predicted_columns(pressed[some], starts, q, overlay)
         columns = Columns(column, starts, np.cumsum(first) - 1, compressed)
         found = rest(
             points.take(some, axis=0), heights[some], skin, load,
-            columns=columns, foreseen=foreseen, tolerance=TOLERANCE,
+            columns=columns, start=predicted, tolerance=TOLERANCE,
         )  # fmt: skip
         missed = (heights > found.pose.heights_mm(points)) & ~kept
         if not missed.any():
@@ -231,10 +231,10 @@ def checked_tabs(overlay: Overlay) -> None:
         )
 
 
-def foreseen_pose(
+def predicted_pose(
     points_mm: Array, heights_mm: Array, overlay: Overlay, load: PlateLoad
 ) -> tuple[PlatePose, float]:
-    """Return about where the plate comes to rest, and how deep the tabs are pressed.
+    """Return a prediction of the plate at rest, and of the depth of the tabs.
 
     Some points of each tip stand for all, each a neo-Hookean column of its own, stiffened as
     tips are that are covered in part.
@@ -258,12 +258,12 @@ def foreseen_pose(
     law = NeoHooke(overlay.young_mpa * area / overlay.height_mm, overlay.height_mm)
     z = level.max() - _level_depth(-np.sort(-level[:, some], axis=None), law, load.force_n)
     start = PlatePose(float(z), load.tilt_x_rad, load.tilt_y_rad)
-    found = rest(points, heights, law, load, foreseen=start, tolerance=0.02)
+    found = rest(points, heights, law, load, start=start, tolerance=0.02)
     return found.pose, max(float((heights - found.pose.heights_mm(points)).max()), 0.0)
 
 
 def _level_depth(heights: Array, law: NeoHooke, force_n: float) -> float:
-    """Return about how deep a level plate sinks in on columns of falling heights (n,).
+    """Return the approximate depth of a level plate on columns of falling heights (n,).
 
     The first k are taken at their mean; the next would bear too much.
     """
@@ -288,10 +288,10 @@ def _stretch(stress: float) -> float:
     return stretch
 
 
-def columns_foreseen(
+def predicted_columns(
     pressed: Array, starts: NDArray[np.intp], points: int, overlay: Overlay
 ) -> Array:
-    """Return about the compression of the columns behind skins that are pressed so deep.
+    """Return the approximate compression of the columns behind skins pressed to a depth.
 
     Exact for tips covered at one height in the limits of small and of large strain.
     """

@@ -1,4 +1,4 @@
-"""Where the tips of the overlay are asked for contact: a few points on each. Thesis 4.2.
+"""Sample points on the tips of the overlay. Thesis 4.2.
 
 SensorType + `Tips` -> points (rows * columns, q, 2) in the sensor frame and the depth of each
 below the highest place of its tip. A round tip carries rings of points of equal share (7, 19,
@@ -26,7 +26,7 @@ _GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tips:
-    """What is known of the tips beyond the sensor's drawing, and how finely they are asked."""
+    """Sampling and defects of the tips."""
 
     points: int = 19  #: on each tip, one of `NUMBERS`
     dome_mm: float = 0.0  #: how far the rim of a round tip lies below its middle
@@ -35,12 +35,12 @@ class Tips:
 
 
 def tip_points(sensor: SensorType, tips: Tips) -> tuple[Array, Array]:
-    """Return where the tips are asked, and how deep these places lie.
+    """Return the sample points of the tips, and their depths.
 
     Parameters
     ----------
     sensor
-        Its overlay tells round tips of tabs from the squares of a pad.
+        Tabs have round tips, a pad the squares of its tactels.
     tips
         Number of points, dome and defects.
 

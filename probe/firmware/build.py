@@ -1,7 +1,7 @@
 """Build the firmware and its emulator with make, each once.
 
 A build is kept in the user's cache folder under a name made of its sources and settings, so
-that a change of either builds anew, and two programmes that build at the same time do no harm.
+that a change of either makes a new build, and two programmes may build at the same time.
 """
 
 from __future__ import annotations

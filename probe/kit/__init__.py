@@ -4,12 +4,10 @@ Sensor type -> printable parts (mould, housing, cap, coupon), parts list, wiring
 
 ::
 
-    sizes       what the parts measure, from the sensor type and from settings
-    model       sizes -> solids of the CAD kernel
-    mesh        solid -> STEP text and triangles, checked
+    sizes       lengths of the parts
+    model       sizes -> solids of the CAD kernel, STEP text and triangles, checked
     coupon      a small encoded plate for the first touch
-    board       what is soldered, and the wiring picture
-    tolerances  what a dimension costs in reading, measured
-    sheet       casting and assembly, parts list: one page
-    make        all of it into a folder
+    board       electric parts, and the wiring picture
+    sheet       casting and assembly, parts list, tolerances: one page
+    make        all of it into a folder, with an encoded coupon for the first touch
 """

@@ -1,4 +1,4 @@
-"""What is bought and soldered: parts list, connections, wiring picture.
+"""Board of the probe: parts list, connections, wiring picture.
 
 Rows are driven by shift registers, columns read through a multiplexer and a load resistor: the
 grounded board of `probe/firmware/README.md`. It has 16 x 16 lines at most; larger matrices are read
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from html import escape
 
 from encoded_objects.base.sensor_type import SensorType
+from probe.kit import sizes
 from probe.kit.sizes import KitSizes
 
 LINES_MAX = 16  #: rows or columns of the board
@@ -37,7 +38,7 @@ def has_board(sensor: SensorType) -> bool:
 
 
 def electric_items(sensor: SensorType) -> list[Item]:
-    """Return what stands on the board."""
+    """Return the parts of the board."""
     if not has_board(sensor):
         return []
     registers = math.ceil(sensor.rows / 8)
@@ -57,17 +58,17 @@ def electric_items(sensor: SensorType) -> list[Item]:
 
 
 def mechanical_items(k: KitSizes) -> list[Item]:
-    """Return what holds the probe together and shapes the overlay."""
+    """Return the mechanical parts and the material of the overlay."""
     overlay, litres = k.sensor.overlay, 1.3 * k.silicone_mm3 / 1000
     shore = shore_a(overlay.young_mpa)
     found = [
         Item("two-part silicone", f"Shore A {shore:.0f} (E = {overlay.young_mpa:g} MPa)",
              f"{litres:.1f} ml", "the overlay, a third more than it holds"),
         Item("release spray for silicone", "", "a little", "mould"),
-        Item("dowel pin", f"{k.settings.pin_mm:g} x 20 mm", "2", "mould"),
+        Item("dowel pin", f"{sizes.PIN_MM:g} x 20 mm", "2", "mould"),
         Item("screw and nut", "M3 x 25", "4", "mould"),
         Item("screw", "M3 x 30, socket head, with nut", "4", "frame, body, adapter"),
-        Item("foam sheet", f"EVA, {k.settings.foam_mm:g} mm",
+        Item("foam sheet", f"EVA, {sizes.FOAM_MM:g} mm",
              f"{2 * k.sensor.half_mm[0]:.0f} x {2 * k.sensor.half_mm[1]:.0f} mm",
              "under the foot of the cap"),
         Item("screw", "M6 x 16, socket head", "4", "robot flange ISO 9409-1-50-4-M6"),
@@ -158,7 +159,7 @@ class _Drawing:
         self.lines: list[str] = []
 
     def part(self, name: str, pins: list[tuple[str, str]]) -> None:
-        """Draw a box with its pins, those with a rail beside them by its name."""
+        """Draw a box with its pins, with the names of their rails."""
         x = _COLUMNS_PX[name]
         y = self.next.get(x, 30)
         right = [pin for pin in pins if _stands_right(name, pin[0])]

@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
-import typer
-
-from encoded_objects.base import console
-from encoded_objects.base.console import Action
+from encoded_objects.base import console, output
+from encoded_objects.base.errors import UsageError
+from encoded_objects.base.options import Argument, Json, Option, command
 from encoded_objects.base.output import progress_bar
 
 if TYPE_CHECKING:
@@ -41,47 +40,33 @@ def run(arguments: list[str]) -> int:
     return console.run(NAME, lambda _arguments: app, arguments)
 
 
-@app.command(help=HELP, epilog=EPILOG)
+@command(app, help=HELP, epilog=EPILOG, version_of=NAME)
 def kit(
     sensor_type: Annotated[
-        str, typer.Argument(metavar="TYPE", show_default=False,
-                            help="A name that probe-sensor types lists, or a file."),
+        str, Argument("A name that probe-sensor types lists, or a file.", "TYPE")
     ] = "",
     folder: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the files."),
+        Path, Option("Folder for the files.", "DIR", names=("-o", "--output"))
     ] = Path("kit"),
     verify: Annotated[
-        bool, typer.Option("--verify", help="Read every part back and prove it (needs the mesh "
-                                            "extra too)."),
+        bool, Option("Read every part back and prove it (needs the mesh extra too).")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout, also for errors."),
-    ] = False,
-    version: Annotated[bool, typer.Option("--version", help="Say which version this is.")] = False,
-) -> Action:  # fmt: skip
+    as_json: Json = False,
+) -> int:
     """Make the kit."""
+    if not sensor_type:
+        raise UsageError("no sensor type is named: probe-sensor types lists them")
+    from encoded_objects.base.sensor_type_file import sensor_type_named
+    from probe.kit.make import make_kit
 
-    def action() -> int:
-        from encoded_objects.base import output
-
-        if version:
-            output.version(NAME, as_json=as_json)
-            return console.DONE
-        if not sensor_type:
-            raise typer.BadParameter("no sensor type is named: probe-sensor types lists them")
-        from encoded_objects.base.sensor_type_file import sensor_type_named
-        from probe.kit.make import make_kit
-
-        with progress_bar("reading", 1) as bar:
-            made = make_kit(sensor_type_named(sensor_type), folder, verify=verify,
-                            progress=lambda what, share: bar.show(share, label=what))  # fmt: skip
-        if as_json:
-            output.write_json(_json(made))
-        else:
-            output.write(_text(made))
-        return console.DONE
-
-    return action
+    with progress_bar("reading", 1) as bar:
+        made = make_kit(sensor_type_named(sensor_type), folder, verify=verify,
+                        progress=lambda what, share: bar.show(share, label=what))  # fmt: skip
+    if as_json:
+        output.write_json(_json(made))
+    else:
+        output.write(_text(made))
+    return console.DONE
 
 
 def _text(made: Kit) -> str:

@@ -2,7 +2,7 @@
 
 Its lab has a key of its own, the same for everybody: every coupon of a type is alike, and is found
 in `coupon.db` alone. A lab's own parts are made in the lab's own database. The same type gives the
-same bytes of both, so a coupon does not tell when it was made.
+same bytes of both, so the time in a coupon is a fixed one.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from pathlib import Path
 
 from generator.cad.encode import encode
 from generator.solid import Part
-from probe.kit.sizes import KitSizes
+from probe.kit.sizes import COUPON_MM, KitSizes
 
 KEY = "V2DC-7EWP-B45S-77XC"  #: of the lab of all coupons
 NAME, DATABASE = "Coupon", "coupon.db"
-UNDATED = "1980-01-01T00:00:00+00:00"  #: when every coupon says it was made, as in its 3MF
+UNDATED = "1980-01-01T00:00:00+00:00"  #: time of making in every coupon, as in its 3MF
 
 
 @dataclass(frozen=True, slots=True)
 class Coupon:
-    """A plate that is printed, and what it is registered as."""
+    """A printed plate, and its registration."""
 
     part: Part
     face: str
@@ -43,7 +43,7 @@ def make_coupon(k: KitSizes, pitch_mm: float, printer: str, database: Path) -> C
     pitch_mm
         Of its symbols.
     printer
-        That makes them.
+        Of the plate.
     database
         File for it.
     """
@@ -51,7 +51,7 @@ def make_coupon(k: KitSizes, pitch_mm: float, printer: str, database: Path) -> C
 
     side = k.coupon_mm
     made = encode(
-        Box(side, side, k.settings.coupon_mm),
+        Box(side, side, COUPON_MM),
         name=NAME,
         database=str(database),
         folder=database.parent,
@@ -66,7 +66,7 @@ def make_coupon(k: KitSizes, pitch_mm: float, printer: str, database: Path) -> C
 
 
 def _undate(database: Path) -> None:
-    """Put the same time into every coupon's database, and nothing of what stood there before."""
+    """Put the same time into every coupon's database, and erase the earlier one."""
     with closing(sqlite3.connect(database)) as connection:
         with connection:
             connection.execute("UPDATE provenance SET utc = ?", (UNDATED,))

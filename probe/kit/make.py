@@ -31,9 +31,7 @@ from probe.kit.board import (
     wiring_svg,
 )
 from probe.kit.coupon import DATABASE, Coupon, make_coupon
-from probe.kit.mesh import KitPartReport, check_part, mesh_of, step_text
-from probe.kit.model import PARTS
-from probe.kit.settings import KIT
+from probe.kit.model import PARTS, KitPartReport, check_part, mesh_of, step_text
 from probe.kit.sheet import FILAMENT, RESIN, PrintedPart, sheet_html
 from probe.kit.sizes import KitSizes, kit_sizes
 
@@ -85,13 +83,13 @@ def make_kit(
     pitch = sensor.symbol_pitch_mm
     k = kit_sizes(sensor, pitch)
     parts, meshes, reports = [], [], []
-    with Staging(folder) as staging, tempfile.TemporaryDirectory() as beside:
+    with Staging(folder) as staging, tempfile.TemporaryDirectory() as scratch:
         for number, (name, (what, model, resin)) in enumerate(PARTS.items()):
             progress(name, number / (len(PARTS) + 1))
             if not _is_needed(name, k):
                 continue
             solid = model(k)
-            mesh = mesh_of(solid, KIT)
+            mesh = mesh_of(solid)
             step = staging.write(f"{name}.step", step_text(solid, name))
             stl = staging.write(f"{name}.stl", stl_chunks(mesh))
             if verify:
@@ -101,7 +99,7 @@ def make_kit(
             parts.append(PrintedPart(name, what, (x, y, z), float(solid.volume), resin))
             meshes.append((name, mesh, resin))
         progress("coupon", len(PARTS) / (len(PARTS) + 1))
-        database = Path(beside) / DATABASE
+        database = Path(scratch) / DATABASE
         coupon = make_coupon(k, pitch, RESIN if pitch < FINE_MM else FILAMENT, database)
         staging.write("coupon.step", step_chunks(coupon.part))
         staging.write("coupon.stl", stl_chunks(triangles(coupon.part)))

@@ -1,9 +1,13 @@
-"""A FlexiTac board: its images out of a serial line, told on as a probe would.
+"""A FlexiTac board: its images out of a serial line, as packets of a probe.
 
 On its wire an image is AA 55 and a byte for each tactel, row after row, without check sum,
-number or time, at 2 Mbaud. Numbers are counted here, times are the host's. Where an image
-begins is found by `MarkedImages`. Written from the protocol; its own client, `flexitac` 0.3.1,
-is what the tests compare with.
+number or time, at 2 Mbaud. Numbers are counted here, times are the host's. Written from the
+protocol; its own client, `flexitac` 0.3.1, is what the tests compare with.
+
+The marker AA 55 may stand inside an image too. The length of an image and the pauses of the line
+tell where it begins: markers stand an image apart, and a board pauses between images. Where only
+one distance in the stream bears a marker every time it is the true one; where an image that does
+not change holds the marker too, the one nearest to the pauses counts.
 """
 
 from __future__ import annotations
@@ -16,12 +20,15 @@ from encoded_objects.base.sensor_type import SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.port.address import Address, Port, refuse_unknown
 from probe.port.commanded import CommandedProbe
-from probe.port.marked import MarkedImages
 from probe.port.serial_line import open_line
 from probe.port.url import USUAL_TYPES
 from probe.protocol import FramePacket, IdentPacket, encode
 
 BAUD = 2_000_000
+MARKER = b"\xaa\x55"
+PAUSE_LEAST_S = 0.5e-3  #: quiet line that counts as a pause between images
+_MARKED_IMAGES = 4  #: markers an image apart by which it is known where images begin
+_PAUSES = 8  #: the last ones that are remembered
 
 
 def open_flexitac(address: Address) -> Port:
@@ -97,3 +104,77 @@ class FlexiTacPort(CommandedProbe):
             self._seq += 1
         self.sent += len(packets)
         return packets
+
+
+class MarkedImages:
+    """Images out of a stream; nothing is passed on whose next marker has not come.
+
+    Parameters
+    ----------
+    length
+        Bytes of an image, without its marker.
+    """
+
+    def __init__(self, length: int) -> None:
+        self.sure = False  #: whether it is known where images begin
+        self.lost = 0  #: bytes that belonged to no image
+        self._step = len(MARKER) + length
+        self._rest = bytearray()
+        self._at = 0  # bytes that left `_rest`
+        self._paused: list[int] = []  # where in the stream the line began again after a pause
+
+    def feed(self, data: bytes, *, quiet_s: float = 0.0) -> list[bytes]:
+        """Return the images that `data` completes.
+
+        Parameters
+        ----------
+        quiet_s
+            How long the line was seen empty before the first byte of `data`.
+        """
+        if data and quiet_s >= PAUSE_LEAST_S:
+            self._paused = [*self._paused[1 - _PAUSES :], self._at + len(self._rest)]
+        self._rest += data
+        images: list[bytes] = []
+        while self.sure or self._find():
+            if len(self._rest) < self._step + len(MARKER):
+                break
+            if self._marked(self._step):
+                images.append(bytes(self._rest[len(MARKER) : self._step]))
+                self._take(self._step)
+                continue
+            self.sure = False  # bytes of this image were lost, or came in between
+            self._drop(len(MARKER))
+        return images
+
+    def _find(self) -> bool:
+        """Go to where an image begins, and tell whether that is known."""
+        needed = (_MARKED_IMAGES + 1) * self._step + len(MARKER)  # for a start at any place
+        while len(self._rest) >= needed:
+            starts = [at for at in range(self._step) if self._marked_always(at)]
+            if len(starts) > 1 and self._paused:
+                starts = [min(starts, key=self._from_pause)]
+            if len(starts) == 1:
+                self._drop(starts[0])
+                self.sure = True
+                return True
+            self._drop(self._step)
+        return False
+
+    def _marked_always(self, at: int) -> bool:
+        return all(self._marked(at + k * self._step) for k in range(_MARKED_IMAGES))
+
+    def _marked(self, at: int) -> bool:
+        return self._rest[at : at + len(MARKER)] == MARKER
+
+    def _from_pause(self, at: int) -> int:
+        """Return how many bytes a place lies from where the line pauses, image by image."""
+        away = [(self._at + at - pause) % self._step for pause in self._paused]
+        return sum(min(a, self._step - a) for a in away)
+
+    def _drop(self, number: int) -> None:
+        self.lost += number
+        self._take(number)
+
+    def _take(self, number: int) -> None:
+        self._at += number
+        del self._rest[:number]

@@ -11,9 +11,10 @@ from dataclasses import replace
 
 from probe.frame import Frame
 from probe.port.address import Address, Port, number, refuse_unknown
-from probe.port.settings import PORT
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
+
+_PAUSE_NS = 10_000_000  #: between the end of a recording and its repetition
 
 
 def open_recording(address: Address) -> Port:
@@ -57,4 +58,4 @@ def endless_frames(opened: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
             yield last
         if first is None or last is None:
             return
-        seq, t_ns = last.seq + 1, last.t_ns + PORT.pause_ns
+        seq, t_ns = last.seq + 1, last.t_ns + _PAUSE_NS

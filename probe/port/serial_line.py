@@ -19,9 +19,10 @@ import serial
 from probe.errors import PortError
 from probe.port.address import Address, Port, number, refuse_unknown
 from probe.port.listing import list_ports
-from probe.port.settings import PORT
 
 _CHUNK = 65536
+_BAUD = 1_000_000  #: where the address names none
+_WRITE_TIMEOUT_S = 1.0  #: a line that takes no byte for so long is broken
 
 
 def open_serial(address: Address) -> Port:
@@ -33,7 +34,7 @@ def open_serial(address: Address) -> Port:
         When it is not there, busy, forbidden, or cannot run at this baud rate.
     """
     refuse_unknown(address, ("baud",))
-    return open_line(address, int(number(address, "baud", PORT.baud, least=1)))
+    return open_line(address, int(number(address, "baud", _BAUD, least=1)))
 
 
 def open_line(address: Address, baud: int) -> SerialLine:
@@ -43,7 +44,7 @@ def open_line(address: Address, baud: int) -> SerialLine:
             address.target,
             baud,
             timeout=0,
-            write_timeout=PORT.write_timeout_s,
+            write_timeout=_WRITE_TIMEOUT_S,
             exclusive=True,
         )
         line.reset_input_buffer()

@@ -15,8 +15,11 @@ import numpy as np
 
 from probe.frame import Frame
 from probe.port.commanded import CommandedProbe
-from probe.port.settings import PORT
 from probe.protocol import FramePacket, IdentPacket, encode
+
+_BATCH = 64  #: packets of one read at most
+_LATE_S = 0.5  #: a reader later than that makes the device wait
+_STEP_NS = 500_000_000  #: longest time between frames that needs no announcement
 
 
 class SoftwareProbe(CommandedProbe):
@@ -63,7 +66,7 @@ class SoftwareProbe(CommandedProbe):
         return b"".join(self._ready(time.monotonic()))
 
     def begin(self) -> None:
-        """Let the device's clock begin anew."""
+        """Let the device's clock begin at zero."""
         self._origin_s = 0.0
 
     def now(self) -> tuple[int, int]:
@@ -80,13 +83,13 @@ class SoftwareProbe(CommandedProbe):
         late_s = now_s - (self._origin_s + shown_s)
         if not self._origin_s:
             self._origin_s = now_s - shown_s
-        elif late_s > PORT.late_s:
+        elif late_s > _LATE_S:
             self._origin_s += late_s
             self.waits += 1
         return self._origin_s + shown_s
 
     def _ready(self, now_s: float) -> Iterator[bytes]:
-        for _ in range(PORT.batch):
+        for _ in range(_BATCH):
             if not (self.streaming or self.wanted):
                 return
             try:
@@ -113,7 +116,7 @@ class SoftwareProbe(CommandedProbe):
         if self._last is None:
             return False
         steps, step_ns = frame.seq - self._last.seq, frame.t_ns - self._last.t_ns
-        return steps != 1 or not 0 <= step_ns <= PORT.step_ns
+        return steps != 1 or not 0 <= step_ns <= _STEP_NS
 
     def _packed(self, frame: Frame) -> FramePacket:
         counts, byte_wide = frame.counts, self.ident.bits == 8

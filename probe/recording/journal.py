@@ -252,8 +252,9 @@ def _is_whole(records: NDArray[Any]) -> bool:
 
 def _sums(records: NDArray[Any]) -> NDArray[np.uint32]:
     """Return the CRC-32 of each record."""
-    rows = np.frombuffer(records, np.uint8).reshape(len(records), -1)[:, :-4]
-    return np.array([zlib.crc32(row) for row in rows], np.uint32)
+    data, size = memoryview(records.tobytes()), records.dtype.itemsize
+    ends = range(size - 4, len(data), size)
+    return np.array([zlib.crc32(data[end + 4 - size : end]) for end in ends], np.uint32)
 
 
 def _head(origin: RecordingOrigin, piece: int, shape: tuple[int, int]) -> bytes:

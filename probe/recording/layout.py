@@ -56,7 +56,7 @@ class RecordingOrigin:
     sensor: str = ""  #: ident of the probe, or what was simulated
     calibration: str = ""  #: hash of the calibration file; empty: none
     units: str = "counts"
-    sensor_type: str = ""  #: as YAML, `sensor_type_text`; empty: not told
+    sensor_type: str = ""  #: as YAML, `sensor_type_text`; empty: not known
     more: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
 
@@ -168,6 +168,8 @@ class FrameFile:
     a value is no count, time, number or pose."""
 
     def blocks(self) -> Iterator[FrameBlock]:
-        """Yield the blocks that were compressed or written together; see `read`."""
-        for start in range(0, self.frames, CHUNK):
-            yield self.read(start, min(start + CHUNK, self.frames))
+        """Yield all frames, many whole chunks at a time; see `read`."""
+        tactels = self.shape[0] * self.shape[1]
+        size = CHUNK * max(1, min(16, (1 << 24) // (CHUNK * tactels)))
+        for start in range(0, self.frames, size):
+            yield self.read(start, min(start + size, self.frames))

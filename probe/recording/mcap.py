@@ -232,7 +232,7 @@ def _messages(path: Path, kinds: Collection[str]) -> Iterator[tuple[str, Any]]:
     """Yield type and content of the messages of some types.
 
     Of a file with `TouchFrame` messages poses are left out, for these hold them, and the rest comes
-    as it was written: times of a probe may begin anew.
+    as it was written: the clock of a probe may restart.
     """
     from mcap.exceptions import McapError
     from mcap.reader import make_reader

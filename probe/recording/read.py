@@ -55,6 +55,7 @@ class Recording:
     Examples
     --------
     >>> import tempfile
+    >>> import numpy as np
     >>> from probe.frame import frame_from
     >>> from probe.recording.record import Recorder
     >>> path = Path(tempfile.mkdtemp()) / "touch.h5"

@@ -59,6 +59,7 @@ class Recorder:
     Examples
     --------
     >>> import tempfile
+    >>> import numpy as np
     >>> from probe.frame import frame_from
     >>> path = Path(tempfile.mkdtemp()) / "touch.h5"
     >>> with Recorder(path, sensor="bench 1") as recorder:
@@ -120,7 +121,7 @@ class Recorder:
             self._piece_began_ns = frame.t_ns
         elif not 0 <= frame.t_ns - self._piece_began_ns < self._roll_over_ns:
             self.flush()
-            if frame.t_ns > self._piece_began_ns:  # or else the clock of the probe began anew
+            if frame.t_ns > self._piece_began_ns:  # or else the clock of the probe restarted
                 self._finish(last=False)
                 self._journal = self._next_journal()
             self._piece_began_ns = frame.t_ns

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from probe.errors import ContactError
-from probe.scan.settings import TOUCH_PATH
 
+_SHORT = 0.7  #: share of the step that the stiffness so far would ask for
 Reason = Literal["contact", "no contact", "force limit", "travel limit", "too stiff"]
 
 
@@ -111,7 +111,7 @@ def _advance_travel(
     step = limits.step_mm
     if low[1] >= limits.felt_n:
         stiffness = (low[1] - before[1]) / max(low[0] - before[0], limits.finest_mm)
-        wanted = TOUCH_PATH.short * (limits.force_n - low[1])
+        wanted = _SHORT * (limits.force_n - low[1])
         step = min(step, wanted / stiffness) if stiffness > 0 else step / 4
     return min(low[0] + max(step, limits.finest_mm), limits.travel_mm)
 

@@ -3,7 +3,7 @@
 Commanded poses of the sensor -> joint angles -> believed and true poses, with the covariance
 that belongs to the errors. The encoders sit before the gears: what the arm believes is what
 was commanded. A joint follows its motor only when the play is used up, so its error depends
-on the way it came; on top there is noise, anew for each touch. The thesis's reason for
+on the way it came; on top there is noise, drawn for each touch. The thesis's reason for
 correlating images: touches are placed by these beliefs.
 """
 
@@ -15,11 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from probe.arm.carried import sensor_pose
-from probe.arm.inverse import inverse
-from probe.arm.links import AXES, Arm, forward
+from probe.arm import AXES, Arm, forward, inverse, sensor_pose
 from probe.errors import PoseError
-from probe.wrist.geometry import Wrist, WristPose, gripper_to_plate, plate_to_sensor
+from probe.wrist import Wrist, WristPose, gripper_to_plate, plate_to_sensor
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +39,7 @@ class ArmPath:
 
     believed: NDArray[np.float64]  #: (n, 4, 4) T_base_sensor, mm
     true: NDArray[np.float64]  #: (n, 4, 4) T_base_sensor, mm
-    covariance: NDArray[np.float64]  #: (n, 6, 6) of true about believed, as in `probe.arm.carried`
+    covariance: NDArray[np.float64]  #: (n, 6, 6) of true about believed, as in `probe.arm`
     angles_rad: NDArray[np.float64]  #: (n, 5) as commanded
     true_angles_rad: NDArray[np.float64]  #: (n, 5)
 

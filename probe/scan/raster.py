@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.errors import SurfaceError
-from probe.scan.settings import TOUCH_PATH
+
+STEP_TACTELS = 4.25  #: between neighbours, which then share three quarters
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,7 @@ def raster(
     loops: Sequence[ArrayLike],
     sensor: SensorType | None = None,
     *,
-    step_tactels: float = TOUCH_PATH.step_tactels,
+    step_tactels: float = STEP_TACTELS,
     theta_rad: float = 0.0,
     least_cover: float = 0.1,
 ) -> RasterPlan:

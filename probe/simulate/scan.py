@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm.links import Arm
+from probe.arm import Arm
 from probe.contact.contract import Contact, Touch
 from probe.errors import SurfaceError
 from probe.scan.approach import ApproachLimits, guarded_approach
@@ -25,9 +25,7 @@ from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.simulate.scene import Scene
 from probe.simulate.touch import pose_of
-from probe.wrist.distances import counts_of, distances_at
-from probe.wrist.geometry import Wrist
-from probe.wrist.springs import pose_under_load, stiffness
+from probe.wrist import Wrist, counts_of, distances_at, pose_under_load, stiffness
 
 Array = NDArray[np.float64]
 ScanKind = Literal["raster", "kinesthetic"]
@@ -120,7 +118,7 @@ def scan_path(
     PoseError
         When the arm does not reach.
     ContactError
-        When the force cannot be felt.
+        When the force cannot be measured.
     """
     way = raster(scene.region.loops(), sensor, theta_rad=theta_rad).there_and_back(LEAST_COVER)
     if most is not None and most < len(way):

@@ -1,4 +1,4 @@
-"""What is touched: a height over a plane, asked only where somebody wants to know.
+"""Surfaces: a height over a plane, evaluated at points.
 
 Surface frame: a plane near the touched material, z out of it; for a part's face it is the
 face frame (origin at the face's first vertex, x along its first edge). The sensor looks
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 
 class HeightMap(Protocol):
-    """A height field. Asking costs what is asked: n points, not the whole face."""
+    """A height field. Cost is per point, not per face."""
 
     @property
     def top_mm(self) -> float:

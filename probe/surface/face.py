@@ -14,7 +14,7 @@ and the cell in column c and row r, counted from the anchor, has its centre at
 u = (c + 1/2) p, v = -(r + 1/2) p. Cost is per point, not per symbol: `HeightTemplate` cuts one
 cell into fine square bins. A bin that no edge of the symbol crosses lies under one planar piece;
 the table names that piece, and the height is its plane's, exact. The few bins that an edge crosses
-ask `SymbolReliefs`. No interpolation anywhere. A bin is filled when it is first asked.
+ask `SymbolReliefs`. No interpolation anywhere. A bin is filled at its first use.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class FaceSurface:
 
     @property
     def top_mm(self) -> float:
-        """The tops of the symbols, or what rises above them beside the face."""
+        """The tops of the symbols, or of higher neighbours."""
         own = self.lattice.top_mm if self.lattice else 0.0
         return max(own, self.around.top_mm) if self.around else own
 
@@ -64,8 +64,8 @@ class FaceSurface:
             heights[inside] = self._own(points_mm[inside])
         if self.around is not None:
             # Only what leans over the face can be higher than it.
-            asked = slice(None) if self.around.top_mm > 0 else np.flatnonzero(~inside)
-            heights[asked] = np.maximum(heights[asked], self.around.heights_mm(points_mm[asked]))
+            some = slice(None) if self.around.top_mm > 0 else np.flatnonzero(~inside)
+            heights[some] = np.maximum(heights[some], self.around.heights_mm(points_mm[some]))
         return heights
 
     def _own(self, points: Array) -> Array:
@@ -110,7 +110,7 @@ LabelAt = Callable[[Index, Index], Index]
 
 @dataclass(frozen=True, eq=False)
 class LatticeSurface:
-    """Where symbols stand on a plane."""
+    """Symbols on a plane."""
 
     template: HeightTemplate
     label_at: LabelAt
@@ -137,7 +137,7 @@ class LatticeSurface:
 
     @cached_property
     def _to_cells(self) -> tuple[Array, Array]:
-        """Return what takes face points to columns and rows: matrix (2, 2) and shift (2,)."""
+        """Return matrix (2, 2) and shift (2,) from face points to columns and rows."""
         c, s, p = math.cos(self.rotation_rad), math.sin(self.rotation_rad), self.template.pitch_mm
         turn = np.array([[c, -s], [-s, -c]]) / p
         return turn, np.array([self.x_mm, -self.y_mm]) / p
@@ -201,7 +201,7 @@ def tile_lookup(labels: ArrayLike) -> LabelAt:
 
 
 def call_lookup(label: Callable[[Index, Index], ArrayLike]) -> LabelAt:
-    """Return the look-up of an array that is a function; it is asked once for each cell in view.
+    """Return the look-up of an array that is a function; it is called once for each cell in view.
 
     Parameters
     ----------
@@ -263,9 +263,9 @@ class HeightTemplate:
         sloped = np.flatnonzero(piece > 1)
         b, c = self.planes[piece[sloped], 1:].T
         z[sloped] += b * self._x(right[sloped]) + c * self._y(down[sloped])
-        asked = np.flatnonzero(piece == _CROSSED)
-        x, y = self._x(right[asked]), self._y(down[asked])
-        z[asked] = self.symbols.heights_mm(labels[asked], x, y)
+        some = np.flatnonzero(piece == _CROSSED)
+        x, y = self._x(right[some]), self._y(down[some])
+        z[some] = self.symbols.heights_mm(labels[some], x, y)
         return z
 
     def _look_into(self, cell: Index) -> NDArray[np.int16]:
@@ -303,9 +303,9 @@ def template(symbols: SymbolReliefs, pitch_mm: float) -> HeightTemplate:
             fix="take a larger pitch, or thinner strokes",
         )
     foot, count = symbols.foot_half_mm, len(symbols.rings)
-    beside = np.abs(pitch_mm * _middles()) > foot + pitch_mm / BINS
+    outside = np.abs(pitch_mm * _middles()) > foot + pitch_mm / BINS
     table = np.full((count + 1, BINS, BINS), _OPEN, dtype=np.int16)
-    table[:, beside] = table[:, :, beside] = 0
+    table[:, outside] = table[:, :, outside] = 0
     table[count] = 0  # of label -1
     planes, first = [symbols.planes(0)[:2]], np.zeros(count, dtype=np.int64)
     for label in range(count):

@@ -2,7 +2,7 @@
 
 Every one stands with its highest level at z = 0 (the rough one has its mean there), its
 centre at the origin, and matter on the closed set, so a point on an outline is touched.
-Beside it the height is `floor_mm`, by default -inf: nothing. A touch moves and turns them.
+Around it the height is `floor_mm`, by default -inf: nothing. A touch moves and turns them.
 Thesis 4.2, figures 4.9 and 4.10 (the washer).
 """
 
@@ -75,7 +75,7 @@ class RaisedStrip(_TopAtZero):
     floor_mm: float = -math.inf
 
     def heights_mm(self, points_mm: Array) -> Array:
-        """Return 0 on the bar and the floor beside it."""
+        """Return 0 on the bar and the floor around it."""
         x, y = np.abs(points_mm).T
         return np.where((x <= self.width_mm / 2) & (y <= self.length_mm / 2), 0.0, self.floor_mm)
 
@@ -89,7 +89,7 @@ class Cross(_TopAtZero):
     floor_mm: float = -math.inf
 
     def heights_mm(self, points_mm: Array) -> Array:
-        """Return 0 on the bars and the floor beside them."""
+        """Return 0 on the bars and the floor around them."""
         away = np.abs(points_mm)
         near, far = away.min(axis=1), away.max(axis=1)
         on = (near <= self.width_mm / 2) & (far <= max(self.length_mm, self.width_mm) / 2)
@@ -105,7 +105,7 @@ class Washer(_TopAtZero):
     floor_mm: float = -math.inf
 
     def heights_mm(self, points_mm: Array) -> Array:
-        """Return 0 on the ring and the floor beside it."""
+        """Return 0 on the ring and the floor around it."""
         square = np.einsum("ij,ij->i", points_mm, points_mm)
         on = (square <= (self.outer_mm / 2) ** 2) & (square >= (self.inner_mm / 2) ** 2)
         return np.where(on, 0.0, self.floor_mm)

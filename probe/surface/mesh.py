@@ -48,7 +48,7 @@ class MeshSurface:
         return float(self.corners[:, :, 2].max())
 
     def heights_mm(self, points_mm: Array) -> Array:
-        """Return the height of the highest triangle over points (n, 2); -inf beside all."""
+        """Return the height of the highest triangle over points (n, 2); -inf off the mesh."""
         bins, triangles = self.bins, self._triangles
         points = np.ascontiguousarray(points_mm, np.float64)
         heights = np.empty(len(points))

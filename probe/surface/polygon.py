@@ -18,7 +18,7 @@ from probe.errors import SurfaceError
 Array = NDArray[np.float64]
 
 ON_EDGE = 1e-12  # share of the size that counts as on an edge
-_BLOCK = 1 << 20  # pairs of points and edges looked at together
+_BLOCK = 1 << 20  # pairs of points and edges at once
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -37,7 +37,7 @@ FAR_MM = 1e9  # support of an edge that is not there
 
 @dataclass(frozen=True, slots=True)
 class Relief:
-    """How symbols stand on a face."""
+    """Height and sides of symbols."""
 
     height_mm: float = 1.0
     stroke_mm: float = 1.4  #: width at the top, before the chamfer
@@ -76,7 +76,7 @@ class SymbolReliefs:
         return max(float(np.abs(ring.moved(foot)).max()) for rings in self.rings for ring in rings)
 
     def heights_mm(self, labels: Index, x: Array, y: Array) -> Array:
-        """Return the height of a point each (n,) over the face; 0 beside the symbol."""
+        """Return the height of a point each (n,) over the face; 0 off the symbol."""
         return self.pieces(labels, x, y)[1]
 
     def pieces(self, labels: Index, x: Array, y: Array) -> tuple[Index, Array]:

@@ -1,4 +1,4 @@
-"""Touches of a recording -> how the print under each of them is stretched."""
+"""Touches of a recording -> strain and stroke width of the print under each."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.calibration import Calibration
-from recognizer.as_built.estimate import FeltPrint
+from recognizer.as_built.estimate import MeasuredPrint
 from recognizer.errors import AsBuiltError
 from recognizer.touch.evidence import VerifiedHypothesis
 from recognizer.touch.lab import EncodedFace
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import read_touch
 from recognizer.touch.source import TouchImage
@@ -23,29 +24,33 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def feel_prints(
+#: Options of a reader that accepts prints farther off than usual.
+WIDE_SCALE = ReaderOptions(scale_sd=0.04, scale_most=0.12)
+
+
+def measure_prints(
     reader: Reader,
     touches: Iterable[TouchImage],
     *,
     calibration: Calibration | None = None,
     place: str = "",
-) -> tuple[FeltPrint, ...]:
-    """Return how every touch that is recognised felt the print.
+) -> tuple[MeasuredPrint, ...]:
+    """Return the print under every touch that is recognised.
 
     Parameters
     ----------
     reader
-        With the options `WIDE_SCALE`, so that a print far off is read too.
+        With the options `WIDE_SCALE`, which read prints far off, too.
     place
         Of the touches, for messages.
 
     Raises
     ------
     AsBuiltError
-        Nothing is recognised, or several objects are; or only round faces, whose stretch a touch
-        does not tell from their bend.
+        Nothing is recognised, or several objects are; or only round faces, whose strain cannot be
+        separated from their curvature.
     """
-    found: list[FeltPrint] = []
+    found: list[MeasuredPrint] = []
     reasons: Counter[str] = Counter()
     for touch in touches:
         signal = reader.signal(touch.counts, calibration=calibration)
@@ -83,7 +88,7 @@ def feel_prints(
 
 def _fit_print(
     verified: VerifiedHypothesis, face: EncodedFace, T_part_face: Array, seq: int
-) -> FeltPrint:
+) -> MeasuredPrint:
     fit = verified.fit
     lattice = fit_stretch(verified.image, fit.pose, fit.gain, verified.labels_at)
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
@@ -94,7 +99,7 @@ def _fit_print(
         [s * s, c * c, -2 * c * s],
         [-c * s, c * s, c * c - s * s],
     ]
-    return FeltPrint(
+    return MeasuredPrint(
         seq=seq,
         object=face.object,
         face=face.face,

@@ -4,32 +4,37 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from generator.database.as_built import AsBuilt
-from recognizer.as_built.settings import VERDICT, VerdictSettings
 
 AS_DESIGNED, CORRECTED, PRINT_AGAIN = "as designed", "corrected", "print again"
+
+ALIKE = 0.001  #: scale - 1 that counts as designed: .03 mm at 30 mm
+MOST_SCALE = 0.025  #: beyond it panels no longer meet: 1.5 mm of 60, though they are read
+SQUARE_RAD = 0.001  #: skew that counts as square
+MOST_SKEW_RAD = 0.015  #: beyond it panels no longer meet: .9 mm over 60
+TOGETHER = 0.003  #: largest difference of the two scales that have one cause
+STROKE_MM = 0.1  #: excess or lack of width that is not mentioned
 
 
 @dataclass(frozen=True, slots=True)
 class PrintVerdict:
-    """What is said of a print."""
+    """The verdict on a print."""
 
     kind: str  #: AS_DESIGNED, CORRECTED or PRINT_AGAIN
     words: str
 
 
-def judge_print(
-    found: AsBuilt, stroke_mm: float, settings: VerdictSettings = VERDICT
-) -> PrintVerdict:
-    """Return what is to be done about a print.
+def judge_print(found: AsBuilt, stroke_mm: float) -> PrintVerdict:
+    """Return the verdict on a print; deviations within one standard deviation do not count.
 
     Parameters
     ----------
     stroke_mm
-        That was asked for.
+        As designed.
 
     Examples
     --------
@@ -42,35 +47,77 @@ def judge_print(
     'print again, X is 3.0 % short: belts?'
     """
     x, y = found.scale_x - 1, found.scale_y - 1
-    unsure = settings.unsure * np.sqrt(np.diag(found.covariance))
-    said, causes = [], []
-    if max(abs(x) - unsure[0], abs(y) - unsure[1]) > settings.alike:
-        if abs(x - y) <= settings.together:
+    unsure = np.sqrt(np.diag(found.covariance))
+    findings, causes = [], []
+    if max(abs(x) - unsure[0], abs(y) - unsure[1]) > ALIKE:
+        if abs(x - y) <= TOGETHER:
             both = (x + y) / 2
-            said.append(f"{_percent(both)} {'small' if both < 0 else 'large'}")
+            findings.append(f"{_percent(both)} {'small' if both < 0 else 'large'}")
             causes.append("scale in the slicer, shrinkage?")
         else:
             for name, off, least in (("X", x, unsure[0]), ("Y", y, unsure[1])):
-                if abs(off) - least > settings.alike:
-                    said.append(f"{name} is {_percent(off)} {'short' if off < 0 else 'long'}")
+                if abs(off) - least > ALIKE:
+                    findings.append(f"{name} is {_percent(off)} {'short' if off < 0 else 'long'}")
             causes.append("belts?")
-    if abs(found.skew_rad) - unsure[2] > settings.square_rad:
-        said.append(f"{abs(math.degrees(found.skew_rad)):.1f} degrees askew")
+    if abs(found.skew_rad) - unsure[2] > SQUARE_RAD:
+        findings.append(f"{abs(math.degrees(found.skew_rad)):.1f} degrees askew")
         causes.append("a frame out of square?")
     wider = found.stroke_mm - stroke_mm
     strokes = ""
-    if abs(wider) - unsure[3] > settings.stroke_mm:
+    if abs(wider) - unsure[3] > STROKE_MM:
         which = "wide" if wider > 0 else "narrow"
         strokes = f"strokes {abs(wider):.1f} mm too {which}: flow, first layer?"
-    far = max(abs(x), abs(y)) > settings.corrected or abs(found.skew_rad) > settings.askew_rad
-    if not said:
+    far = max(abs(x), abs(y)) > MOST_SCALE or abs(found.skew_rad) > MOST_SKEW_RAD
+    if not findings:
         return PrintVerdict(AS_DESIGNED, "; ".join(filter(None, ("as designed", strokes))))
-    what = ", ".join(said)
+    deviations = ", ".join(findings)
     if far:
-        words = f"print again, {what}: {' '.join(causes)}"
+        words = f"print again, {deviations}: {' '.join(causes)}"
         return PrintVerdict(PRINT_AGAIN, "; ".join(filter(None, (words, strokes))))
-    words = f"{what}, within what the reader corrects"
+    words = f"{deviations}, within what the reader corrects"
     return PrintVerdict(CORRECTED, "; ".join(filter(None, (words, strokes))))
+
+
+def as_built_numbers(found: AsBuilt) -> dict[str, Any]:
+    """Return the numbers of a print for JSON."""
+    spread = [math.sqrt(float(found.covariance[k, k])) for k in range(4)]
+    return {
+        "printer": found.printer,
+        "material": found.material,
+        "touches": found.touches,
+        "scale_x": found.scale_x,
+        "scale_y": found.scale_y,
+        "skew_deg": math.degrees(found.skew_rad),
+        "stroke_mm": found.stroke_mm,
+        "deviation": {
+            "scale_x": spread[0], "scale_y": spread[1], "skew_deg": math.degrees(spread[2]),
+            "stroke_mm": spread[3],
+        },
+        "covariance": found.covariance,
+    }  # fmt: skip
+
+
+def as_built_entry(found: AsBuilt, verdict: PrintVerdict) -> dict[str, Any]:
+    """Return a part with its verdict for JSON."""
+    named = {"part": found.part, "verdict": verdict.kind, "words": verdict.words}
+    return named | as_built_numbers(found)
+
+
+def as_built_sentences(found: AsBuilt, verdict: PrintVerdict) -> str:
+    """Return a part with its verdict in two lines."""
+    return f"{found.part}: {verdict.words}\n  {as_built_sizes(found)}; {found.touches} touches"
+
+
+def as_built_sizes(found: AsBuilt) -> str:
+    """Return scales, skew and stroke with their standard deviations in a line."""
+    numbers = as_built_numbers(found)
+    by = numbers["deviation"]
+    return (
+        f"scale X {found.scale_x:.4f} +- {by['scale_x']:.4f}, "
+        f"Y {found.scale_y:.4f} +- {by['scale_y']:.4f}, "
+        f"skew {numbers['skew_deg']:.2f} +- {by['skew_deg']:.2f} degrees, "
+        f"strokes {found.stroke_mm:.2f} +- {by['stroke_mm']:.2f} mm"
+    )
 
 
 def _percent(share: float) -> str:

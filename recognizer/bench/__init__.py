@@ -13,7 +13,7 @@
     calibration     what counts mean now; a new calibration, a load at a time
     reading         frames -> answers, mosaics, one belief;  touch_log  a record of each touch
     simulated       a probe over registered parts that comes down where one clicks
-    press_sequence  the forces on that probe, frame by frame;  serial_line  its serial line
+    press_sequence  the forces on that probe, frame by frame
     broker          the newest of every topic, for any number of pages
     answers, lab_json   answers and registered things as JSON;  message  frames, mosaics as bytes
     files           recordings, calibrations and printed parts: what may be read and written

@@ -38,7 +38,7 @@ class BenchOptions(Options):
     port: Annotated[
         str,
         Option(
-            "Of the probe: serial:///dev/ttyACM0, sim:, file:touch.h5, or touch: for a "
+            "Of the probe: serial:///dev/ttyACM0, sim:, file:touch.h5, or sim:touch for a "
             "simulated one that comes down where you click (default).",
             "URL",
         ),

@@ -18,21 +18,23 @@ from generator.database.as_built import AsBuilt
 from probe.calibration import read_calibration
 from probe.circuit import Electronics
 from probe.recording.files import next_free
-from recognizer.as_built.keep import keep_prints
-from recognizer.as_built.parts import estimate_parts
-from recognizer.as_built.settings import ESTIMATE, WIDE_SCALE
-from recognizer.as_built.touches import feel_prints
-from recognizer.as_built.words import as_built_entry, as_built_sizes
+from recognizer.as_built.estimate import ENOUGH_TOUCHES, estimate_parts, keep_prints
+from recognizer.as_built.touches import WIDE_SCALE, measure_prints
+from recognizer.as_built.verdict import as_built_entry, as_built_sizes
 from recognizer.bench.calibration import PageGuide, page_guide
 from recognizer.bench.errors import BenchError, BusyError
 from recognizer.bench.feed import ProbeFeed
 from recognizer.bench.files import find_file, list_files
-from recognizer.sensor.file import read_state, write_state
-from recognizer.sensor.learn import learn_sensor
-from recognizer.sensor.mounting import WORDS, FoundMounting, find_mounting, simplify_turns
-from recognizer.sensor.settings import LEARNING
-from recognizer.sensor.wiring import Wiring, wiring_named
-from recognizer.sensor.words import state_words
+from recognizer.sensor.file import read_state, state_words, write_state
+from recognizer.sensor.learn import LEAST_TOUCHES, learn_sensor
+from recognizer.sensor.wiring import (
+    WORDS,
+    FoundMounting,
+    Wiring,
+    find_mounting,
+    simplify_turns,
+    wiring_named,
+)
 from recognizer.touch.reader import Reader
 from recognizer.touch.source import TouchImage
 
@@ -186,9 +188,9 @@ class SensorController:
         session = self._session
         reader = _reader(session)
         frames = session.recognition.touches.frames()[-MOST:]
-        if len(frames) < LEARNING.least:
+        if len(frames) < LEAST_TOUCHES:
             raise BusyError(
-                f"{len(frames)} touches were read, {LEARNING.least} are the least to learn from",
+                f"{len(frames)} touches were read, {LEAST_TOUCHES} are the least to learn from",
                 fix="touch other places of registered faces first",
             )
         with session.lock:
@@ -224,7 +226,7 @@ class SensorController:
             "learning": self._share,
             "learned": {"name": self._name, "words": self._text} if self._name else None,
             "states": list_files(self._session.folder, STATE),
-            "least": LEARNING.least,
+            "least": LEAST_TOUCHES,
         }
 
     def _learn(self, reader: Reader, images: list[Any]) -> None:
@@ -277,7 +279,7 @@ class PrintController:
         ]  # fmt: skip
         with self._lock:
             self._found = ()
-            prints = feel_prints(reader, touches, calibration=session.frames.state.calibration)
+            prints = measure_prints(reader, touches, calibration=session.frames.state.calibration)
             estimates, few = estimate_parts(prints, session.database, material)
             self._found = tuple(found for found, _ in estimates)
         parts = [
@@ -299,7 +301,7 @@ class PrintController:
         """
         with self._lock:
             if not self._found:
-                raise BusyError("nothing was estimated", fix=f"touch {ESTIMATE.enough} places "
+                raise BusyError("nothing was estimated", fix=f"touch {ENOUGH_TOUCHES} places "
                                 "all over the part, then estimate")  # fmt: skip
             printer = keep_prints(self._session.database, self._found)
             self._found = ()

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.errors import EncodedObjectsError
-from probe.client.statistics import ClientStatistics
+from probe.client.receiver import ClientStatistics
 from probe.client.stream import Stream
 from probe.frame import Frame
 from probe.recording.layout import FrameBlock

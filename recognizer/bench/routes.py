@@ -36,7 +36,7 @@ from recognizer.bench.files import Uploads, find_file, part_folder, part_to_send
 from recognizer.bench.lab_json import arrays_json, map_json, object_json, object_svg, objects_json
 from recognizer.bench.message import FILTERS
 from recognizer.bench.session import Session
-from recognizer.bench.simulated import SCHEME
+from recognizer.bench.simulated import TOUCH
 from recognizer.bench.touch_log import NAME_LENGTH
 from recognizer.touch.options import DEFAULTS
 
@@ -409,7 +409,7 @@ def _add_lab_routes(routes: APIRouter, session: Session, parts: Path | None) -> 
             raise BusyError("objects are registered already", fix="touch one of these")
         name = make_example(Path.cwd(), session.database or LAB)
         session.use_database(session.database or LAB)
-        session.open(SCHEME)
+        session.open(TOUCH)
         return {"object": name}
 
     @routes.get("/objects/{name}")

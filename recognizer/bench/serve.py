@@ -29,8 +29,8 @@ from recognizer.bench.errors import BenchError
 from recognizer.bench.guard import RequestGuard, access_rules, is_loopback
 from recognizer.bench.session import Session
 
-SOFTWARE = ("touch:", "Simulated probe: click on the part")
-FIRMWARE = ("touch:?firmware=avr", "Simulated probe, through the firmware")
+SOFTWARE = ("sim:touch", "Simulated probe: click on the part")
+FIRMWARE = ("sim:touch?firmware=avr", "Simulated probe, through the firmware")
 PATTERN = ("sim:", "Moving pattern")
 
 CONNECTIONS = 900  #: open at once, below the files that a process may have open
@@ -160,7 +160,7 @@ def _database(url: str) -> str:
 
 def _ports(port: str) -> tuple[tuple[str, str], ...]:
     always = (SOFTWARE, FIRMWARE, PATTERN)
-    return ((port, port), *always) if port and port != "touch:" else always
+    return ((port, port), *always) if port and port not in ("sim:touch", "touch:") else always
 
 
 def _open_socket(host: str, port: int) -> socket.socket:

@@ -27,7 +27,7 @@ from recognizer.bench.feed import Feed, NoFeed, ProbeFeed, ReplayFeed
 from recognizer.bench.files import find_file, list_files
 from recognizer.bench.frames import FrameHandler
 from recognizer.bench.reading import RecognitionThread
-from recognizer.bench.simulated import SCHEME, TouchProbe
+from recognizer.bench.simulated import TouchProbe, is_simulation
 
 Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ class Session:
         """
         with self.lock:
             self._leave()
-            if url.startswith(SCHEME):
+            if is_simulation(url):
                 self.simulation = TouchProbe(url, self.database, self.sensor)
                 self.feed = ProbeFeed(self.simulation.url, sensor)
             elif url.startswith("file:"):

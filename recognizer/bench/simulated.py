@@ -1,33 +1,45 @@
-"""A probe that comes down on a registered part where it is told.
+"""A probe that comes down on a registered part where the bench says.
 
-    touch:                        in software
-    touch:?firmware=avr           through the probe's own firmware on an emulated processor
+    sim:touch                     in software
+    sim:touch?firmware=avr        through the probe's own firmware on an emulated processor
 
 Options: rate (frames a second, 100), noise (typical, quiet), hold (s, 2), seed. Either way it
 is a device on a serial line, which can be unplugged, and its frames say nothing of where it
-stands.
+stands. `touch:` is the old spelling.
 """
 
 from __future__ import annotations
 
 import math
+import os
+import pty
+import tempfile
 import threading
+import tty
 from collections import OrderedDict
+from collections.abc import Iterator
 from contextlib import ExitStack, suppress
+from pathlib import Path
 from urllib.parse import parse_qsl
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.errors import ProbeError
-from probe.port.emulated import emulated_probe
+from probe.firmware.emulator import emulated_probe
+from probe.frame import Frame
 from probe.port.simulated import FULL_MV
+from probe.port.software import SoftwareProbe
+from probe.protocol import IdentPacket
 from probe.simulate.registered import registered_object, registered_surface
 from probe.simulate.scene import Scene
 from recognizer.bench.errors import BenchError
 from recognizer.bench.press_sequence import PressSequence, SimulationSettings
-from recognizer.bench.serial_line import SoftwareLine
 
-SCHEME = "touch:"
+TOUCH, FORMERLY = "sim:touch", "touch:"
+WAIT_S = 0.005  #: of the probe for its next frame, and so of a command for its answer
+IDLE_S = 0.05  #: where no frames are wanted
+AT_ONCE = 4096  #: bytes read
+LOST = 65536  #: bytes that wait for a reader; more are thrown away, as on a real line
 SCENES = 32  #: surfaces that are kept
 UNPLUGGED_S = 60.0  #: at most
 _OPTIONS = ("firmware", "rate", "noise", "hold", "seed")
@@ -164,15 +176,85 @@ class TouchProbe:
         for frame in self._presses.frames():
             try:
                 self._emulator.show(frame.counts * (FULL_MV / self._full))
-            except ProbeError:  # the emulator ended; its port is gone, and whoever reads it told
+            except ProbeError:  # the emulator ended, and its port is gone
                 return
             if self._closed.wait(period_s):
                 return
 
 
+def is_simulation(url: str) -> bool:
+    """Whether a URL names the probe of this module."""
+    return url.partition("?")[0] in (TOUCH, FORMERLY)
+
+
+class SoftwareLine:
+    """A probe in software behind a pseudo-terminal: it goes away with its name, and comes back."""
+
+    def __init__(self, frames: Iterator[Frame], name: str, shape: tuple[int, int]) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="bench-probe-")
+        self._link = Path(self._folder.name) / "ttyPROBE"
+        rows, columns = shape
+        ident = IdentPacket(
+            seq=0, t_us=0, settling_us=0.0, baud=0, name=name, rows=rows, columns=columns
+        )
+        self._probe = SoftwareProbe(self.url, frames, ident)
+        self._away_s = 0.0
+        self._unplugged = threading.Event()
+        self._closed = threading.Event()
+        self._plug()
+        self._thread = threading.Thread(target=self._serve, name="software line", daemon=True)
+        self._thread.start()
+
+    @property
+    def url(self) -> str:
+        """The port as a URL."""
+        return f"serial://{self._link}?baud=1000000"
+
+    def unplug(self, seconds: float) -> None:
+        """Take the line away, and give it back after so many seconds."""
+        self._away_s = seconds
+        self._unplugged.set()
+
+    def close(self) -> None:
+        """Take the line away for good."""
+        self._closed.set()
+        self._thread.join()
+        self._folder.cleanup()
+
+    def _plug(self) -> None:
+        self._near, self._far = pty.openpty()
+        tty.setraw(self._far)
+        os.set_blocking(self._near, False)
+        self._link.symlink_to(os.ttyname(self._far))
+
+    def _pull(self) -> None:
+        self._link.unlink()
+        os.close(self._far)
+        os.close(self._near)
+
+    def _serve(self) -> None:
+        waiting = b""
+        while not self._closed.is_set():
+            if self._unplugged.is_set():
+                self._pull()
+                self._closed.wait(self._away_s)
+                self._unplugged.clear()
+                self._plug()
+                waiting = b""
+            with suppress(BlockingIOError):
+                self._probe.write(os.read(self._near, AT_ONCE))
+            asked = self._probe.streaming
+            waiting += self._probe.read(WAIT_S if asked else IDLE_S)
+            with suppress(BlockingIOError):
+                waiting = waiting[os.write(self._near, waiting) :] if waiting else b""
+            if len(waiting) > LOST:  # nobody listens: as on a real line
+                waiting = b""
+        self._pull()
+
+
 def parse_simulation(url: str) -> tuple[bool, SimulationSettings]:
     """Read the options of a URL: whether by firmware, and how the probe moves."""
-    _, _, query = url.removeprefix(SCHEME).partition("?")
+    _, _, query = url.partition("?")
     given = dict(parse_qsl(query, keep_blank_values=True))
     unknown = sorted(set(given) - set(_OPTIONS))
     firmware, noise = given.get("firmware", ""), given.get("noise", "typical")

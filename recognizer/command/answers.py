@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from encoded_objects.base.output import count_of
-from probe.closing import Closing
 from recognizer.touch.recognition import NO_CONTACT
 
 if TYPE_CHECKING:
     from probe.frame import Frame
-    from recognizer.thesis.edges.line import Edge
+    from recognizer.thesis.line import Edge
     from recognizer.touch.recognition import Recognition
     from recognizer.touch.robot import ObjectPose
     from recognizer.touch.source import TouchImage
@@ -70,8 +69,18 @@ class Answer:
         return "; ".join((text, *map(_edge_text, self.edges or ())))
 
 
-class AnswerSink(Closing):
-    """Takes images and answers as they come."""
+class AnswerSink(ABC):
+    """Takes images and answers as they come; a context manager."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @abstractmethod
+    def close(self) -> None:
+        """Complete the output; a second call does nothing."""
 
     @abstractmethod
     def frame(self, frame: Frame) -> None:

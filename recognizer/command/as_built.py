@@ -12,7 +12,7 @@ from recognizer.command.options import Calibration, Database
 
 if TYPE_CHECKING:
     from encoded_objects.base.output import ProgressBar
-    from recognizer.as_built.estimate import FeltPrint
+    from recognizer.as_built.estimate import MeasuredPrint
     from recognizer.touch.source import TouchImage
 
 HELP = """Say how a part came out of the printer: its scale both ways, skew, and stroke width.
@@ -50,8 +50,8 @@ def as_built(
 ) -> int:  # fmt: skip
     """Estimate a print; `HELP` is what people see."""
     from encoded_objects.base.output import message, write, write_json
-    from recognizer.as_built.parts import estimate_parts
-    from recognizer.as_built.words import (
+    from recognizer.as_built.estimate import estimate_parts
+    from recognizer.as_built.verdict import (
         as_built_entry,
         as_built_numbers,
         as_built_sentences,
@@ -64,7 +64,7 @@ def as_built(
         message(words)
     printer = None
     if store:
-        from recognizer.as_built.keep import keep_prints
+        from recognizer.as_built.estimate import keep_prints
 
         printer = keep_prints(database, [found for found, _ in prints])
     if as_json:
@@ -84,12 +84,11 @@ def as_built(
 
 def _touched_prints(
     recording: Path, database: str, sensor_type: str, overlay: str, calibration: Path | None
-) -> tuple[FeltPrint, ...]:
+) -> tuple[MeasuredPrint, ...]:
     """Return what each touch of a recording says of the print."""
     from encoded_objects.base.output import progress_bar, warning
     from probe.recording.read import Recording
-    from recognizer.as_built.settings import WIDE_SCALE
-    from recognizer.as_built.touches import feel_prints
+    from recognizer.as_built.touches import WIDE_SCALE, measure_prints
     from recognizer.touch.lab import open_lab
     from recognizer.touch.reader import Reader
     from recognizer.touch.source import source_of
@@ -102,7 +101,7 @@ def _touched_prints(
     reader = Reader(lab, source.sensor, WIDE_SCALE)
     with progress_bar("reading", source.frames) as bar:
         touches = _counted(source.touches(opened.frames(), reader.options), bar)
-        return feel_prints(reader, touches, calibration=source.calibration, place=str(recording))
+        return measure_prints(reader, touches, calibration=source.calibration, place=str(recording))
 
 
 def _counted(touches: Iterator[TouchImage], bar: ProgressBar) -> Iterator[TouchImage]:

@@ -86,7 +86,7 @@ def _report(
 ) -> int:  # fmt: skip
     """Say how the sensor is mounted by these touches; returns the exit code."""
     from encoded_objects.base.output import write, write_json
-    from recognizer.sensor.mounting import WORDS, FoundMounting, find_mounting
+    from recognizer.sensor.wiring import WORDS, FoundMounting, find_mounting
 
     found = [
         find_mounting(reader, touch.counts, face, calibration=source.calibration)

@@ -52,15 +52,14 @@ class SensorLearning:
 
     def end(self) -> None:
         """Learn from the touches that are left."""
-        from recognizer.sensor.settings import LEARNING
+        from recognizer.sensor.learn import LEAST_TOUCHES
 
-        if len(self.waiting) >= LEARNING.least:
+        if len(self.waiting) >= LEAST_TOUCHES:
             self._learn()
 
     def _learn(self) -> None:
-        from recognizer.sensor.file import write_state
+        from recognizer.sensor.file import state_words, write_state
         from recognizer.sensor.learn import learn_sensor
-        from recognizer.sensor.words import state_words
 
         if self.path is None:
             return

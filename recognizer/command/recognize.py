@@ -234,10 +234,9 @@ def _object_in_base(
         return None, ""
     import numpy as np
 
-    from probe.arm.carried import SensorPose
-    from probe.arm.links import Arm
+    from probe.arm import Arm, SensorPose
     from probe.errors import PoseError
-    from probe.wrist.geometry import Wrist
+    from probe.wrist import Wrist
     from recognizer.touch.robot import carried_pose, object_pose
 
     if joints_deg is None:

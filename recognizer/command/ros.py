@@ -21,7 +21,7 @@ import numpy as np
 
 from encoded_objects.base.files import refuse_taken, staged_file
 from encoded_objects.base.output import json_value
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
 from probe.recording.mcap import McapWriter

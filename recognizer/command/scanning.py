@@ -12,13 +12,13 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from recognizer.errors import RecognizerError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from recognizer.thesis.edges.line import Edge
+    from recognizer.thesis.line import Edge
     from recognizer.touch.lab import EmbossedArray
     from recognizer.touch.reader import Reader
     from recognizer.touch.recognition import Recognition
@@ -62,7 +62,7 @@ def belief_for(reader: Reader, method: str) -> Belief:
 
 def edges_of(reader: Reader, signal: Signal) -> tuple[Edge, ...]:
     """Return the edges that a touch feels, in the sensor frame."""
-    from recognizer.thesis.edges.find import touch_edges
+    from recognizer.thesis.edge_fit import touch_edges
 
     return touch_edges(reader.sensor, signal)
 
@@ -115,8 +115,8 @@ def pose_during(
         )
     import numpy as np
 
-    from probe.arm.links import Arm
-    from probe.wrist.geometry import Wrist
+    from probe.arm import Arm
+    from probe.wrist import Wrist
     from recognizer.touch.robot import carried_pose
 
     angles = np.radians(joints_deg[number - 1])

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from recognizer.scan.answer import ScanHypothesis
 from recognizer.scan.belief import ScanBelief, begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import (

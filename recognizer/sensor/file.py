@@ -1,7 +1,7 @@
 """The state of a sensor in a file: JSON that a person can read, the same bytes for the same state.
 
-It stands beside the calibration. Dead and hot tactels are letters (`.` sound, `D`, `H`), a row a
-line, as in a calibration; numbers have seven digits. Written beside the file and moved over it.
+It lies next to the calibration. Dead and hot tactels are letters (`.` sound, `D`, `H`), a row a
+line, as in a calibration; numbers have seven digits. A staged file replaces it as a whole.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import numpy as np
 
 from encoded_objects.base.files import staged_file
 from recognizer.errors import SensorStateError
-from recognizer.touch.sensor_state import SensorState
+from recognizer.sensor.learn import LEAST_TOUCHES
+from recognizer.touch.sensor_state import PRIOR, SensorState
 
 FORMAT = "tactile sensor state"
 VERSION = 1
@@ -107,6 +108,49 @@ def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -
             place=place,
         )
     return state
+
+
+def state_entry(state: SensorState) -> dict[str, Any]:
+    """Return a state for `--json`: tactels, spreads, and the number of touches."""
+    sound = ~state.masked
+    known = sound & (state.aside_deviation_mm.max(axis=-1) < PRIOR.aside_mm / 2)
+    return {
+        "sensor": state.sensor,
+        "touches": state.touches,
+        "dead": np.argwhere(state.dead),
+        "hot": np.argwhere(state.hot),
+        "raised": np.argwhere(sound & (state.offset != 0)),
+        "floating": state.floating,
+        "gain_spread": float(np.std(np.log(state.gain[sound]))) if sound.any() else 0.0,
+        "tips_known": int(known.sum()),
+        "tips_aside_mm": float(np.sqrt(np.mean(state.aside_mm[known] ** 2)))
+        if known.any()
+        else 0.0,
+        "drift": state.drift,
+    }
+
+
+def state_words(state: SensorState) -> str:
+    """Return a state in one line."""
+    entry = state_entry(state)
+    many = "1 touch" if state.touches == 1 else f"{state.touches:,} touches"
+    if state.touches < LEAST_TOUCHES:
+        return (
+            f"{state.sensor}: {many}, too few to learn from; touch {LEAST_TOUCHES} places or more"
+        )
+    parts = []
+    for name, what in (("dead", "never answer"), ("hot", "read high with nothing on them")):
+        if len(entry[name]):
+            parts.append(f"{len(entry[name])} of {state.dead.size} tactels {what}")
+    if state.floating:
+        parts.append("rows float while another is read: the network is inverted")
+    parts.append(f"gains differ by {100 * entry['gain_spread']:.0f} %")
+    if entry["tips_known"]:
+        parts.append(f"tips stand {entry['tips_aside_mm']:.2f} mm aside (of {entry['tips_known']})")
+    unit = "N" if state.newtons else "counts"
+    if abs(state.drift) >= (0.05 if state.newtons else 2.0):
+        parts.append(f"the background drifted by {state.drift:+.2g} {unit}")
+    return f"{state.sensor}, {many}: {'; '.join(parts)}"
 
 
 def _round_digits(value: Any) -> Any:

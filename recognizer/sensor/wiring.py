@@ -1,14 +1,17 @@
-"""Readings that arrive in other places than the sensor has them: said, and undone on request.
+"""Readings that arrive at other places than the sensor has them: detected, and undone on request.
 
 A matrix that is wired mirrored, by swapped halves, or whose readings fall with force shows symbols
-that no database holds. Undone, they are there again: if several refused touches are recognised
-under one and the same way, that is how the sensor is wired. It is said, and never applied unasked:
-a mirrored image is recognised under a flip of columns, of rows and transposed alike, a quarter or
-half turn apart, and no touch tells which (`recognizer.sensor.mounting` does).
+of no database. Undone, they appear: if several refused touches are recognised under one change,
+that is the wiring of the sensor. It is reported, and never applied unasked: a mirrored image is
+recognised under a flip of columns, of rows and transposed alike, a quarter or half turn apart.
+
+A touch placed by hand, with known face and direction, distinguishes them: of the eight ways in
+which a square image can lie, one shows the named face in the named direction (`find_mounting`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,8 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from probe.calibration import Calibration
 from probe.frame import Frame
 from recognizer.errors import WiringError
-from recognizer.sensor.settings import LEARNING, LearningSettings
 from recognizer.touch.reader import Reader
+from recognizer.touch.recognition import Recognition
 from recognizer.touch.sensor_state import invert_floating
 from recognizer.touch.signal import swap_halves
 from recognizer.touch.source import TouchImage
@@ -38,8 +41,8 @@ CHANGES: dict[str, Change] = {
     "values": lambda image, full: full - np.minimum(image, full),
     "quarter": lambda image, _: np.rot90(image),
 }
-#: What touches can tell; the others are a turn of one of these.
-TOLD = {
+#: Changes that refused touches can show, with a message; the others are a turn of one of these.
+HINTS = {
     "columns": "columns or rows seem reversed, or the image transposed: `--flip columns` (rows, "
     "transpose); `recognize-object check` tells which",
     "values": "readings seem to fall with force: `--flip values`",
@@ -47,6 +50,26 @@ TOLD = {
     "row-halves": "the halves of the rows seem swapped: `--flip row-halves`",
     "floating": "rows seem to float while another is read: `--learn FILE` inverts the network",
 }
+
+#: The eight ways in which a square image can lie, each undone; a matrix that is none has four.
+WAYS = (
+    (), ("quarter", "quarter"), ("columns",), ("rows",),
+    ("quarter",), ("quarter", "quarter", "quarter"), ("transpose",),
+    ("transpose", "quarter", "quarter"),
+)  # fmt: skip
+WORDS = {
+    (): "as drawn",
+    ("quarter", "quarter"): "half a turn off",
+    ("columns",): "with its columns reversed",
+    ("rows",): "with its rows reversed",
+    ("quarter",): "a quarter turn off",
+    ("quarter", "quarter", "quarter"): "a quarter turn off, the other way",
+    ("transpose",): "transposed",
+    ("transpose", "quarter", "quarter"): "transposed across the other diagonal",
+}
+
+TRIED = 6  #: refused touches that are read under each change
+FACING_DEG = 40.0  #: largest error of a direction that a person places by hand
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +85,12 @@ class Wiring:
     changes: tuple[str, ...] = ()
 
     def apply(self, image: NDArray[np.generic], full: int) -> NDArray[np.generic]:
-        """Return an image (rows, columns) as the sensor has it.
+        """Return an image (rows, columns) with every reading at its place on the sensor.
 
         Raises
         ------
         WiringError
-            It would have another shape.
+            The changes would give it another shape.
         """
         found = image
         for change in self.changes:
@@ -86,15 +109,33 @@ class Wiring:
         Raises
         ------
         WiringError
-            It would.
+            They would.
         """
         self.apply(np.zeros(shape), 0)
 
     def frame(self, frame: Frame, full: int) -> Frame:
-        """Return a frame as the sensor has it."""
+        """Return a frame with every reading at its place on the sensor."""
         if not self.changes:
             return frame
         return replace(frame, counts=self.apply(frame.counts, full).astype(frame.counts.dtype))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundMounting:
+    """The mounting by a touch that was placed by hand."""
+
+    wiring: Wiring  #: that undoes it
+    answer: Recognition  #: under it
+    turn_deg: float  #: from the direction that was asked for
+
+    def __str__(self) -> str:
+        words = WORDS[self.wiring.changes]
+        step = f"; read with --flip {','.join(self.wiring.changes)}" if self.wiring.changes else ""
+        return (
+            f"the sensor is mounted {words}: {self.answer.object}/{self.answer.face} at "
+            f"({self.answer.x_mm:.1f}, {self.answer.y_mm:.1f}) mm, {self.turn_deg:.0f} degrees "
+            f"off the asked direction{step}"
+        )
 
 
 def wiring_named(text: str) -> Wiring:
@@ -103,7 +144,7 @@ def wiring_named(text: str) -> Wiring:
     Raises
     ------
     WiringError
-        A name that is none.
+        An unknown name.
     """
     names = tuple(filter(None, (part.strip() for part in text.split(","))))
     for name in names:
@@ -119,9 +160,8 @@ def wiring_hint(
     refused: Sequence[TouchImage | ArrayLike],
     *,
     calibration: Calibration | None = None,
-    settings: LearningSettings = LEARNING,
 ) -> str:
-    """Return in words how a sensor seems to be wired; empty where refused touches do not tell.
+    """Return a message on the likely wiring; empty where refused touches do not show it.
 
     Parameters
     ----------
@@ -130,11 +170,11 @@ def wiring_hint(
     """
     images = [
         np.asarray(one.counts if isinstance(one, TouchImage) else one, np.float64)
-        for one in refused[: settings.tried]
+        for one in refused[:TRIED]
     ]
     full = reader.sensor.full
     best, count = "", 0
-    for name in TOLD:
+    for name in HINTS:
         if name == "floating" and calibration is not None:
             continue
         change = CHANGES.get(name, lambda image, _: invert_floating(image))
@@ -146,5 +186,57 @@ def wiring_hint(
     if not count or 2 * count < len(images) or (len(images) > 1 and count < 2):
         return ""
     if len(images) == 1:
-        return f"one touch says it alone, so it may be chance: {TOLD[best]}"
-    return f"{count} of {len(images)} touches that were refused are recognised so: {TOLD[best]}"
+        return f"one touch says it alone, so it may be chance: {HINTS[best]}"
+    return f"{count} of {len(images)} touches that were refused are recognised so: {HINTS[best]}"
+
+
+def simplify_turns(wiring: Wiring, shape: tuple[int, int]) -> Wiring:
+    """Return the one of the eight ways that equals a wiring; the wiring itself if none does.
+
+    Examples
+    --------
+    >>> simplify_turns(Wiring(("quarter",) * 5), (16, 16)).changes
+    ('quarter',)
+    """
+    image = np.arange(shape[0] * shape[1]).reshape(shape)
+    wanted = wiring.apply(image, 0)
+    for way in WAYS if shape[0] == shape[1] else WAYS[:4]:
+        if np.array_equal(Wiring(way).apply(image, 0), wanted):
+            return Wiring(way)
+    return wiring
+
+
+def find_mounting(
+    reader: Reader,
+    image: ArrayLike,
+    face: tuple[str, str],
+    *,
+    theta_deg: float = 0.0,
+    calibration: Calibration | None = None,
+) -> FoundMounting | Recognition:
+    """Return the mounting of a sensor; the plain answer, where none of the ways fits.
+
+    Parameters
+    ----------
+    image
+        (rows, columns) readings of a touch placed by hand, within 40 degrees.
+    face
+        Object and face that was touched.
+    theta_deg
+        Direction of the sensor's x axis on the face that was asked for.
+    """
+    readings = np.asarray(image, np.float64)
+    square = readings.shape[0] == readings.shape[1]
+    plain = reader.read(readings, calibration=calibration)
+    found: list[FoundMounting] = []
+    for changes in WAYS if square else WAYS[:4]:
+        wiring = Wiring(changes)
+        answer = plain
+        if changes:
+            turned = wiring.apply(readings, reader.sensor.full)
+            answer = reader.read(turned, calibration=calibration)
+        if (answer.object, answer.face) == face:
+            turn = math.remainder(answer.theta_deg - theta_deg, 360.0)
+            found.append(FoundMounting(wiring, answer, turn))
+    near = [one for one in found if abs(one.turn_deg) < FACING_DEG]
+    return min(near, key=lambda one: abs(one.turn_deg)) if near else plain

@@ -2,12 +2,12 @@
 
 ::
 
-    image      frames -> one image, or a mosaic of several (product)
-    filters    median, Sobel, background; edges/   lines of an image and its pose by them
-    skeleton/  image -> strokes -> symbols
+    merge      frames -> one image of several touches (product)
+    filters    median, Sobel, background
+    edges      image -> lines and corners; line   one edge;  edge_fit   edges of one touch, refined
+    skeleton   ink -> end-points and vertices;    symbols   image -> symbols
     grid       symbols -> rows and columns
-    settings   the numbers that decide, one frozen value a stage
-    read       window -> place of the database; scan   the same over a recording
+    read       window -> place of the database;   scan      a recording
 
 Kept as published, to be compared with `recognizer.touch` and `recognizer.scan`. Thesis 4.3, 6,
 appendix 3.

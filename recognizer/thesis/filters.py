@@ -99,8 +99,8 @@ def magnify_image(image: TactileImage, doublings: int = 2) -> TactileImage:
 def sobel(image: TactileImage) -> tuple[Array, Array]:
     """Return the slopes (h, w) along x and y by Sobel's operators, per mm; edges are repeated.
 
-    Undefined samples count as 0: a place that nobody has felt looks like one without force, so
-    slopes beside it are to be left out by whoever knows better.
+    Undefined samples count as 0, like places without force; the caller leaves out slopes next to
+    them.
     """
     f = np.pad(image.values, 1, mode="edge")
     across = f[:, 2:] - f[:, :-2]

@@ -1,11 +1,10 @@
 """Symbols -> the grid that they stand on, and the window of labels. Thesis 6.1, figure 6.8.
 
-A symbol's place and axes say where its four neighbours are expected. A symbol found there,
-within a threshold and turned alike, joins the grid; if there are several, the one that fits
-best; and the neighbours of the new member are expected in turn. So components of ink that were
-taken for symbols by mistake stay out. When nothing joins any more, the lattice is fitted to
-all members at once, and symbols beyond a gap join if they lie where it expects them. The grid
-may begin at any symbol; the largest one counts.
+The place and axes of a symbol predict its four neighbours. A symbol within a threshold of a
+predicted place, with about the same axes, joins the grid, the best if there are several, and its
+neighbours are predicted in turn. Components of ink that are no symbols stay out. When nothing joins
+any more, the lattice is fitted to all members, and symbols beyond a gap join if they lie at its
+cells. The grid may begin at any symbol; the largest one counts.
 
 Image frame and lattice frame: mm; cell (i, j) is the i-th column and the j-th row upwards, as
 in `symbols.fit`; an image point s lies at R(theta) s + (x, y) of the lattice.
@@ -21,8 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.thesis.settings import AcceptanceSettings
-from recognizer.thesis.skeleton.symbols import Symbol
+from recognizer.thesis.symbols import Symbol
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,12 +28,18 @@ Cell = tuple[int, int]
 
 SIDES: tuple[Cell, ...] = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
+OFF = 0.25  #: pitches from the predicted place
+TURN_RAD = math.radians(25)  #: of a symbol's axes against the grid's
+GAP = 3.5  #: cells from the nearest member, beyond which the lattice predicts nothing
+PLACE_MM = 0.2  #: least standard deviation of a symbol's place
+AXES_RAD = math.radians(4)  #: standard deviation of its axes
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
     """Symbols in their cells."""
 
-    window: Ints  #: (rows, columns) labels, -1 where none is seen; row 0 is the uppermost
+    window: Ints  #: (rows, columns) labels, -1 for none; row 0 is the uppermost
     first: Cell  #: cell (i, j) of the window's upper left corner
     members: Ints  #: (m,) which of the symbols
     cells: Ints  #: (m, 2) i and j of each
@@ -46,28 +50,25 @@ class Grid:
     covariance: Array  #: (3, 3) of x, y and theta
 
 
-def grid(
-    found: Sequence[Symbol], pitch_mm: float, acceptance: AcceptanceSettings | None = None
-) -> Grid | None:
+def grid(found: Sequence[Symbol], pitch_mm: float) -> Grid | None:
     """Return the largest grid among symbols; None if there is no symbol.
 
     Parameters
     ----------
     found
-        Symbols of an image; those that were rejected are passed over.
+        Symbols of an image; rejected ones are passed over.
     pitch_mm
         Distance of neighbours.
     """
-    chosen = acceptance or AcceptanceSettings()
     named = [k for k, symbol in enumerate(found) if symbol.label >= 0]
     best: dict[Cell, int] = {}
     left = set(named)
     for seed in sorted(named, key=lambda k: found[k].off_mm):
         if seed in left and len(left) > len(best):
-            members = _grow_grid(found, seed, named, pitch_mm, chosen)
+            members = _grow_grid(found, seed, named, pitch_mm)
             left -= set(members.values())
             best = members if len(members) > len(best) else best
-    return _grid_of(found, best, pitch_mm, chosen) if best else None
+    return _grid_of(found, best, pitch_mm) if best else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,11 +85,7 @@ class _Lattice:
 
 
 def _grow_grid(
-    found: Sequence[Symbol],
-    seed: int,
-    named: list[int],
-    pitch_mm: float,
-    acceptance: AcceptanceSettings,
+    found: Sequence[Symbol], seed: int, named: list[int], pitch_mm: float
 ) -> dict[Cell, int]:
     members: dict[Cell, int] = {(0, 0): seed}
     free = {k for k in named if k != seed}
@@ -96,45 +93,41 @@ def _grow_grid(
     while waiting:
         i, j = waiting.pop(0)
         symbol = found[members[i, j]]
-        # The axes of the neighbours already found are better known than a symbol's own.
+        # the axes of its neighbours in the grid are better known than a symbol's own
         around = {c: k for c, k in members.items() if max(abs(c[0] - i), abs(c[1] - j)) <= 2}
-        turn = _lattice(found, around, pitch_mm, acceptance).turn
+        turn = _lattice(found, around, pitch_mm).turn
         for di, dj in SIDES:
             cell = (i + di, j + dj)
-            expected = complex(symbol.x_mm, symbol.y_mm) + complex(di, dj) * pitch_mm / turn
+            predicted = complex(symbol.x_mm, symbol.y_mm) + complex(di, dj) * pitch_mm / turn
             if cell not in members:
-                joined = _accept_symbol(found, free, expected, turn, pitch_mm, acceptance)
-                if joined is not None:
-                    members[cell] = joined
-                    free.discard(joined)
+                accepted = _accept_symbol(found, free, predicted, turn, pitch_mm)
+                if accepted is not None:
+                    members[cell] = accepted
+                    free.discard(accepted)
                     waiting.append(cell)
-    return _join_beyond_gaps(found, members, free, pitch_mm, acceptance)
+    return _join_beyond_gaps(found, members, free, pitch_mm)
 
 
 def _join_beyond_gaps(
-    found: Sequence[Symbol],
-    members: dict[Cell, int],
-    free: set[int],
-    pitch_mm: float,
-    acceptance: AcceptanceSettings,
+    found: Sequence[Symbol], members: dict[Cell, int], free: set[int], pitch_mm: float
 ) -> dict[Cell, int]:
-    """Return members with those beyond gaps that stand where the whole lattice expects them."""
+    """Return members with symbols beyond gaps that lie at cells of the whole lattice."""
     while len(members) > 1:
-        lattice = _lattice(found, members, pitch_mm, acceptance)
-        expected: set[Cell] = set()
+        lattice = _lattice(found, members, pitch_mm)
+        predicted: set[Cell] = set()
         for k in free:
             at = lattice.turn * complex(found[k].x_mm, found[k].y_mm) + lattice.shift
             cell = (math.floor(at.real / pitch_mm), math.floor(at.imag / pitch_mm))
             near = min(math.dist(cell, member) for member in members)
-            if cell not in members and near <= acceptance.gap:
-                expected.add(cell)
+            if cell not in members and near <= GAP:
+                predicted.add(cell)
         more = {}
-        for cell in sorted(expected):
+        for cell in sorted(predicted):
             place = lattice.place(cell, pitch_mm)
-            joined = _accept_symbol(found, free, place, lattice.turn, pitch_mm, acceptance)
-            if joined is not None:
-                more[cell] = joined
-                free.discard(joined)
+            accepted = _accept_symbol(found, free, place, lattice.turn, pitch_mm)
+            if accepted is not None:
+                more[cell] = accepted
+                free.discard(accepted)
         if not more:
             return members
         members = members | more
@@ -142,33 +135,23 @@ def _join_beyond_gaps(
 
 
 def _accept_symbol(
-    found: Sequence[Symbol],
-    free: set[int],
-    expected: complex,
-    turn: complex,
-    pitch_mm: float,
-    acceptance: AcceptanceSettings,
+    found: Sequence[Symbol], free: set[int], predicted: complex, turn: complex, pitch_mm: float
 ) -> int | None:
     """Return the symbol that fits an expectation best, if one does."""
     fits = [
-        (abs(complex(found[k].x_mm, found[k].y_mm) - expected), k)
+        (abs(complex(found[k].x_mm, found[k].y_mm) - predicted), k)
         for k in free
-        if abs(cmath.phase(cmath.exp(1j * found[k].theta_rad) * turn)) <= acceptance.turn_rad
+        if abs(cmath.phase(cmath.exp(1j * found[k].theta_rad) * turn)) <= TURN_RAD
     ]
     off, best = min(fits, default=(math.inf, -1))
-    return best if off <= acceptance.off * pitch_mm else None
+    return best if off <= OFF * pitch_mm else None
 
 
-def _lattice(
-    found: Sequence[Symbol],
-    members: dict[Cell, int],
-    pitch_mm: float,
-    acceptance: AcceptanceSettings,
-) -> _Lattice:
+def _lattice(found: Sequence[Symbol], members: dict[Cell, int], pitch_mm: float) -> _Lattice:
     """Return the lattice through members by least squares, from their places and their axes.
 
-    Symbols are felt at the middle of their ink; where their centres are follows from how they
-    are turned, which all of them together tell better than each alone.
+    A symbol is found by the middle of its ink. Its centre follows from its axes, and the common
+    axes of all symbols are more precise than its own.
     """
     cells = np.array([_centre(cell, pitch_mm) for cell in members])
     axes = np.array([cmath.exp(-1j * found[k].theta_rad) for k in members.values()])
@@ -179,19 +162,14 @@ def _lattice(
         at = ink + own * axes / turn * abs(turn)
         middle = complex(at.mean())
         by_place = complex(((at - middle).conj() * (cells - cells.mean())).sum())
-        turn = by_place / acceptance.place_mm**2 + complex(axes.sum()) / acceptance.axes_rad**2
+        turn = by_place / PLACE_MM**2 + complex(axes.sum()) / AXES_RAD**2
     turn /= abs(turn)
     spread = float((abs(at - middle) ** 2).sum())
     return _Lattice(turn, complex(cells.mean()) - turn * middle, spread, middle)
 
 
-def _grid_of(
-    found: Sequence[Symbol],
-    members: dict[Cell, int],
-    pitch_mm: float,
-    acceptance: AcceptanceSettings,
-) -> Grid:
-    lattice = _lattice(found, members, pitch_mm, acceptance)
+def _grid_of(found: Sequence[Symbol], members: dict[Cell, int], pitch_mm: float) -> Grid:
+    lattice = _lattice(found, members, pitch_mm)
     cells = np.array(list(members), np.int64)
     numbers = np.array(list(members.values()), np.int64)
     low, high = cells.min(axis=0), cells.max(axis=0)
@@ -211,16 +189,14 @@ def _grid_of(
         y_mm=lattice.shift.imag,
         theta_rad=cmath.phase(lattice.turn),
         off_mm=off,
-        covariance=_covariance(lattice, len(members), off, acceptance),
+        covariance=_covariance(lattice, len(members), off),
     )
 
 
-def _covariance(
-    lattice: _Lattice, number: int, off_mm: float, acceptance: AcceptanceSettings
-) -> Array:
+def _covariance(lattice: _Lattice, number: int, off_mm: float) -> Array:
     """Return the covariance (3, 3) of x, y and theta at the image's origin."""
-    variance = max(acceptance.place_mm, off_mm / math.sqrt(2)) ** 2
-    turning = 1 / (lattice.spread / variance + number / acceptance.axes_rad**2)
+    variance = max(PLACE_MM, off_mm / math.sqrt(2)) ** 2
+    turning = 1 / (lattice.spread / variance + number / AXES_RAD**2)
     away = -lattice.turn * lattice.middle  # the origin from the middle, lattice frame
     by_turn = np.array([-away.imag, away.real, 1.0])
     return np.diag([variance / number] * 2 + [0.0]) + turning * np.outer(by_turn, by_turn)

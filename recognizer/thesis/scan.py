@@ -1,29 +1,28 @@
 """A scan of overlapping touches, read the thesis's way: merged, then read as one image.
 
-    image    touches and believed poses -> global tactile image
+    merge    touches and believed poses -> global tactile image
     read     image -> symbols, grid, window, index, pose
 
-Where nobody knows how the probe moved, the mosaic of `recognizer.scan` says where touches lie.
-The answer says where the probe stands at the last touch. Thesis 4.3, 6.1-6.3.
+Without known motion, the mosaic of `recognizer.scan` gives the poses of touches. The answer has the
+probe's pose at the last touch. Thesis 4.3, 6.1-6.3.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import no_touches
 from recognizer.scan.session import TouchPlaces
 from recognizer.scan.views import ScanSettings
-from recognizer.thesis.image import MergedImage, merge_touches
+from recognizer.thesis.merge import WINDOW_TACTELS, MergedImage, Placing, merge_touches
 from recognizer.thesis.read import ClassicalReading, read_classically
-from recognizer.thesis.settings import MergingSettings, ThesisSettings
 from recognizer.touch.lab import Lab
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW, Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
@@ -33,9 +32,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanReading:
-    """The answer to a scan and how it came about."""
+    """The answer to a scan with its intermediate results."""
 
-    recognition: Recognition  #: of the probe's pose at the last touch
+    recognition: Recognition  #: with the probe's pose at the last touch
     merged: MergedImage
     reading: ClassicalReading
 
@@ -45,27 +44,25 @@ def read_scan(
     sensor: SensorType,
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
-    settings: ThesisSettings | None = None,
-    merging: MergingSettings | None = None,
+    placing: Placing = "product",
+    window_tactels: float = WINDOW_TACTELS,
     *,
     trust: ArrayLike | None = None,
     seq: int = 0,
 ) -> ScanReading:
-    """Return which object and face a scan has touched, and where the probe stands now.
+    """Return object and face of a scan, and the probe's pose at its last touch.
 
     Parameters
     ----------
-    lab
-        What can be touched.
     sensor
-        The one that felt the touches.
+        Of all touches.
     readings
         (rows, columns) of each touch: newtons or counts over their bias.
     poses
         Of the touches as arm and wrist believe them: (n, 4, 4) T_base_probe, or (n, 3) x, y
         (mm) and theta (rad) in the plane of the face, in any frame.
-    settings, merging
-        Of the stages.
+    placing, window_tactels
+        Where a correction is searched for, and how far (`merge_touches`).
     trust
         (rows, columns) of a calibration: 0 for bad tactels.
     seq
@@ -76,10 +73,8 @@ def read_scan(
     ImageError
         If readings and poses do not belong together.
     """
-    image = merge_touches(sensor, readings, poses, merging, trust)
-    found = read_classically(
-        lab, image.image, settings, T_image_probe=spatial_pose(image.poses[-1]), seq=seq
-    )
+    image = merge_touches(sensor, readings, poses, placing, window_tactels, trust=trust)
+    found = read_classically(lab, image.image, T_image_probe=spatial_pose(image.poses[-1]), seq=seq)
     return ScanReading(found.recognition, image, found)
 
 
@@ -95,65 +90,50 @@ def read_while_scanning(
     sensor: SensorType,
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
-    settings: ThesisSettings | None = None,
-    merging: MergingSettings | None = None,
+    placing: Placing = "product",
+    window_tactels: float = WINDOW_TACTELS,
+    *,
     every: int = 1,
 ) -> Iterator[ScanReading]:
-    """Yield what is read after the first touches of a scan, `every` more at a time, and all.
+    """Yield the reading of the first touches of a scan, `every` more at a time, and of all.
 
     A probe that reads while it scans stops at the first answer.
     """
     places = np.asarray(poses, np.float64)
     for number in [*range(every, len(readings), every), len(readings)]:
-        yield read_scan(lab, sensor, readings[:number], places[:number], settings, merging)
+        some = readings[:number], places[:number]
+        yield read_scan(lab, sensor, *some, placing, window_tactels)
 
 
 class ThesisScan:
-    """Overlapping touches of one face, merged and read anew every few touches.
+    """Overlapping touches of one face, merged and read again every few touches.
 
-    It takes and gives what `recognizer.scan.session.Scan` does.
+    Its interface is that of `recognizer.scan.session.Scan`.
 
     Parameters
     ----------
-    lab
-        What can be touched.
     sensor
-        The one that feels all touches; the usual one if not given.
-    settings, merging
-        Of the stages; by default corrections are searched around the arm's poses.
+        Of all touches; the usual one if not given.
     every
-        After so many touches the image is read again; `answer` reads what is left.
+        Number of touches after which the image is read again; `answer` reads the rest.
     """
 
-    def __init__(
-        self,
-        lab: Lab,
-        *,
-        sensor: SensorType | None = None,
-        settings: ThesisSettings | None = None,
-        merging: MergingSettings | None = None,
-        every: int = 8,
-    ) -> None:
-        self._lab, self._settings, self._merging = (
-            lab,
-            settings,
-            merging or MergingSettings(placing="bounded"),
-        )
+    def __init__(self, lab: Lab, *, sensor: SensorType | None = None, every: int = 8) -> None:
+        self._lab, self._every, self._unread = lab, every, 0
         self._mosaic = no_touches(sensor or SensorType())
         self._places = TouchPlaces(ScanSettings())
         self._answer = refusal(0, TOO_FEW)
-        self._every, self._unread = every, 0
 
     @property
     def answer(self) -> Recognition:
-        """The best answer so far, of the probe's pose at the touch `answer.seq`; or why none."""
+        """The best answer so far, with the probe's pose at the touch `answer.seq`, or a refusal."""
         if self._unread:
             self._read()
         return self._answer
 
     @property
     def touches(self) -> int:
-        """How many touches it rests on: those with contact."""
+        """Number of touches with contact."""
         return len(self._mosaic)
 
     def add(
@@ -163,7 +143,7 @@ class ThesisScan:
         *,
         seq: int | None = None,
     ) -> Recognition:
-        """Return what all touches say by now, with the pose of the probe at this one.
+        """Return the answer of all touches so far, with the probe's pose at this one.
 
         Parameters
         ----------
@@ -181,22 +161,19 @@ class ThesisScan:
         self._mosaic = add_touch(self._mosaic, self._places.place(signal, pose, number))
         self._places.keep(pose)
         self._unread += 1
-        if self._unread < self._every:
-            return refusal(number, TOO_FEW)
-        return self._read()
+        return self._read() if self._unread >= self._every else refusal(number, TOO_FEW)
 
     def _read(self) -> Recognition:
         """Merge and read all touches."""
         touches, self._unread = self._mosaic.touches, 0
         arm = [each.believed.pose for each in touches if each.believed is not None]
-        known = len(arm) == len(touches)
+        by_arm = len(arm) == len(touches)
         found = read_scan(
             self._lab,
             self._mosaic.sensor,
             [each.signal.forces for each in touches],
-            np.array(arm) if known else self._mosaic.poses,
-            self._settings,
-            self._merging if known else replace(self._merging, placing="believed"),
+            np.array(arm) if by_arm else self._mosaic.poses,
+            "bounded" if by_arm else "believed",
             trust=np.min([each.signal.trust for each in touches], axis=0),
             seq=touches[-1].seq,
         ).recognition

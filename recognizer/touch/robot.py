@@ -19,10 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm.carried import SensorPose, sensor_pose
-from probe.arm.links import Arm
-from probe.wrist.distances import distances_mm, wrist_pose
-from probe.wrist.geometry import Wrist
+from probe.arm import Arm, SensorPose, sensor_pose
+from probe.wrist import Wrist, distances_mm, wrist_pose
 from recognizer.touch.recognition import Recognition
 
 Array = NDArray[np.float64]

@@ -26,7 +26,7 @@ __all__ = ["ValidationResult", "validate"]
 
 
 def __getattr__(name: str) -> Any:
-    if name == "validate":  # numpy and the simulation load when they are asked for
+    if name == "validate":  # numpy and the simulation load when they are used
         from recognizer.validation.pipeline import validate
 
         return validate

@@ -18,7 +18,7 @@ import numpy as np
 
 from probe.contact.engines import ENGINES, engine_named
 from probe.simulate.world.levels import LEVELS
-from recognizer.touch.options import DEFAULTS, Effort
+from recognizer.touch.options import DEFAULTS
 from recognizer.touch.reader import Reader
 from recognizer.validation.draw import FOREIGN
 from recognizer.validation.encoded_set import COPY, NEAR, SAME_PROFILE, SIDE, SMALL
@@ -29,7 +29,7 @@ from recognizer.validation.trial import ONE, POLICY_NAMES
 SHARD = 1000  #: touches in a file, lost at most with a run
 BATCH = 25  #: touches that a worker takes at once, 1/8 s: calls cost nothing then
 #: Touches of faces that every reader of a study gets: the interval of 99.5 % is then 2 % wide. Six
-#: readers take 1,200, so a run of fewer touches than this has no study unless one is asked for.
+#: readers take 1,200, so a run of fewer touches than this has no study unless it is named.
 STUDY = 200
 
 TOUCHES = "touches"  #: name of the series that is counted
@@ -89,7 +89,7 @@ def touchable(campaign: Campaign, named: bool) -> Campaign:
     Parameters
     ----------
     campaign
-        As it was asked for.
+        As it was given.
     named
         Whether a person named the kinds; otherwise those that cannot be are left out.
 
@@ -194,7 +194,14 @@ def reader_with(reader: Reader, name: str) -> Reader:
     """Return a reader that spends as `READERS` says, and no second try beyond it."""
     if name == AS_IS:
         return reader
-    spent = Effort(*READERS[name])
+    candidates, steps, finalists, final_steps = READERS[name]
+    effort: dict[str, int] = {
+        "candidates": candidates,
+        "steps": steps,
+        "finalists": finalists,
+        "final_steps": final_steps,
+    }
+    spent = replace(reader.options.first, **effort)
     return replace(reader, options=replace(reader.options, first=spent, thorough=spent))
 
 

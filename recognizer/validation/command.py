@@ -268,9 +268,9 @@ def report(
     as_json: Json = False,
 ) -> int:
     """Write results and report anew from the touches that are there."""
-    from recognizer.validation.pipeline import report_anew
+    from recognizer.validation.pipeline import report_again
 
-    _report(report_anew(folder), as_json=as_json)
+    _report(report_again(folder), as_json=as_json)
     return console.DONE
 
 
@@ -283,7 +283,7 @@ def _report(result: ValidationResult, *, as_json: bool) -> None:
 
 
 def _print_comparison(found: dict[str, Any], page: Path | None, *, as_json: bool) -> None:
-    """Say what became of what."""
+    """Print a comparison."""
     if as_json:
         output.write_json(found)
         return
@@ -296,7 +296,7 @@ def _print_comparison(found: dict[str, Any], page: Path | None, *, as_json: bool
 
 
 def _print_worlds(found: dict[str, Any], page: Path | None, *, as_json: bool) -> None:
-    """Say what became of the touches of every world."""
+    """Print the outcome of every world."""
     if as_json:
         output.write_json(found)
         return
@@ -316,7 +316,7 @@ def _print_worlds(found: dict[str, Any], page: Path | None, *, as_json: bool) ->
 
 
 def _print_row(row: dict[str, Any], plot: Path | None, *, as_json: bool) -> None:
-    """Say what became of one touch."""
+    """Print the row of one touch."""
     if as_json:
         output.write_json(row)
         return

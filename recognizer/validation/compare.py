@@ -18,25 +18,23 @@ from typing import Any
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import write_json, write_text
 from recognizer.validation.pictures import accuracy, draw_answers, draw_errors
-from recognizer.validation.report import PAIR, RESULTS, TIMES_FILE, environment, require_report
+from recognizer.validation.report import RESULTS, TIMES_FILE, environment, require_report
 from recognizer.validation.results import FORMAT
+
+PAIR, WORLDS = "compare.html.j2", "worlds.html.j2"  #: templates
+SAME, BETTER, WORSE = "same within chance", "better", "worse"
 
 
 @dataclass(frozen=True, slots=True)
 class FinishedRun:
-    """What a run left."""
+    """Results of a run that is done, as its folder has them."""
 
     results: dict[str, Any]
     times: dict[str, Any]
 
-    @property
-    def command(self) -> str:
-        """The command that makes the run again."""
-        return str(self.results["provenance"]["command"])
-
 
 def read_finished(folder: Path) -> FinishedRun:
-    """Return what a run left.
+    """Return the results of a folder's run.
 
     Raises
     ------
@@ -65,18 +63,8 @@ def _read_json(folder: Path, name: str) -> dict[str, Any]:
     return values
 
 
-SAME, BETTER, WORSE = "same within chance", "better", "worse"
-
-
 def compare_runs(first: Path, second: Path, output: Path | None) -> dict[str, Any]:
-    """Compare two runs.
-
-    Parameters
-    ----------
-    first, second
-        Folders of runs that are done.
-    output
-        Page to write; None: none.
+    """Compare two runs by their folders, and write a page if `output` is given.
 
     Returns
     -------
@@ -85,7 +73,7 @@ def compare_runs(first: Path, second: Path, output: Path | None) -> dict[str, An
     Raises
     ------
     ValidationError
-        A folder holds no run that is done, or one of another version.
+        As `read_finished`.
     """
     one, other = read_finished(first), read_finished(second)
     a, b, times = one.results, other.results, (one.times, other.times)
@@ -168,28 +156,18 @@ def _text(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-PAGE = "worlds.html.j2"
-
-
 def join_runs(folders: Sequence[Path], page: Path | None) -> dict[str, Any]:
-    """Return the worlds of several runs.
-
-    Parameters
-    ----------
-    folders
-        Of runs that are done.
-    page
-        HTML to write; JSON goes beside it under the same name. None: nothing is written.
+    """Return the worlds of several runs; `page` (HTML) and its JSON are written if it is given.
 
     Returns
     -------
-    `runs`: name (a letter), command, versions; `worlds`: a line of `worlds.worlds_of` each, with
+    `runs`: name (a letter), command, versions; `worlds`: a line of `results.worlds_of` each, with
     the run's name and the CPU times of a touch (`drawing_ms`, `reading_ms`).
 
     Raises
     ------
     ValidationError
-        A folder holds no run that is done, or one of another version; or one stands twice.
+        As `read_finished`; or a folder is named twice.
     """
     if not folders:
         raise ValidationError("no run is named", fix="give the folders that -o named")
@@ -201,7 +179,7 @@ def join_runs(folders: Sequence[Path], page: Path | None) -> dict[str, Any]:
     if page is not None:
         require_report("validate-set worlds")
         pictures = draw_answers(found["worlds"]), draw_errors(found["worlds"])
-        text = environment().get_template(PAGE).render(**found, pictures=pictures)
+        text = environment().get_template(WORLDS).render(**found, pictures=pictures)
         write_text(page, text)
         write_json(page.with_suffix(".json"), found)
     return found
@@ -209,17 +187,17 @@ def join_runs(folders: Sequence[Path], page: Path | None) -> dict[str, Any]:
 
 def join_finished(runs: Sequence[FinishedRun]) -> dict[str, Any]:
     """Return the worlds of runs, in their order."""
-    told, worlds = [], []
+    listed, worlds = [], []
     for number, run in enumerate(runs):
         name = run_name(number)
         provenance = run.results["provenance"]
         touches = run.results["totals"]["touches"]
-        told.append({"run": name, "command": run.command, "touches": touches,
+        listed.append({"run": name, "command": provenance["command"], "touches": touches,
                      "versions": provenance["versions"], "set": provenance["set"]})  # fmt: skip
         for line, spent in zip(run.results["worlds"], run.times["worlds"], strict=True):
             ms = {f"{part}_ms": value for part, value in spent.items()}
             worlds.append({"run": name, **line, **ms})
-    return {"runs": told, "worlds": worlds}
+    return {"runs": listed, "worlds": worlds}
 
 
 def run_name(number: int) -> str:

@@ -13,12 +13,14 @@ import json
 import subprocess
 import sys
 from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
+from sqlalchemy import Connection
 
 from generator.array.lab_key import lab_key_of
 from generator.database import DatabaseError
@@ -53,19 +55,11 @@ class Member:
 
 
 def make_parts(specs: list[Path], folder: Path, database: str, sensor_type: str = "") -> None:
-    """Write the STL parts of specs, and register them.
+    """Write the STL parts of specs to a folder, and register them.
 
-    Parameters
-    ----------
-    specs
-        Files for `encode-object`.
-    folder
-        Where the parts go.
-    database
-        Where they are registered; what is registered already is written again, the same. A new
-        one has the key of the specs, or `LAB_KEY`: the same specs, the same touches.
-    sensor_type
-        File of the type that will touch them; empty: as the specs say.
+    A new database has the key of the specs, or `LAB_KEY`, so that a set made again gives the same
+    touches. `sensor_type` is the file of the type that will touch the parts; empty: as the specs
+    say.
 
     Raises
     ------
@@ -95,19 +89,20 @@ def _says_lab_key(spec: Path) -> bool:
     return any(isinstance(output, dict) and "lab_key" in output for output in outputs)
 
 
-def members_of(database: str) -> tuple[Member, ...]:
-    """Return the objects of a database.
-
-    Raises
-    ------
-    SetError
-        It cannot be read.
-    """
+@contextmanager
+def _connect(database: str) -> Iterator[Connection]:
+    """Yield a connection that only reads; raises `SetError` if the database cannot be read."""
     try:
         with read_transaction(open_database(database, writable=False)) as connection:
-            entries = list_objects(connection)
+            yield connection
     except DatabaseError as error:
         raise SetError(error.cause, fix=error.fix, place=error.place or database) from error
+
+
+def members_of(database: str) -> tuple[Member, ...]:
+    """Return the objects of a database; raises `SetError` if it cannot be read."""
+    with _connect(database) as connection:
+        entries = list_objects(connection)
     return tuple(
         Member(
             name=entry.name,
@@ -122,26 +117,17 @@ def members_of(database: str) -> tuple[Member, ...]:
 
 
 def set_digest(database: str) -> str:
-    """Return a sha256 of what is touched and read: specs, arrays, styles and files.
-
-    Raises
-    ------
-    SetError
-        The database cannot be read.
-    """
-    try:
-        with read_transaction(open_database(database, writable=False)) as connection:
-            held: list[Any] = [
-                [
-                    entry.name,
-                    entry.spec_hash,
-                    entry.symbols,
-                    [[part.name, part.sha256] for part in read_parts(connection, entry.object_id)],
-                ]
-                for entry in list_objects(connection)
+    """Return a sha256 of specs, arrays, styles and files; raises `SetError` if it cannot."""
+    with _connect(database) as connection:
+        held: list[Any] = [
+            [
+                entry.name,
+                entry.spec_hash,
+                entry.symbols,
+                [[part.name, part.sha256] for part in read_parts(connection, entry.object_id)],
             ]
-    except DatabaseError as error:
-        raise SetError(error.cause, fix=error.fix, place=error.place or database) from error
+            for entry in list_objects(connection)
+        ]
     return hashlib.sha256(json.dumps(held).encode()).hexdigest()
 
 
@@ -164,7 +150,7 @@ LABS = "labs"
 
 
 def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: int) -> None:
-    """Make what kinds need beside the set.
+    """Make what kinds need besides the set.
 
     Parameters
     ----------

@@ -1,4 +1,12 @@
-"""What can be wrong with what `validate-set` is asked for."""
+"""Errors of `validate-set`: options and folders, workers, the set.
+
+::
+
+    RecognizerError
+        ValidationError
+        WorkersError
+        SetError
+"""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ RIGHT_DOTS = 150  #: of a face, at most; refused and wrong touches are all drawn
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlatFace:
-    """A face and what became of its touches."""
+    """A face and its touches by verdict."""
 
     name: str
     loops_mm: tuple[Array, ...]  #: (k, 2) each, face frame

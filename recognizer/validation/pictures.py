@@ -404,7 +404,7 @@ def work_precision(study: dict[str, Any], times: dict[str, Any], used: str = "")
 def draw_work_precision(
     axes: list[Axes], study: Mapping[str, Any], times: Mapping[str, Any], used: str
 ) -> list[Annotation]:
-    """Draw four pictures; return the names beside their points."""
+    """Draw four pictures; return the names of their points."""
     panels = [_contact_points(axes[0], study, times, used)]
     decoders = zip(study["decoders"], times["decoders"], strict=True)
     panels.append(

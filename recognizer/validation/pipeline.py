@@ -1,6 +1,6 @@
 """From what a person asks to the finished folder: set, touches, results, report.
 
-`validate` is `validate-set SPEC...`; `report_anew` makes the results and the page again from
+`validate` is `validate-set SPEC...`; `report_again` makes the results and the page again from
 the touches that are there.
 """
 
@@ -22,7 +22,7 @@ from recognizer.validation.campaign import (
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import done_shards, write_json
 from recognizer.validation.provenance import circumstances
-from recognizer.validation.report import export_touches, require_report, write_results
+from recognizer.validation.report import require_report, write_results
 from recognizer.validation.result import ValidationResult, result_from
 from recognizer.validation.run import (
     RECORD,
@@ -94,7 +94,7 @@ def validate(
     engine
         Of contact: `own`, or `mujoco` (extra `engines`), which knows tabs alone.
     sensor_per
-        `touch`: every touch is felt by another sensor; `run`: all by one, whose errors stay.
+        `touch`: another sensor for every touch; `run`: one sensor, whose errors stay.
     policy
         `one`: every touch by itself; `next`: where it is not answered, touches follow where the
         answer proposes, up to three, read as one belief.
@@ -159,13 +159,16 @@ def validate(
         steps.begin("report", 0, 0)
         results = write_results(record, place)
         if export:
-            export_touches(record, place, export, steps)
+            from recognizer.validation.dataset import touch_dataset, write_lerobot, write_npz
+
+            write = write_npz if export == "npz" else write_lerobot
+            write(touch_dataset(record, place, steps), place)
         seconds = round(time.monotonic() - start, 3)
         write_json(place / PROVENANCE, circumstances(begun, seconds, jobs, cluster))
     return result_from(results, seconds, place)
 
 
-def report_anew(folder: Path) -> ValidationResult:
+def report_again(folder: Path) -> ValidationResult:
     """Write results and report of a run again.
 
     Raises

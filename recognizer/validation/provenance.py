@@ -1,6 +1,6 @@
 """Where results come from: versions, seeds, hashes, distributions; no clock, no machine.
 
-The one file with time and machine in it is `provenance.json`, beside the results.
+The one file with time and machine in it is `provenance.json`, next to the results.
 """
 
 from __future__ import annotations

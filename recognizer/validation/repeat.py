@@ -168,10 +168,10 @@ def _draw_answer(
         label = "answer" if own else f"answer, on {answer.object}/{answer.face}"
         outline = _outline(reader, float(T[0, 3]), float(T[1, 3]), turn)
         axis.plot(*outline, "--", color="#2f6db3", label=label)
-    told = row["verdict"] + (f": {row['reason']}" if row["reason"] else "")
+    outcome = row["verdict"] + (f": {row['reason']}" if row["reason"] else "")
     if row["error_mm"] is not None:
-        told += f", off by {row['error_mm']:.3f} mm, {row['error_deg']:.2f} degrees"
-    axis.set_title(f"4  {told}")
+        outcome += f", off by {row['error_mm']:.3f} mm, {row['error_deg']:.2f} degrees"
+    axis.set_title(f"4  {outcome}")
     axis.set_xlabel("x of the face, mm")
     axis.set_ylabel("y of the face, mm")
     axis.set_aspect("equal")

@@ -1,6 +1,6 @@
 """The page of a run: one HTML file that needs nothing else.
 
-Results + times + rows -> report.html, in the order of the questions that are asked of it:
+Results + times + rows -> report.html, in the order of its questions:
 does it hold, who is taken for whom, how far off, when not, error against run time, extremes,
 what was left out, the worst touches, where it comes from. Every picture is inline SVG.
 """
@@ -29,14 +29,14 @@ from recognizer.validation.flat_faces import flat_objects
 from recognizer.validation.pictures import work_precision
 from recognizer.validation.provenance import judging_limits, provenance
 from recognizer.validation.results import results_of, world_times
-from recognizer.validation.run import RunRecord, TouchProgress
+from recognizer.validation.run import RunRecord
 from recognizer.validation.statistics import FAILS, HOLDS, UNTOLD
 from recognizer.validation.studies import (
     contact_study,
     decoder_study,
     engine_lines,
-    find_savings,
     reader_study,
+    work_avoided,
 )
 from recognizer.validation.touch_plan import TouchPlan
 from recognizer.validation.workers import prepare_reader
@@ -44,11 +44,12 @@ from recognizer.validation.workers import prepare_reader
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-PAGE, PAIR = "report.html.j2", "compare.html.j2"
+PAGE, REPORT = "report.html.j2", "report.html"
+TRIALS, RESULTS, TIMES_FILE = "trials.parquet", "results.json", "times.json"
 
 
 def require_report(command: str) -> None:
-    """See to it that what writes tables, pictures and pages is installed."""
+    """Raise `MissingExtraError` unless the libraries of tables and pages are installed."""
     require("pyarrow", "matplotlib", "jinja2", extra="report", purpose=command)
 
 
@@ -57,14 +58,8 @@ def page_of(
 ) -> str:
     """Return the page of a run.
 
-    Parameters
-    ----------
-    results, times
-        As they are written to `results.json` and `times.json`.
-    rows
-        Columns of `trials.parquet`.
-    flat
-        The faces of every object drawn flat, as `flat_faces.flat_objects` returns them.
+    Results and times are those of `results.json` and `times.json`; `rows` are columns of
+    `trials.parquet`; `flat` is what `flat_faces.flat_objects` returns.
     """
     study, level = results["study"], results["provenance"]["contact_level"]
     drawn = {
@@ -91,18 +86,10 @@ def environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters.update(
-        size=_size, percent=_percent, share=_share, count=_count, interval=_interval, tint=_tint
-    )
+    tints = {HOLDS: "good", FAILS: "bad", UNTOLD: "untold"}  # classes of cells
+    made.filters.update(size=_size, percent=_percent, share=_share, count=_count,
+                        interval=_interval, tint=lambda state: tints.get(state, ""))  # fmt: skip
     return made
-
-
-_TINTS = {HOLDS: "good", FAILS: "bad", UNTOLD: "untold"}
-
-
-def _tint(state: str) -> str:
-    """Return the class of a cell: red is what fails, grey what nobody can tell yet."""
-    return _TINTS.get(state, "")
 
 
 def _interval(ends: tuple[float, float | None], digits: int = 3) -> str:
@@ -131,10 +118,6 @@ def _count(value: int | None) -> str:
     return "–" if value is None else f"{value:,}"
 
 
-TRIALS, RESULTS, TIMES_FILE = "trials.parquet", "results.json", "times.json"
-REPORT = "report.html"
-
-
 def write_results(record: RunRecord, folder: Path) -> dict[str, Any]:
     """Write everything that follows from the touches; returns the results."""
     campaign, work = record.campaign, record.work_now(folder)
@@ -143,10 +126,10 @@ def write_results(record: RunRecord, folder: Path) -> dict[str, Any]:
     rows = columns_of(table)
     spent = columns_of(read_series(folder, series[0], TIMES))
     reader = prepare_reader(work)
-    asked = provenance(record, work.database)
-    results = results_of(rows, asked["campaign"])
+    origin = provenance(record, work.database)
+    results = results_of(rows, origin["campaign"])
     times: dict[str, Any] = {name: _cpu_ms(spent[name]) for name in ("drawing", "reading")}
-    times["worlds"] = world_times(rows, spent, asked["campaign"])
+    times["worlds"] = world_times(rows, spent, origin["campaign"])
     results["rule"] = judging_limits()
     results["study"], results["left_out"], results["engines"] = {}, [], engine_lines()
     if campaign.study:
@@ -158,34 +141,23 @@ def write_results(record: RunRecord, folder: Path) -> dict[str, Any]:
         plan = TouchPlan(work.database, campaign.seed, kind="face",
                          files=campaign.surfaces == FILES, prints=work.prints,
                          engine=campaign.engine)  # fmt: skip
-        saved = find_savings(reader, plan, studies["readers"])
+        avoided = work_avoided(reader, plan, studies["readers"])
         results["study"] = {name: study.counted for name, study in studies.items()}
-        results["left_out"] = saved.counted
+        results["left_out"] = avoided.counted
         times |= {name: study.spent for name, study in studies.items()}
-        times["left_out"] = saved.spent
+        times["left_out"] = avoided.spent
     if campaign.surfaces == PRINTED:
         from recognizer.validation.printing import prints_as_results
 
         results["printed"] = prints_as_results(folder, campaign)
     results["extremes"] = extremes(reader)
-    results["provenance"] = asked
+    results["provenance"] = origin
     write_table(table, folder / TRIALS)
     write_json(folder / RESULTS, results)
     write_json(folder / TIMES_FILE, times)
     flat = flat_objects(reader.lab, rows, results["objects"]["faces"])
     write_text(folder / REPORT, page_of(results, times, rows, flat))
     return results
-
-
-def export_touches(record: RunRecord, folder: Path, kind: str, progress: TouchProgress) -> None:
-    """Write the touches of a run as a data set."""
-    from recognizer.validation.dataset import touch_dataset, write_lerobot, write_npz
-
-    data = touch_dataset(record, folder, progress)
-    if kind == "npz":
-        write_npz(data, folder)
-    else:
-        write_lerobot(data, folder)
 
 
 def _cpu_ms(seconds: Any) -> dict[str, float]:

@@ -16,7 +16,7 @@ from recognizer.validation.statistics import HOLDS
 
 @dataclass(frozen=True, slots=True)
 class ValidationBound:
-    """A bound of the design beside what was found; prints as a line."""
+    """A bound of the design and the value found; prints as a line."""
 
     name: str
     sign: str  #: of what must hold: =, <=, >=, or within two limits

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
 
@@ -40,27 +40,33 @@ INSIDE = (0.90, 0.98)  #: of the errors inside the 95 % ellipsoid
 FACE_ANSWERED = 0.5  #: of all touches of a face; with less, the face is no use
 HARDEST = "mismatch"  #: wrong in everything at once
 
-Columns = dict[str, Any]
+FORMAT = 2  #: of `results.json`; 1 had no states of lines and no intervals of errors
+WORST = 20
+QUANTILES = (0.5, 0.9, 0.99, 1.0)
+
+#: Edges of the bins of what accuracy is shown against, and the unit.
+BINS: dict[str, tuple[str, list[float]]] = {
+    "force_n": ("N", [20, 40, 60, 80, 100, 120]),
+    "tilt_deg": ("degrees", [0, 0.5, 1, 1.5, 2]),
+    "edge_mm": ("mm", [0, 3, 6, 9, 12, 15, 20, 30, 60]),
+    "symbols": ("symbols", [0, 2, 4, 6, 8, 10, 12, 14, 16, 20, 30, 60]),
+}
+SURFACES = {"files": "written files", "database": "registered faces"}
+ALL = "all of them"  #: sensors
+
+Columns = dict[str, Any]  #: of `trial.COLUMNS`
 Mask = NDArray[np.bool_]
 
 
 def line_of(rows: Columns, where: Mask) -> dict[str, Any]:
     """Return counts, shares, pose errors and the state of some touches.
 
-    Parameters
-    ----------
-    rows
-        Columns of `rows.COLUMNS`.
-    where
-        (n,) which of them.
-
-    Returns
-    -------
     `answered` and `wrongly` are shares of all these touches, `expected` of those that show enough
     symbols; `rms_mm` and `rms_deg` are of the right answers, `rms_mm_95` and `rms_deg_95` their
     intervals; `inside_95` is how many of these errors lie inside the answer's own 95 % ellipsoid;
-    `drawn_anew` counts draws that were no touch; `state` and `inside_state` are those of
-    `state_of_line` and `inside_state`.
+    `drawn_anew` counts draws that were no touch. `state` fails by one wrong answer, and where fewer
+    than `ANSWERED` of the touches with enough symbols are answered; `inside_state` by `INSIDE`;
+    both are empty where no bound applies.
     """
     verdicts = rows["verdict"][where]
     right = where & (rows["verdict"] == RIGHT)
@@ -76,128 +82,78 @@ def line_of(rows: Columns, where: Mask) -> dict[str, Any]:
         **{f"rms_{name}": size["rms"] for name, size in sizes.items()},
         **{f"rms_{name}_95": [size["low"], size["high"]] for name, size in sizes.items()},
         "inside_95": inside_of(rows["chi2"][right]),
-        "drawn_anew": drawn_anew(rows, where),
+        "drawn_anew": _resampled(rows, where),
     }
-    return line | {"state": state_of_line(line), "inside_state": inside_state(line)}
-
-
-def state_of_line(line: dict[str, Any]) -> str:
-    """Return whether these touches keep the bounds; empty where nothing is asked of them.
-
-    One wrong answer fails. Where touches show enough symbols, `ANSWERED` of them must be
-    answered.
-    """
-    if line["wrong"]:
-        return FAILS
-    if line["expected"]["of"] == 0:
-        return ""
-    return state_of(line["expected"], ">=", ANSWERED)
-
-
-def inside_state(line: dict[str, Any]) -> str:
-    """Return whether as many errors lie inside the ellipsoid as should; empty without any."""
-    if line["inside_95"]["of"] == 0:
-        return ""
-    return state_of(line["inside_95"], "within", *INSIDE)
+    expected, inside = line["expected"], line["inside_95"]
+    state = FAILS if line["wrong"] else state_of(expected, ">=", ANSWERED) if expected["of"] else ""
+    inside_state = state_of(inside, "within", *INSIDE) if inside["of"] else ""
+    return line | {"state": state, "inside_state": inside_state}
 
 
 def face_is_bad(line: dict[str, Any]) -> bool:
-    """Return whether a face must be looked at: its bound fails, or too few touches help.
+    """Return whether a face needs a look: its bound fails, or too few touches are answered.
 
-    Parameters
-    ----------
-    line
-        Of all touches of the face that are not worn; a face whose touches all show too few
-        symbols is bad as well, though no answer is expected of it.
+    The line is of all its touches that are not worn; a face whose touches all show too few symbols
+    is bad as well, though no answer is expected of it.
     """
     few = state_of(line["answered"], ">=", FACE_ANSWERED)
     return FAILS in (line["state"], few)
 
 
-def drawn_anew(rows: Columns, where: Mask) -> int | None:
+def _resampled(rows: Columns, where: Mask) -> int | None:
     """Return how many draws were no touch: the plate slipped off, or found no rest.
 
-    None where nobody counted: rows of a version that did not.
+    None for rows of a version that did not count.
     """
-    if "drawn_anew" not in rows:
+    texts: list[str | None] = rows["drawn_anew"][where].tolist() if "drawn_anew" in rows else [None]
+    if None in texts:
         return None
-    texts: list[str | None] = rows["drawn_anew"][where].tolist()
-    told = [text for text in texts if text is not None]
-    if len(told) < len(texts):
-        return None
-    return sum(text.count(" | ") + 1 for text in told if text)
+    return sum(text.count(" | ") + 1 for text in texts if text)
 
 
-SURFACES = {"files": "written files", "database": "registered faces"}
-ALL = "all of them"  #: sensors
+def _worlds(rows: Columns, campaign: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], Mask]]:
+    """Yield the worlds of a run (engine, surface, sensor, registered) and their rows.
 
-
-@dataclass(frozen=True, slots=True)
-class World:
-    """Where touches were made."""
-
-    engine: str  #: of contact
-    surface: str  #: what was touched, in words
-    sensor: str  #: level, or `ALL`
-    registered: bool  #: whether a database knows what was touched
-
-
-def worlds_in(rows: Columns, campaign: Mapping[str, Any]) -> Iterator[tuple[World, Mask]]:
-    """Yield the worlds of a run, and which rows are theirs.
-
-    Parameters
-    ----------
-    rows
-        Columns of `rows.COLUMNS`.
-    campaign
-        As `results.json` has it.
+    Touches of registered faces are grouped by the level of the sensor; touches of surfaces that no
+    database knows by their kind, where every answer is wrong.
     """
     engine, surface = campaign["engine"], surface_name(campaign)
     registered = rows["object"] != ""
+    names = ("engine", "surface", "sensor", "registered")
     for level in names_in(rows["level"][registered], campaign["levels"]):
-        yield World(engine, surface, level, True), registered & (rows["level"] == level)
+        world = dict(zip(names, (engine, surface, level, True), strict=True))
+        yield world, registered & (rows["level"] == level)
     for kind in names_in(rows["kind"][~registered], campaign["kinds"]):
-        yield World(engine, kind, ALL, False), ~registered & (rows["kind"] == kind)
+        world = dict(zip(names, (engine, kind, ALL, False), strict=True))
+        yield world, ~registered & (rows["kind"] == kind)
 
 
 def worlds_of(rows: Columns, campaign: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return a line for each world, with the states of its bounds."""
+    """Return a line for each world, with the states of its bounds; "" where none can be judged."""
     found = []
-    for world, where in worlds_in(rows, campaign):
-        line = {"engine": world.engine, "surface": world.surface, "sensor": world.sensor,
-                "registered": world.registered, **line_of(rows, where)}  # fmt: skip
-        found.append(line | {"states": states_of(line)})
+    for world, where in _worlds(rows, campaign):
+        line = world | line_of(rows, where)
+        states = {"expected": line["state"]}
+        for name, bound in (("mm", RMS_MM), ("deg", RMS_DEG)):
+            size = _size_found(line, name)
+            states[f"rms_{name}"] = state_of(size, "<=", bound) if line["right"] else ""
+        found.append(line | {"states": states | {"inside_95": line["inside_state"]}})
     return found
-
-
-def states_of(line: dict[str, Any]) -> dict[str, str]:
-    """Return the state of every bound of a world; empty where nothing can be judged."""
-    sizes = {}
-    for name, bound in (("mm", RMS_MM), ("deg", RMS_DEG)):
-        low, high = line[f"rms_{name}_95"]
-        found = {"of": line["right"], "low": low, "high": high}
-        sizes[f"rms_{name}"] = state_of(found, "<=", bound) if line["right"] else ""
-    return {"expected": line["state"], **sizes, "inside_95": line["inside_state"]}
 
 
 def world_times(
     rows: Columns, spent: Mapping[str, Any], campaign: Mapping[str, Any]
 ) -> list[dict[str, float]]:
-    """Return CPU times of a touch, ms, means, in the order of `worlds_of`.
+    """Return mean CPU times of a touch, ms, in the order of `worlds_of`.
 
-    Parameters
-    ----------
-    rows, campaign
-        As `worlds_in` takes them.
-    spent
-        Columns of the times, in the order of the rows, s.
+    `spent` has columns of CPU times in the order of the rows, s.
     """
     return [
         {
             name: round(1e3 * float(np.mean(spent[name][where])), 3)
             for name in ("drawing", "reading")
         }
-        for _, where in worlds_in(rows, campaign)
+        for _, where in _worlds(rows, campaign)
     ]
 
 
@@ -220,42 +176,24 @@ def surface_name(campaign: Mapping[str, Any]) -> str:
     return ", ".join([name, *made])
 
 
-FORMAT = 2  #: of `results.json`; 1 knew no states of lines and no intervals of errors
-WORST = 20
-QUANTILES = (0.5, 0.9, 0.99, 1.0)
-
-#: Edges of the bins of what accuracy is shown against, and the unit.
-BINS: dict[str, tuple[str, list[float]]] = {
-    "force_n": ("N", [20, 40, 60, 80, 100, 120]),
-    "tilt_deg": ("degrees", [0, 0.5, 1, 1.5, 2]),
-    "edge_mm": ("mm", [0, 3, 6, 9, 12, 15, 20, 30, 60]),
-    "symbols": ("symbols", [0, 2, 4, 6, 8, 10, 12, 14, 16, 20, 30, 60]),
-}
-
-
 def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the results of all touches.
+    """Return the results of all touches, in the order of their numbers.
 
-    Parameters
-    ----------
-    rows
-        Columns of `rows.COLUMNS`, in the order of the numbers.
-    campaign
-        As `results.json` has it; None: the usual one.
+    The campaign is as `results.json` has it; None: the usual one.
     """
-    asked = asdict(Campaign()) if campaign is None else campaign
+    given = asdict(Campaign()) if campaign is None else campaign
     verdicts, kinds, levels = rows["verdict"], rows["kind"], rows["level"]
     registered = rows["object"] != ""
     whole = registered & (kinds != "worn")
     fair = np.asarray(rows["enough"], bool)
     inside = kinds == "face"
     everything = np.ones(len(kinds), bool)
-    policy = {"policy": _until_answered(rows, asked)} if asked.get("policy") == NEXT else {}
+    policy = {"policy": _until_answered(rows, given)} if given.get("policy") == NEXT else {}
     return policy | {
         "format": FORMAT,
         "totals": line_of(rows, everything),
         "enough": line_of(rows, fair),
-        "worlds": worlds_of(rows, asked),
+        "worlds": worlds_of(rows, given),
         "verdict": _verdict(rows, fair),
         "kinds": [
             {
@@ -263,16 +201,16 @@ def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict
                 "surface": surface,
                 **line_of(rows, (kinds == kind) & _surface_mask(rows, surface)),
             }
-            for kind, surface in _kinds(rows, asked["kinds"])
+            for kind, surface in _kinds(rows, given["kinds"])
         ],
         "levels": [
             {"level": level, **line_of(rows, (levels == level) & fair)}
-            for level in names_in(levels[fair], asked["levels"])
+            for level in names_in(levels[fair], given["levels"])
         ],
         "objects": _confusion(rows, registered),
         "reasons": dict(sorted(Counter(rows["reason"][verdicts == REJECTED].tolist()).items())),
         "drawn_anew": _drawn_anew(rows),
-        "pose": _pose(rows, asked["levels"]),
+        "pose": _pose(rows, given["levels"]),
         "against": {
             name: {
                 "unit": unit,
@@ -285,13 +223,13 @@ def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict
     }
 
 
-def _until_answered(rows: Columns, asked: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _until_answered(rows: Columns, given: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return how many touches it took until one was answered right, by kind; all faces first."""
     right = rows["verdict"] == RIGHT
     registered = rows["object"] != ""
     found = []
     masks = [("all faces", registered)]
-    masks += [(kind, rows["kind"] == kind) for kind in names_in(rows["kind"], asked["kinds"])]
+    masks += [(kind, rows["kind"] == kind) for kind in names_in(rows["kind"], given["kinds"])]
     for kind, where in masks:
         within = [
             share_of(int((where & right & (rows["touches"] <= n)).sum()), int(where.sum()))
@@ -400,7 +338,7 @@ def _drawn_anew(rows: Columns) -> dict[str, int]:
 
 
 def _face(rows: Columns, numbers: list[int]) -> dict[str, Any]:
-    """Return what became of the touches of a face, and whether it must be looked at."""
+    """Return the line of a face, and whether it needs a look."""
     here = {name: values[numbers] for name, values in rows.items()}
     whole = line_of(here, here["kind"] != "worn")
     return line_of(here, np.ones(len(numbers), bool)) | {"bad": face_is_bad(whole)}

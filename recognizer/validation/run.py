@@ -45,7 +45,7 @@ from recognizer.validation.touch_plan import sensor_of
 from recognizer.validation.trial import REJECTED, RIGHT, WRONG, CpuTime, Row
 from recognizer.validation.workers import Work, Workers, code_digest
 
-RECORD = "asked.json"
+RECORD, SENSOR = "asked.json", "sensor.yaml"
 PRINTS = "printed.json"  #: which surface of the folder of prints is which face
 FORMAT = 2  #: of the record; another one is refused
 
@@ -68,7 +68,7 @@ class RunRecord:
         return Work(self.campaign, url, self.set_digest, self.code_digest, labs, prints)
 
     def work_now(self, folder: Path) -> Work:
-        """Return the same for this version, which may be another than that of the touches."""
+        """Return the work for this version, which may not be that of the touches."""
         return replace(self.work(folder), code_digest=code_digest())
 
 
@@ -106,7 +106,7 @@ def read_record(folder: Path) -> RunRecord:
 
 
 def write_record(record: RunRecord, folder: Path) -> None:
-    """Remember a run."""
+    """Write the record of a run."""
     values = {
         "format": FORMAT,
         "campaign": asdict(record.campaign),
@@ -119,13 +119,7 @@ def write_record(record: RunRecord, folder: Path) -> None:
 
 
 def check_same(before: RunRecord, now: RunRecord, folder: Path) -> None:
-    """See to it that a run goes on as it began.
-
-    Raises
-    ------
-    ValidationError
-        Options, specs, the set or this software have changed.
-    """
+    """Raise `ValidationError` if options, specs, the set or this software have changed."""
     old, new = asdict(before.campaign), asdict(now.campaign)
     differ = [f"{name} {old[name]}, now {new[name]}" for name in new if old[name] != new[name]]
     if before.specs != now.specs:
@@ -172,27 +166,26 @@ class TouchProgress:
         self._bar.begin(stage, touches or None, done)
 
     def step(self, what: str) -> None:
-        """Take note of one more thing that is done in a stage without touches."""
+        """Count one more thing that is done in a stage without touches."""
         self._new += 1
-        done = self._before + self._new
-        rate = self._new / max(time.monotonic() - self._start, 1e-3)
-        left = timedelta(seconds=round((self._touches - done) / max(rate, 1e-9)))
+        done, _, left = self._state()
         self._bar.show(done, f"{done:,}/{self._touches:,} {what}, {left} left")
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Take note of some more touches."""
+        """Count some more touches."""
         for row in rows:
             self._counts[row["verdict"]] += 1
             self._new += 1
-        done = self._before + self._new
-        rate = self._new / max(time.monotonic() - self._start, 1e-3)
-        left = timedelta(seconds=round((self._touches - done) / max(rate, 1e-9)))
+        done, rate, left = self._state()
         counts = ", ".join(f"{number:,} {name}" for name, number in self._counts.items())
         text = f"{done:,}/{self._touches:,}  {rate:.1f} touches/s, {left} left; {counts}"
         self._bar.show(done, text)
 
-
-SENSOR = "sensor.yaml"
+    def _state(self) -> tuple[int, float, timedelta]:
+        """Return how many are done, the rate per second, and the time left."""
+        done = self._before + self._new
+        rate = self._new / max(time.monotonic() - self._start, 1e-3)
+        return done, rate, timedelta(seconds=round((self._touches - done) / max(rate, 1e-9)))
 
 
 def prepare_run(
@@ -200,18 +193,7 @@ def prepare_run(
 ) -> RunRecord:
     """Make the set if it is not there, and write the record of the run.
 
-    Parameters
-    ----------
-    folder
-        Of the run.
-    campaign
-        What decides the results.
-    specs
-        What is made; none: what the database holds.
-    database
-        Where it is registered; empty: in the folder.
-    resume
-        Go on with a run that the folder holds.
+    Without specs the set is what the database holds; an empty `database` is one in the folder.
 
     Raises
     ------

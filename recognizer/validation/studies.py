@@ -1,4 +1,4 @@
-"""Error against run time, and what the reader leaves out.
+"""Error against run time, and the work that is avoided.
 
 Counts go to the results, CPU times to the times: `counted` holds the lines, `spent` their CPU
 times, ms, in order. Contact models and engines were measured against finer references by
@@ -46,10 +46,18 @@ Ints = NDArray[np.int64]
 
 @dataclass(slots=True)
 class Study:
-    """Lines of a picture, and what each took."""
+    """Lines of a picture, and the CPU time of each."""
 
     counted: list[dict[str, Any]] = field(default_factory=list)
-    spent: list[float] = field(default_factory=list)  #: ms CPU
+    spent: list[Any] = field(default_factory=list)  #: ms CPU
+
+    def add_avoided(
+        self, what: str, needed: int, of: int, unit: str,
+        ms: float | None = None, whole_ms: float | None = None,
+    ) -> None:  # fmt: skip
+        """Add a line: how much one touch looks at, out of how much, and the CPU time of both."""
+        self.counted.append({"what": what, "needed": needed, "of": of, "unit": unit})
+        self.spent += [None if t is None else float(f"{t:.3g}") for t in (ms, whole_ms)]
 
 
 def contact_study() -> Study:
@@ -68,7 +76,7 @@ def contact_study() -> Study:
 
 
 def reader_study(folder: Path, campaign: Campaign) -> Study:
-    """Return what readers that spend more or less make of the same touches."""
+    """Return the outcome of the same touches for readers that spend more or less."""
     study = Study()
     for series in series_of(campaign)[1:]:
         rows = columns_of(read_series(folder, series))
@@ -80,7 +88,7 @@ def reader_study(folder: Path, campaign: Campaign) -> Study:
 
 
 def decoder_study(encoding: EmbossedArray, seed: int) -> Study:
-    """Return what decoders make of damaged windows at registered places of an array."""
+    """Return the outcome of damaged windows at registered places of an array, by decoder."""
     study, array = Study(), encoding.array
     shape = (array.window[0] + BEYOND, array.window[1] + BEYOND)
     rng = np.random.default_rng([seed, 2])
@@ -135,17 +143,11 @@ def _exact(array: Any, method: str) -> Callable[[Ints], Decodings]:
     return lambda windows: decode_exact(array, windows, method)
 
 
-def find_savings(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
-    """Return what was left out for a touch of a registered face.
+def work_avoided(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
+    """Return the work that is avoided for a touch of a registered face.
 
-    Parameters
-    ----------
-    reader
-        That reads the touches.
-    plan
-        Of kind `face`; its touch 0 is the example.
-    readers
-        The study of readers; its first is the reader as it is, its last spends most.
+    The example is touch 0 of the plan, of kind `face`; in the study of readers the first is the
+    reader as it is, and the last spends most.
     """
     study = Study()
     _objects(study, reader)
@@ -154,25 +156,32 @@ def find_savings(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
     _triangles(study, plan, reader)
     _cells(study, reader)
     if readers.counted:
-        _add(study, "Ways to read the touch that are tried out: the likeliest ones; more only "
-             "where these give no answer", readers.counted[0]["settings"]["candidates"],
-             readers.counted[-1]["settings"]["candidates"], "ways",
-             readers.spent[0], readers.spent[-1])  # fmt: skip
+        tried, most = (readers.counted[k]["settings"]["candidates"] for k in (0, -1))
+        study.add_avoided(
+            "Ways to read the touch that are tried out: the likeliest ones; more only where these "
+            "give no answer", tried, most, "ways", readers.spent[0], readers.spent[-1],
+        )  # fmt: skip
     return study
 
 
 def _objects(study: Study, reader: Reader) -> None:
-    """Objects read from the database: that whose cells were met."""
+    """Objects read from the database: the one whose cells were found."""
     with read_transaction(open_database(reader.lab.url, writable=False)) as connection:
         names = object_names(connection)
         spent = [_cpu_ms(partial(read_object, connection, name), 1) for name in names[:OBJECTS]]
     one = float(np.median(spent))
-    _add(study, "Objects loaded from the database: only the one that is touched", 1, len(names),
-         "objects", one, one * len(names))  # fmt: skip
+    study.add_avoided(
+        "Objects loaded from the database: only the one that is touched",
+        1,
+        len(names),
+        "objects",
+        one,
+        one * len(names),
+    )
 
 
 def _heights(study: Study, plan: TouchPlan, reader: Reader) -> None:
-    """Heights asked: under the tips, not of the whole face."""
+    """Heights computed: under the tips, not of the whole face."""
     found = draw_touch(plan, 0, reader)
     scene = found.contact.scene
     points = tip_points(reader.sensor, Tips())[0].reshape(-1, 2)
@@ -184,10 +193,14 @@ def _heights(study: Study, plan: TouchPlan, reader: Reader) -> None:
     whole = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     surface = scene.surface
     surface.heights_mm(under)
-    _add(study, "Places where the height of the surface is computed: only under the sensor's tips",
-         len(under), len(whole), "places",
-         _cpu_ms(lambda: surface.heights_mm(under)),
-         _cpu_ms(lambda: surface.heights_mm(whole)))  # fmt: skip
+    study.add_avoided(
+        "Places where the height of the surface is computed: only under the sensor's tips",
+        len(under),
+        len(whole),
+        "places",
+        _cpu_ms(lambda: surface.heights_mm(under)),
+        _cpu_ms(lambda: surface.heights_mm(whole)),
+    )
 
 
 def _levels(study: Study, reader: Reader) -> None:
@@ -196,10 +209,15 @@ def _levels(study: Study, reader: Reader) -> None:
     chosen = level_for(reader.sensor)
     lines = {line.level: line for line in table()[kind]}
     finest = [level for level in LEVELS[kind] if level in lines][-1]
-    _add(study, f"Fineness of the simulated contact: {chosen}, the cheapest that is exact enough; "
-         f"the finest is {finest}",
-         LEVELS[kind].index(chosen) + 1, len(lines), "levels", lines[chosen].ms,
-         lines[finest].ms)  # fmt: skip
+    study.add_avoided(
+        f"Fineness of the simulated contact: {chosen}, the cheapest that is exact enough; "
+        f"the finest is {finest}",
+        LEVELS[kind].index(chosen) + 1,
+        len(lines),
+        "levels",
+        lines[chosen].ms,
+        lines[finest].ms,
+    )
 
 
 def _triangles(study: Study, plan: TouchPlan, reader: Reader) -> None:
@@ -213,12 +231,16 @@ def _triangles(study: Study, plan: TouchPlan, reader: Reader) -> None:
     if counted is None:
         return
     needed, of = counted
-    _add(study, f"Triangles of the part that engine {plan.engine} gets: only those under the "
-         "sensor", needed, of, "triangles", None, None)  # fmt: skip
+    study.add_avoided(
+        f"Triangles of the part that engine {plan.engine} gets: only those under the sensor",
+        needed,
+        of,
+        "triangles",
+    )
 
 
 def engine_lines() -> list[dict[str, Any]]:
-    """Return what each engine leaves out of a real touch, in plain words."""
+    """Return, in plain words, which effects of a real touch each engine leaves out."""
     measured = {line.engine: line.from_own for line in engine_table()}
     return [
         {"engine": name, "left_out": entry.left_out, "from_own": measured.get(name)}
@@ -234,24 +256,7 @@ def _cells(study: Study, reader: Reader) -> None:
             f"Places that an answer may name: only those that were made, of all "
             f"{encoding.array.rows} x {encoding.array.columns} of the array"
         )
-        _add(study, what, len(encoding.keys), cells, "places", None, None)
-
-
-def _add(
-    study: Study,
-    what: str,
-    needed: int,
-    of: int,
-    unit: str,
-    ms: float | None,
-    whole_ms: float | None,
-) -> None:
-    study.counted.append({"what": what, "needed": needed, "of": of, "unit": unit})
-    study.spent += [_three_digits(ms), _three_digits(whole_ms)]
-
-
-def _three_digits(ms: float | None) -> Any:
-    return None if ms is None else float(f"{ms:.3g}")
+        study.add_avoided(what, len(encoding.keys), cells, "places")
 
 
 def _cpu_ms(work: Callable[[], object], repeats: int = REPEATS) -> float:

@@ -59,7 +59,7 @@ Proposal = Callable[[Recognition, np.random.Generator], NextTouch | None]
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """What became of a touch."""
+    """The outcome of a touch."""
 
     number: int
     kind: str
@@ -86,7 +86,7 @@ class Trial:
 
 
 def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
-    """Return what became of one touch, or of those that followed it."""
+    """Return the outcome of one touch, or of those that followed it."""
     if plan.policy == NEXT:
         return _trial_of_several(plan, number, reader)
     found = draw_touch(plan, number, reader)

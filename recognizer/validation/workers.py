@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 LOSSES = 3  #: pools in a row that break before they have done anything
 CLUSTER_WAIT_S = 20.0  #: for the scheduler, and for its first worker
 
+Result = TypeVar("Result")
 PACKAGES = ("generator", "decoder", "probe", "recognizer")
 
 
@@ -63,17 +64,17 @@ class BatchResult:
     times: tuple[CpuTime, ...]
 
 
-#: Takes work and batches, yields what is done in any order. `workers`, `cluster`.
+#: Takes work and batches, yields finished batches in any order.
 Workers = Callable[[Work, Iterable[Batch]], Iterator[BatchResult]]
 
 
 def touch(work: Work, batch: Batch) -> BatchResult:
-    """Return what became of the touches of a batch.
+    """Return the rows of a batch's touches.
 
     Raises
     ------
     WorkersError
-        The code or the set is not the one that was asked for.
+        The code or the set is not that of the run.
     """
     reader = prepare_reader(work)
     series = next(s for s in series_of(work.campaign) if s.name == batch.series)
@@ -118,9 +119,6 @@ def code_digest() -> str:
             digest.update(path.relative_to(root).as_posix().encode() + b"\0")
             digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()
-
-
-Result = TypeVar("Result")
 
 
 def workers_of(processes: int, cluster: str = "") -> Workers:
@@ -171,7 +169,7 @@ def run_pool(
     BrokenProcessPool
         A process was lost; also what a call raises.
     """
-    # Begun anew rather than forked: no open database and no thread is taken over.
+    # Started fresh rather than forked: no open database and no thread is taken over.
     pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_worker)
     try:
         waiting = [pool.submit(function, *call) for call in calls]
@@ -268,7 +266,7 @@ def connect(address: str) -> Client:
 
 
 def _failure(error: Any) -> Exception:
-    """Return what a worker raised; what became of a batch that outlived its workers."""
+    """Return the error of a worker, or of a batch that outlived its workers."""
     if type(error).__name__ == "KilledWorker":
         return WorkersError(
             "several workers were lost at the same touches",

@@ -139,7 +139,7 @@ def scan(side_mm, repeat):
 
 def scanned(surface, loops, sensor, level):
     """Scan once; return the number of frames, and CPU seconds of arm, contact and board."""
-    from probe.arm.links import Arm
+    from probe.arm import Arm
     from probe.circuit import Electronics, fsr_of, read_counts
     from probe.frame import frame_from
     from probe.scan.kinesthetic import JointErrors, follow_poses

@@ -20,8 +20,8 @@ from encoded_objects.base.sensor_type import SensorType
 from probe.circuit import QUIET, Electronics, conductances, fsr_of, invert_readings
 from probe.client.client import Client
 from probe.contact.press import press
+from probe.firmware.emulator import EmulatedProbe, emulated_probe
 from probe.port import open_port
-from probe.port.emulated import EmulatedProbe, emulated_probe
 from probe.protocol import Command, Damage, FramePacket, Splitter, decode
 from probe.simulate.registered import registered_surface
 from probe.simulate.touch import TouchRanges, random_touches

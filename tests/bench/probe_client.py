@@ -27,7 +27,7 @@ import numpy as np
 
 from probe.client import Client
 from probe.frame import frame_from
-from probe.port.pattern import moving_pattern
+from probe.port.simulated import moving_pattern
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
 from probe.recording.record import Recorder

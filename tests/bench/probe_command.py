@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from probe.port.emulated import emulated_probe
+from probe.firmware.emulator import emulated_probe
 
 COMMAND = (sys.executable, "-c", "from probe.command import main; main()")
 SHORT_S = 4.0

@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from probe.firmware.emulator import EmulatedProbe, emulated_probe
 from probe.port import open_port
-from probe.port.emulated import EmulatedProbe, emulated_probe
 from probe.protocol import Command, Damage, FramePacket, Splitter, bits_command, decode
 
 IMAGES = 64

@@ -24,7 +24,7 @@ from scipy.ndimage import gaussian_filter
 from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
-from probe.arm.links import Arm
+from probe.arm import Arm
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
@@ -35,14 +35,14 @@ from probe.simulate.registered import registered_surface
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
 from recognizer.scan.mosaic.planar import relative_pose, transform_points
-from recognizer.thesis.edges.find import classical_edges, outline
+from recognizer.thesis.edge_fit import outline
+from recognizer.thesis.edges import classical_edges
 from recognizer.thesis.filters import median, subtract_bias
 from recognizer.thesis.grid import grid
-from recognizer.thesis.image import merge_touches
+from recognizer.thesis.merge import merge_touches
 from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_while_scanning, spatial_pose
-from recognizer.thesis.settings import MergingSettings
-from recognizer.thesis.skeleton.symbols import symbols
+from recognizer.thesis.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.tactile_image import touch_image
 
@@ -235,9 +235,9 @@ class Tally:
         )
 
 
-def first_answer(lab, readings, believed, merging):
+def first_answer(lab, readings, believed, *merging):
     """Touches until an answer, in steps of four; None without one."""
-    while_scanning = read_while_scanning(lab, SENSOR, readings, believed, merging=merging, every=4)
+    while_scanning = read_while_scanning(lab, SENSOR, readings, believed, *merging, every=4)
     early = next((reading for reading in while_scanning if reading.recognition), None)
     return None if early is None else len(early.merged.poses)
 
@@ -257,11 +257,9 @@ def bench_scans(url, scans, seed, sigmas):
             scene = registered_surface(url, name, side)
             believed, readings, true = scanned(scene, level, rng, 0.4 * copy, sigma)
             for placing, tally in tallies.items():
-                merging = MergingSettings(
-                    placing=placing, window_tactels=max(0.75, 2 * (sigma or 0))
-                )
+                merging = placing, max(0.75, 2 * (sigma or 0))
                 begun = time.process_time()
-                image = merge_touches(SENSOR, readings, believed, merging)
+                image = merge_touches(SENSOR, readings, believed, *merging)
                 found = read_classically(
                     lab, image.image, T_image_probe=spatial_pose(image.poses[-1])
                 )
@@ -273,7 +271,7 @@ def bench_scans(url, scans, seed, sigmas):
                 tally.touches.append(len(readings))
                 tally.add(found.recognition, (name, side), true[-1])
                 if placing == "bounded" and copy == 0:
-                    tally.first.append(first_answer(lab, readings, believed, merging))
+                    tally.first.append(first_answer(lab, readings, believed, *merging))
         for placing, tally in tallies.items():
             shown = "arm" if sigma is None else f"{sigma:g}"
             print(f"{level:9}{shown:>6}  {placing:9}{tally.row()}", flush=True)
@@ -298,7 +296,7 @@ def bench_stages(lab, url, seed):
 
     image = stage("merge by products", lambda: merge_touches(SENSOR, readings, believed)).image
     stage("merge as believed", lambda: merge_touches(SENSOR, readings, believed,
-                                              MergingSettings(placing="believed")))  # fmt: skip
+                                              "believed"))  # fmt: skip
     over = stage("bias, median", lambda: median(subtract_bias(image)))
     found = stage("ink, thinning, counting", lambda: symbols(over, encoding.alphabet,
                                                              encoding.style))  # fmt: skip

@@ -31,7 +31,7 @@ import numpy as np
 from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
-from probe.arm.links import Arm
+from probe.arm import Arm
 from probe.circuit import Electronics, fsr_of, read_counts
 from probe.contact.contract import Touch
 from probe.contact.press import press
@@ -55,7 +55,7 @@ from recognizer.scan.mosaic.planar import (
     wrap_angle,
 )
 from recognizer.scan.mosaic.register import register_patches
-from recognizer.thesis.product import product_shift
+from recognizer.thesis.merge import product_shift
 from recognizer.touch.lab import open_lab
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader

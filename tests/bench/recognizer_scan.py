@@ -29,7 +29,7 @@ from pathlib import Path
 import numpy as np
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm.links import Arm
+from probe.arm import Arm
 from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.scan.kinesthetic import JointErrors, follow_poses
@@ -50,7 +50,6 @@ from recognizer.scan.mosaic.planar import (
     transform_points,
 )
 from recognizer.thesis.scan import read_scan as read_classically
-from recognizer.thesis.settings import MergingSettings
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
@@ -262,13 +261,13 @@ def alone(reader, felt, name, tally):
 
 def classical(lab, felt, name, sigma, tally):
     """Read a scan the thesis's way, after every eighth touch and at the end."""
-    merging = MergingSettings(window_tactels=max(0.75, 2 * (sigma or 0)))
+    window = max(0.75, 2 * (sigma or 0))
     poses = np.array([touch.believed.pose for touch in felt.touches])
     images = [np.maximum(counts - BIAS, 0) for counts in felt.counts]
     first, n = None, len(images)
     for k in [*range(8, n, 8), n]:
         start = time.process_time()
-        found = read_classically(lab, SENSOR, images[:k], poses[:k], merging=merging)
+        found = read_classically(lab, SENSOR, images[:k], poses[:k], window_tactels=window)
         if k == n:
             tally.ms.append(1e3 * (time.process_time() - start) / n)
         if tally.judge(found.recognition, name, felt.true[k - 1]) and first is None:

@@ -31,10 +31,14 @@ from probe.simulate.world.levels import LEVELS  # noqa: E402
 from probe.simulate.world.sensor import LevelSensor  # noqa: E402
 from probe.simulate.written import written_triangles  # noqa: E402
 from probe.surface.mesh import mesh  # noqa: E402
-from recognizer.as_built.estimate import estimate_print  # noqa: E402
-from recognizer.as_built.keep import keep_prints  # noqa: E402
-from recognizer.as_built.settings import WIDE_SCALE  # noqa: E402
-from recognizer.as_built.touches import feel_prints  # noqa: E402
+from recognizer.as_built.estimate import (  # noqa: E402
+    estimate_print,
+    keep_prints,
+)
+from recognizer.as_built.touches import (  # noqa: E402
+    WIDE_SCALE,
+    measure_prints,
+)
 from recognizer.as_built.verdict import judge_print  # noqa: E402
 from recognizer.errors import AsBuiltError  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
@@ -144,7 +148,7 @@ def main() -> None:
         wide = Reader(open_lab(database), options=WIDE_SCALE)
         start = perf_counter()
         try:
-            felt = feel_prints(wide, learn)
+            felt = measure_prints(wide, learn)
             found = estimate_print(felt, object_id=1, printer="fdm-0.4")
         except AsBuiltError as error:
             print(f"{name}: {error}; the usual reader answers {usual} of {len(learn)}", flush=True)

@@ -25,10 +25,8 @@ from generator.database.transaction import read_transaction
 from probe.errors import SurfaceError
 from probe.simulate.printed import printed_scene, read_listing
 from probe.simulate.registered import registered_object, registered_objects
-from recognizer.as_built.estimate import estimate_print
-from recognizer.as_built.keep import keep_prints
-from recognizer.as_built.settings import settings_for_prints
-from recognizer.as_built.touches import feel_prints
+from recognizer.as_built.estimate import estimate_print, keep_prints
+from recognizer.as_built.touches import WIDE_SCALE, measure_prints
 from recognizer.errors import AsBuiltError
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
@@ -75,7 +73,7 @@ def main() -> None:
         ]
         judge = list(as_built.touched(scene, reader, 2, options.touches, options.level))
         try:
-            felt = feel_prints(Reader(open_lab(copy), settings=settings_for_prints()), learn)
+            felt = measure_prints(Reader(open_lab(copy), options=WIDE_SCALE), learn)
             found = estimate_print(felt, object_id=numbers[name], printer="fdm-0.4")
         except AsBuiltError as error:
             print(f"{name}/{face}: {error}", flush=True)

@@ -26,8 +26,8 @@ import numpy as np
 
 from probe.client import Client, ClientStatistics
 from probe.errors import PortError
+from probe.firmware.emulator import EmulatedProbe, emulated_probe
 from probe.frame import Frame
-from probe.port.emulated import EmulatedProbe, emulated_probe
 
 SHOWN_S = 0.02
 REMEMBERED = 64  # images, more than a second

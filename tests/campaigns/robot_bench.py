@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "examples"))
 import mujoco
 import mujoco_bench as world
 
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from probe.errors import PoseError
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.robot import ObjectPose, object_pose

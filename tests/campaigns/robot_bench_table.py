@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.stats import beta, chi2
 
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.robot import ObjectPose, fuse_poses, object_pose
 

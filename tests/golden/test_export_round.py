@@ -14,7 +14,7 @@ from generator.export.check import BENT_VOLUME, verify_step
 from generator.export.step import step_chunks
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.read import read_shape
-from generator.polyhedron.round import cone, cylinder
+from generator.polyhedron.shapes import cone, cylinder
 from generator.solid import emboss_whole
 
 pytest.importorskip("OCP")

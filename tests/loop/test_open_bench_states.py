@@ -195,7 +195,7 @@ def test_a_port_that_goes_away_for_good_is_named(served, browser, tmp_path):
         expect(state).to_contain_text(re.compile("probe is gone: .*ttyNONE"), timeout=PATIENCE_MS)
         for name in ("record", "bias", "calibrate", "touch-go"):  # cannot work: off
             expect(page.get_by_test_id(name)).to_be_disabled()
-        page.get_by_test_id("port").select_option("touch:")  # another one still can be chosen
+        page.get_by_test_id("port").select_option("sim:touch")  # another one still can be chosen
         expect(state).to_contain_text("probe is there", timeout=PATIENCE_MS)
         assert httpx.get(f"{address}api/touches").json()["touches"] == []
         shown(page, "Cube")

@@ -13,8 +13,8 @@ from cobs import cobs
 
 from probe.client import Client
 from probe.errors import PortError
+from probe.firmware.emulator import emulated_probe
 from probe.frame import frame_from
-from probe.port.emulated import emulated_probe
 from probe.recording.record import Recorder
 
 PATIENCE_S = 20.0  # of a busy machine

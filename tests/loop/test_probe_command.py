@@ -24,8 +24,8 @@ from generator.spec import read_specs
 from probe.circuit import QUIET, Electronics, fsr_of, read_counts
 from probe.command import run
 from probe.errors import RecordingError
+from probe.firmware.emulator import emulated_probe
 from probe.frame import frame_from
-from probe.port.emulated import emulated_probe
 from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 

@@ -19,8 +19,8 @@ from probe.circuit import QUIET, Electronics, invert_readings
 from probe.circuit.reading import shares
 from probe.errors import PortError
 from probe.firmware.build import SOURCES
+from probe.firmware.emulator import emulated_probe
 from probe.port import open_port
-from probe.port.emulated import emulated_probe
 from probe.protocol import Damage, FramePacket, IdentPacket, Splitter, StatisticsPacket, decode
 
 HERTZ = 16_000_000
@@ -444,7 +444,7 @@ def test_paced_it_is_no_faster_than_real_time():
 
 def test_it_does_not_outlive_the_programme_that_started_it(tmp_path):
     programme = (
-        "import time\nfrom probe.port.emulated import emulated_probe\n"
+        "import time\nfrom probe.firmware.emulator import emulated_probe\n"
         "with emulated_probe() as probe:\n"
         "    print(probe._host._process.pid, probe.device, flush=True)\n    time.sleep(60)\n"
     )

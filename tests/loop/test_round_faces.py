@@ -24,8 +24,8 @@ from generator.database.transaction import read_transaction
 from generator.pipeline import encode
 from generator.plane.polygon import points_inside
 from generator.plane.rings import distance
-from generator.polyhedron.developable import developable_from
 from generator.polyhedron.development import development
+from generator.polyhedron.winged import developable_from
 from generator.spec import read_specs
 from probe.simulate.registered import registered_object
 from probe.simulate.scene import bare_scene

@@ -8,13 +8,9 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from probe.arm.inverse import inverse
-from probe.arm.jacobian import GAIN, joint_speeds
-from probe.arm.links import Arm, forward
-from probe.arm.settings import ARM_MOTION
+from probe.arm import GAIN, LEAST_SINGULAR, LENGTH_MM, Arm, forward, inverse, joint_speeds
 from probe.errors import PoseError
-from probe.wrist.distances import distances_at, wrist_pose
-from probe.wrist.geometry import Wrist, gripper_to_plate
+from probe.wrist import Wrist, distances_at, gripper_to_plate, wrist_pose
 
 ARM = Arm()
 ANGLE = st.floats(-math.pi, math.pi)
@@ -67,11 +63,8 @@ def test_a_vertical_approach_is_reached_or_refused(place, turn, tilt):
 @given(JOINTS, st.lists(st.floats(-1, 1), min_size=6, max_size=6).map(np.array), st.integers(0, 15))
 def test_joint_speeds_are_bounded_everywhere(q, twist, exponent):
     q[2] *= 10.0**-exponent
-    speeds = joint_speeds(ARM, q, twist * np.repeat([ARM_MOTION.length_mm, 1.0], 3))
-    assert (
-        np.linalg.norm(speeds)
-        <= GAIN / ARM_MOTION.least_singular * np.linalg.norm(twist) * 1.000001
-    )
+    speeds = joint_speeds(ARM, q, twist * np.repeat([LENGTH_MM, 1.0], 3))
+    assert np.linalg.norm(speeds) <= GAIN / LEAST_SINGULAR * np.linalg.norm(twist) * 1.000001
 
 
 @settings(deadline=None, max_examples=150)

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from probe.client.receiver import Receiver
 from probe.protocol import (
+    LONGEST,
     Damage,
     FramePacket,
     IdentPacket,
@@ -14,7 +15,6 @@ from probe.protocol import (
     decode,
     encode,
 )
-from probe.protocol.splitter import LONGEST
 
 U16, U32 = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 U8 = st.integers(0, 255)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.scan.mosaic.canvas import CanvasEntry, empty_canvas, image_of, lay_touch
+from recognizer.scan.mosaic.canvas import CanvasEntry, add_to_canvas, empty_canvas, image_of
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import compose_poses, inverse, relative_pose, transform_points
 from recognizer.scan.mosaic.pose_graph import PLANE, Constraint, covariances, solve_pose_graph
@@ -64,9 +64,9 @@ def test_the_order_of_touches_does_not_matter_to_the_canvas(seed, places):
     ]
     there, back = empty_canvas(SENSOR.pitch_mm), empty_canvas(SENSOR.pitch_mm)
     for patch, how in some:
-        there = lay_touch(there, patch, how)
+        there = add_to_canvas(there, patch, how)
     for patch, how in reversed(some):
-        back = lay_touch(back, patch, how)
+        back = add_to_canvas(back, patch, how)
     assert there.tiles.keys() == back.tiles.keys()
     one = image_of(there) if np.ptp(np.array(places)[:, :2], axis=0).max() < 100 else None
     if one is not None:
@@ -75,13 +75,13 @@ def test_the_order_of_touches_does_not_matter_to_the_canvas(seed, places):
         assert one.values == pytest.approx(two.values, abs=1e-9)
         assert np.isfinite(one.error).all()
     for patch, how in some:
-        there = lay_touch(there, patch, how, -1)
+        there = add_to_canvas(there, patch, how, -1)
     assert not there.tiles
 
 
 @given(seeds, st.integers(2, 12))
 @settings(max_examples=20, deadline=None)
-def test_whatever_the_ties_say_there_is_a_pose_with_a_covariance(seed, n):
+def test_any_constraints_give_a_pose_with_a_covariance(seed, n):
     rng = np.random.default_rng(seed)
     constraints = []
     for k in range(n):

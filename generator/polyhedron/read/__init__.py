@@ -14,11 +14,13 @@ import numpy as np
 from generator.errors import ShapeError
 from generator.polyhedron.read.mesh import solid_of_soup
 from generator.polyhedron.read.obj import read_obj
-from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import Soup
 from generator.polyhedron.read.step import read_step
 from generator.polyhedron.read.stl import read_stl
 from generator.polyhedron.winged import Polyhedron
+
+LARGEST_BYTES = 64 * 2**20  #: of a file: bounds the memory
+LARGEST_MM = 1e4  #: of the solid, as of a length in a spec
 
 MESHES: dict[str, Callable[[bytes, str], Soup]] = {".stl": read_stl, ".obj": read_obj}
 STEP = (".step", ".stp")
@@ -59,7 +61,7 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
             place=place,
         )
     try:
-        content = file_content(file, place, MODEL.largest_bytes)
+        content = file_content(file, place, LARGEST_BYTES)
         if suffix not in MESHES:
             solid = read_step(content, place, scale)
         else:
@@ -75,9 +77,9 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
 
 def _check_size(solid: Polyhedron) -> None:
     largest = float(np.ptp(solid.vertices, axis=0).max())
-    if largest > MODEL.largest_mm:
+    if largest > LARGEST_MM:
         raise ShapeError(
-            f"the model is {largest / 1000:.3g} m long; {MODEL.largest_mm / 1000:g} m are allowed",
+            f"the model is {largest / 1000:.3g} m long; {LARGEST_MM / 1000:g} m are allowed",
             fix="check its unit: shape: {file: ..., scale: 0.001} makes it a thousandth",
         )
 

@@ -1,22 +1,31 @@
 """The CAD kernel's part of reading solids with round faces: facets on common points.
 
 The kernel divides every edge once, into steps of one angle for all circles, so faces meet in
-the same points. A planar face becomes a polygon. A cylinder or cone face between two circles
-and two straight lines (or all around) becomes a run of facets that unroll; everything else is
-taken as the kernel's triangles, which no symbol stands on. A solid of very many facets is divided
-more coarsely, and says so. Lengths in mm, angles in rad.
+the same points. A planar face becomes a polygon. A cylinder or cone face becomes a run of facets
+that unroll if its outline is circles, a straight line, circles, a straight line (all around the
+axis the two lines are one seam), or of a cone up to its tip circles and two lines, and both
+circles are divided at the same angles. Everything else is taken as the kernel's triangles, which
+no symbol stands on. A solid of very many facets is divided more coarsely, and says so. Lengths in
+mm, angles in rad.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import groupby, pairwise
 from typing import Any
 
+import numpy as np
+
 from generator.errors import ShapeError
-from generator.polyhedron.read.settings import MODEL
-from generator.polyhedron.read.strip import run_of
-from generator.polyhedron.settings import SOLID
+from generator.polyhedron.read.soup import MOST_FACETS
+from generator.polyhedron.shapes import CHORD_ERROR_MM, FACETS
+
+SAME = 1e-6  #: share of the size within which lines and circles are what they seem
+BLANK_ERROR_MM = 0.1  #: chord error of faces that carry no symbols: half a printed layer
+INTERIOR_RAD = 0.35  #: between triangles of faces that carry no symbols
+COARSER = (1.0, 2.0, 5.0, 10.0)  #: times the chord errors, until there are few enough facets
 
 _REMAKE = "check the model in a CAD program, make that face anew, and export it again"
 
@@ -56,22 +65,22 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
         There are too many facets, or the kernel cannot divide a face.
     """
     counts: list[int] = []
-    for coarser in MODEL.coarser:
+    for coarser in COARSER:
         found = _tessellate(solid, faces, kinds, coarser)
         counts.append(len(found.faces))
-        if counts[-1] <= MODEL.most_facets:
+        if counts[-1] <= MOST_FACETS:
             break
     else:
         raise ShapeError(
             f"its round faces need {min(counts)} facets, to "
-            f"{MODEL.blank_error_mm * MODEL.coarser[-1]:g} mm; {MODEL.most_facets} are allowed",
+            f"{BLANK_ERROR_MM * COARSER[-1]:g} mm; {MOST_FACETS} are allowed",
             fix="leave out threads, small fillets and other round parts that carry no symbols",
         )
     notes = []
     if coarser > 1.0:
         notes.append(
-            f"round faces were divided to {MODEL.blank_error_mm * coarser:g} mm, those with "
-            f"symbols to {SOLID.chord_error_mm * coarser:g} mm: finer, they have {counts[-2]} "
+            f"round faces were divided to {BLANK_ERROR_MM * coarser:g} mm, those with "
+            f"symbols to {CHORD_ERROR_MM * coarser:g} mm: finer, they have {counts[-2]} "
             "facets"
         )
     return {
@@ -82,7 +91,7 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
         "blank": found.blank,
         "kinds": found.kinds,
         "notes": notes,
-        "error_mm": MODEL.blank_error_mm * coarser,
+        "error_mm": BLANK_ERROR_MM * coarser,
     }
 
 
@@ -95,10 +104,10 @@ def _tessellate(solid: Any, faces: list[Any], kinds: list[str], coarser: float) 
     step, radius = _step(faces, kinds, coarser)
     limits = IMeshTools_Parameters()
     # On circles of cylinders and cones the angle alone may count, so that those of a cone match.
-    limits.Deflection = max(MODEL.blank_error_mm * coarser, 2.0 * _chord_error(radius, step))
+    limits.Deflection = max(BLANK_ERROR_MM * coarser, 2.0 * _chord_error(radius, step))
     limits.DeflectionInterior = limits.Deflection
     limits.Angle = 2.0 * step  # which the kernel halves on edges
-    limits.AngleInterior = MODEL.interior_rad * math.sqrt(coarser)
+    limits.AngleInterior = INTERIOR_RAD * math.sqrt(coarser)
     limits.MinSize = 1e-6
     BRepTools.Clean_s(solid)
     BRepMesh_IncrementalMesh(solid, limits)
@@ -122,7 +131,7 @@ def _gather(faces: list[Any], kinds: list[str], divided: set[int]) -> _Found | N
         if kind == "plane":
             found.add(name, [[_ids(wire) for wire in wires]])
             continue
-        run = run_of(face, kind, wires, found.points) if kind in ("cylinder", "cone") else None
+        run = _run_of(face, kind, wires, found.points) if kind in ("cylinder", "cone") else None
         if run is not None:
             loops, definition = run
             facets = found.add(name, [[loop] for loop in loops])
@@ -147,9 +156,9 @@ def _step(faces: list[Any], kinds: list[str], coarser: float) -> tuple[float, fl
             ends = (surface.FirstVParameter(), surface.LastVParameter())
             sine = math.sin(surface.Cone().SemiAngle())
             radii += [abs(surface.Cone().RefRadius() + v * sine) for v in ends]
-    steps = math.pi / math.acos(max(0.0, 1.0 - coarser * SOLID.chord_error_mm / max(radii)))
-    fewest = SOLID.facets[0] / math.sqrt(coarser)
-    wanted = min(4 * math.ceil(max(steps, fewest) / 4), SOLID.facets[1])
+    steps = math.pi / math.acos(max(0.0, 1.0 - coarser * CHORD_ERROR_MM / max(radii)))
+    fewest = FACETS[0] / math.sqrt(coarser)
+    wanted = min(4 * math.ceil(max(steps, fewest) / 4), FACETS[1])
     return 2.0 * math.pi / wanted * (1.0 + 1e-9), max(radii)  # so that a rounding adds no step
 
 
@@ -279,3 +288,109 @@ def _is_straight(edge: Any) -> bool:
     if BRep_Tool.Degenerated_s(edge):
         return False
     return bool(BRepAdaptor_Curve(edge).GetType() == GeomAbs_Line)
+
+
+def _run_of(
+    face: Any, kind: str, wires: list[list[tuple[Any, list[int]]]], points: list[Any]
+) -> tuple[list[list[int]], dict[str, Any]] | None:
+    """Return the facets of a cylinder or cone between two circles; None for any other outline."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+    if len(wires) != 1:
+        return None
+    surface = BRepAdaptor_Surface(face)
+    shape = surface.Cylinder() if kind == "cylinder" else surface.Cone()
+    axis = shape.Axis()
+    origin = np.array([axis.Location().X(), axis.Location().Y(), axis.Location().Z()])
+    ahead = np.array([axis.Direction().X(), axis.Direction().Y(), axis.Direction().Z()])
+    where = np.array(points)
+    sides = [_Side.of(numbers, where[numbers] - origin, ahead) for _, numbers in wires[0]]
+    chains = _two_chains(sides)
+    if chains is None:
+        return None
+    low, high = chains
+    angles = [_angles(where[chain] - origin, ahead) for chain in (low, high) if len(chain) > 1]
+    if len(angles) == 2 and (
+        len(low) != len(high) or np.abs(angles[0] - angles[1]).max() > math.radians(0.01)
+    ):
+        return None
+    pairs = list(zip(low, high if len(high) > 1 else high * len(low), strict=True))
+    loops = [[a, b, d, c] if c != d else [a, b, c] for (a, c), (b, d) in pairwise(pairs)]
+    chosen = where[[*low, *high]] - origin
+    reach = np.linalg.norm(chosen - (chosen @ ahead)[:, None] * ahead, axis=1).max()
+    turn = float(np.abs(np.diff(angles[0])).max())
+    corners = where[loops[0]] - origin
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    middle = corners[:2].mean(axis=0)
+    return loops, {
+        "kind": kind,
+        "radius_mm": float(reach),
+        "half_angle_rad": abs(float(shape.SemiAngle())) if kind == "cone" else 0.0,
+        "closed": low[0] == low[-1],
+        "concave": bool(normal @ (middle - (middle @ ahead) * ahead) < 0.0),
+        "chord_error_mm": float(reach * (1.0 - math.cos(turn / 2.0))),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Side:
+    """One edge of a round face."""
+
+    kind: str  #: circle, line, other
+    numbers: list[int]  #: its points, in order around the face
+
+    @classmethod
+    def of(cls, numbers: list[int], place: Any, ahead: Any) -> _Side:
+        """Return what an edge is; `place` (k, 3) from a point of the axis along `ahead`."""
+        height = place @ ahead
+        radial = place - height[:, None] * ahead
+        radius = np.linalg.norm(radial, axis=1)
+        slack = SAME * max(1.0, float(np.abs(place).max()))
+        if len(numbers) > 2 and np.ptp(height) <= slack and np.ptp(radius) <= slack:
+            return cls("circle", numbers)
+        if len(numbers) == 2 and _is_upright(radial, radius):
+            return cls("line", numbers)
+        return cls("other", numbers)
+
+
+def _is_upright(radial: Any, radius: Any) -> bool:
+    """Whether both ends of a straight edge lie on one side of the axis; the tip counts."""
+    if radius.min() <= SAME * radius.max():
+        return True
+    cosine = float(radial[0] @ radial[1]) / float(radius[0] * radius[1])
+    return cosine > 1.0 - 1e-9
+
+
+def _two_chains(sides: list[_Side]) -> tuple[list[int], list[int]] | None:
+    """Return the points below and above, both to the right; None for another outline.
+
+    The outline is circles, a line, circles, a line; or, of a cone up to its tip, circles and two
+    lines.
+    """
+    starts = [
+        k for k, side in enumerate(sides) if side.kind == "circle" and sides[k - 1].kind == "line"
+    ]
+    if not starts:
+        return None
+    sides = sides[starts[0] :] + sides[: starts[0]]
+    runs = [(kind, list(same)) for kind, same in groupby(sides, key=lambda side: side.kind)]
+    shape = [kind if kind == "circle" else f"{len(same)} {kind}" for kind, same in runs]
+    below = _join_chains([side.numbers for side in runs[0][1]])
+    if shape == ["circle", "1 line", "circle", "1 line"]:
+        return below, _join_chains([side.numbers for side in runs[2][1]])[::-1]
+    if shape == ["circle", "2 line"]:
+        return below, [runs[1][1][0].numbers[-1]]
+    return None
+
+
+def _join_chains(chains: list[list[int]]) -> list[int]:
+    """Return chains that follow each other as one."""
+    return [*(number for chain in chains for number in chain[:-1]), chains[-1][-1]]
+
+
+def _angles(place: Any, ahead: Any) -> Any:
+    """Return the angles of points about the axis, without jumps."""
+    radial = place - (place @ ahead)[:, None] * ahead
+    x = radial[0] / np.linalg.norm(radial[0])
+    y = np.cross(ahead, x)
+    return np.unwrap(np.arctan2(radial @ y, radial @ x))

@@ -19,8 +19,8 @@ import numpy as np
 
 from encoded_objects.base.errors import install_line
 from generator.errors import ShapeError
-from generator.polyhedron.read.settings import MODEL
 
+PLANAR_MM = 1e-5  #: a spline surface this flat is a plane; kernel tolerances are smaller
 AGAIN = "export the model again; the file may be damaged"
 
 
@@ -133,7 +133,7 @@ def _kind(face: Any) -> str:
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomLib import GeomLib_IsPlanarSurface
 
-    if GeomLib_IsPlanarSurface(BRep_Tool.Surface_s(face), MODEL.planar_mm).IsPlanar():
+    if GeomLib_IsPlanarSurface(BRep_Tool.Surface_s(face), PLANAR_MM).IsPlanar():
         return "plane"
     kind: str = BRepAdaptor_Surface(face).GetType().name
     return kind.removeprefix("GeomAbs_").lower()
@@ -174,7 +174,7 @@ def _refuse_bent(edge: Any) -> None:
     along = points[-1] - points[0]
     length = float(np.linalg.norm(along))
     offset = np.linalg.norm(np.cross(points - points[0], along), axis=1)
-    if length == 0.0 or offset.max() > MODEL.planar_mm * length:
+    if length == 0.0 or offset.max() > PLANAR_MM * length:
         x, y, z = points[0]
         raise ShapeError(
             f"an edge at ({x:.6g}, {y:.6g}, {z:.6g}) is not straight",

@@ -3,7 +3,8 @@
 Neighbours are coplanar if the smaller one lies in the larger one's plane by distance, and
 their normals agree by angle; slivers, whose normal is noise, join their best neighbour.
 Boundaries are walked around the vertices, so faces may be non-convex and have holes.
-Vertices between two faces alone, on their common line, are dropped.
+Vertices between two faces alone, on their common line, are dropped. A mesh is one body: closed
+surfaces that share no edge are refused.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from numpy.typing import NDArray
 
 from generator.errors import ShapeError
 from generator.plane.polygon import area_vector
-from generator.polyhedron.read.bodies import check_one_body
-from generator.polyhedron.read.settings import MODEL
-from generator.polyhedron.read.soup import Soup, cluster_labels
-from generator.polyhedron.read.tee import split_at_tees
+from generator.polyhedron.read.soup import MOST_FACETS, Soup, cluster_labels, split_at_tees
+
+COPLANAR = 1e-5  #: coplanar points lie this near to a plane, as a share of the size
+COPLANAR_RAD = 1e-3  #: coplanar polygons turn by no more than this, besides the noise
+SLIVER = 8.0  #: a polygon thinner than this many times the noise has no direction
 
 _REPAIR = "repair the mesh (PrusaSlicer, MeshLab or the program that made it) and export it again"
+LISTED = 4  #: bodies that a message describes, the largest ones
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
@@ -32,13 +35,13 @@ def merge_triangles(soup: Soup) -> tuple[Floats, Faces]:
     ------
     ShapeError
         An open, branching or inconsistently oriented mesh (with the first place), one of
-        several bodies, a flat one, a surface of more than `MODEL.most_facets` planar faces, or
+        several bodies, a flat one, a surface of more than `MOST_FACETS` planar faces, or
         a face that is not planar.
     """
     _check_flat(soup)
     soup = split_at_tees(soup)
     twin = _twins(soup)
-    check_one_body(soup, twin)
+    _check_one_body(soup, twin)
     group = _coplanar_groups(soup, twin)
     boundary = group[soup.face] != group[soup.face[twin]]
     loops = _boundary_loops(soup, twin, boundary)
@@ -117,7 +120,7 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
     longest = np.zeros(count)
     np.maximum.at(longest, soup.face, np.linalg.norm(end - start, axis=1))
     width = area / longest
-    sliver = width <= MODEL.sliver * soup.noise
+    sliver = width <= SLIVER * soup.noise
     normal = vector / np.where(area > 0.0, area, 1.0)[:, None]
 
     half = np.flatnonzero(np.arange(len(twin)) < twin)
@@ -128,9 +131,7 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
     off = _farthest_off_plane(soup, large, small, normal, corner)
     cross = np.linalg.norm(np.cross(normal[large], normal[small]), axis=1)
     turn = np.arctan2(cross, np.einsum("ij,ij->i", normal[large], normal[small]))
-    allowed = np.maximum(
-        MODEL.coplanar_rad, 4.0 * soup.noise / np.maximum(width[small], soup.noise)
-    )
+    allowed = np.maximum(COPLANAR_RAD, 4.0 * soup.noise / np.maximum(width[small], soup.noise))
     flat = (off <= tolerance) & (turn <= allowed) & ~sliver[large] & ~sliver[small]
     group = cluster_labels(np.arange(count), large[flat], small[flat])
     plane = (normal, corner)
@@ -146,7 +147,7 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
 
 def _distance(soup: Soup) -> float:
     size = float(np.linalg.norm(np.ptp(soup.points[soup.origin], axis=0)))
-    return MODEL.coplanar * size + soup.noise
+    return COPLANAR * size + soup.noise
 
 
 def _farthest_off_plane(
@@ -225,13 +226,13 @@ def _bends(soup: Soup, group: Integers, vector: Floats, corner: Integers) -> Flo
 def _check_groups(soup: Soup, group: Integers, vector: Floats, corner: Integers) -> None:
     """Refuse too many faces, and faces that bend."""
     numbers, compact = np.unique(group, return_inverse=True)
-    if len(numbers) > MODEL.most_facets:
+    if len(numbers) > MOST_FACETS:
         total = np.zeros((len(numbers), 3))
         np.add.at(total, compact, vector)
         area = np.linalg.norm(total, axis=1)
         raise ShapeError(
             f"{len(numbers)} planar faces, the smallest of {area.min():.2g} mm^2; "
-            f"{MODEL.most_facets} are allowed",
+            f"{MOST_FACETS} are allowed",
             fix="export round parts more coarsely, or as STEP, where they count once",
         )
     bend = _bends(soup, group, vector, corner)
@@ -297,3 +298,57 @@ def _outer_first(points: Floats, loops: list[tuple[int, ...]]) -> list[tuple[int
     vectors = [area_vector(points[list(loop)]) if loop else np.zeros(3) for loop in loops]
     normal = sum(vectors, np.zeros(3))
     return [loops[k] for k in np.argsort([-(v @ normal) for v in vectors], kind="stable")]
+
+
+def _check_one_body(soup: Soup, twin: NDArray[np.intp]) -> None:
+    """Refuse a mesh of several bodies, and say how large they are and where they lie.
+
+    Parameters
+    ----------
+    soup
+        Closed and oriented polygons, mm.
+    twin
+        (H,) the half-edge that runs the same edge backwards.
+
+    Raises
+    ------
+    ShapeError
+        The surface falls into several; one that runs the other way round than the largest, as
+        the walls of a cavity do, is called a void.
+    """
+    count = int(soup.face.max()) + 1
+    label = cluster_labels(np.arange(count), soup.face, soup.face[twin])
+    bodies = np.unique(label)
+    if len(bodies) == 1:
+        return
+    boxes, volumes = [], []
+    for body in bodies:
+        own = label[soup.face] == body
+        points = soup.points[soup.origin[own]]
+        boxes.append((points.min(axis=0), points.max(axis=0)))
+        volumes.append(_signed_volume(soup, own))
+    order = np.argsort(-np.abs(volumes), kind="stable")
+    sign = np.sign(volumes[order[0]])
+    words = []
+    for k in order[:LISTED]:
+        low, high = boxes[k]
+        size = " x ".join(f"{x:.4g}" for x in high - low)
+        middle = ", ".join(f"{x:.4g}" for x in (low + high) / 2)
+        void = "a void of " if np.sign(volumes[k]) == -sign else ""
+        words.append(f"{void}{size} mm about ({middle})")
+    if len(bodies) > LISTED:
+        words.append(f"{len(bodies) - LISTED} smaller")
+    raise ShapeError(
+        f"{len(bodies)} separate bodies: {', '.join(words)}; one solid has one",
+        fix="join bodies that overlap (a boolean union), give the others files of their own, "
+        "and fill inner voids",
+    )
+
+
+def _signed_volume(soup: Soup, own: NDArray[np.bool_]) -> float:
+    """Return the volume inside some of the polygons, mm^3, below 0 if they face inward."""
+    _, first = np.unique(soup.face, return_index=True)  # fans from a corner of each polygon
+    apex = soup.points[soup.origin[first]][soup.face[own]]
+    start = soup.points[soup.origin[own]]
+    end = soup.points[soup.origin[soup.following[own]]]
+    return float(np.einsum("ij,ij->", apex, np.cross(start, end)) / 6.0)

@@ -1,18 +1,35 @@
-"""Polygons of a mesh -> the solid that they enclose. Lengths in mm.
+"""Polygons of a mesh -> the solid that they enclose, its curved regions `blank`.
 
 Where a mesh makes no solid as it stands, points a little farther apart are welded: programs
 that round what they cut leave walls of a thousandth of a millimetre, which touch themselves.
+
+In a mesh of many faces, two that meet at a small angle belong to one curved surface where they
+are narrow for that angle: a strip of width w that turns by a has the radius w / a, which for a
+fillet or a bore is small against the solid, and for a plane that a fillet meets is not. Lengths
+in mm, angles in rad; shares are of the size.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from generator.errors import ShapeError
+from generator.plane.polygon import face_vector
 from generator.polyhedron.read.merge import merge_triangles
-from generator.polyhedron.read.regions import mesh_polyhedron
-from generator.polyhedron.read.soup import Soup, weld_coarsely
-from generator.polyhedron.winged import Polyhedron
+from generator.polyhedron.read.soup import Soup, cluster_labels, weld_coarsely
+from generator.polyhedron.winged import Face, Polyhedron, polyhedron
+
+Floats = NDArray[np.float64]
+Loops = tuple[tuple[int, ...], ...]
+MOST_FACES = 100  #: of more, those that bend belong to curved surfaces, and stay blank
+SMOOTH_RAD = 0.36  #: facets of one curved surface meet at no more: circles of 18 sides and more
+BEND = 0.5  #: radius, as a share of the size, above which narrow faces are planar ones
+FAINT_RAD = 0.02  #: strips that meet at less belong to one curved surface of any radius
+STRIP = 0.05  #: width of such a strip, as a share of the size
+LISTED = 6  # regions that a note names with their places
 
 
 def solid_of_soup(soup: Soup, kind: str, scale: float = 1.0) -> Polyhedron:
@@ -48,4 +65,91 @@ def solid_of_soup(soup: Soup, kind: str, scale: float = 1.0) -> Polyhedron:
 
 def _solid(soup: Soup, kind: str, scale: float) -> Polyhedron:
     vertices, faces = merge_triangles(soup)
-    return mesh_polyhedron(kind, scale * vertices, faces)
+    return _mesh_polyhedron(kind, scale * vertices, faces)
+
+
+def _mesh_polyhedron(kind: str, vertices: Floats, faces: list[Loops]) -> Polyhedron:
+    """Return the solid of a mesh; of more than `MOST_FACES`, curved regions stay blank.
+
+    Planar faces are called F1, F2, ... in the order of the file, then each curved region is one
+    face of many facets: F9, F9.2, F9.3, ...
+
+    Raises
+    ------
+    ShapeError
+        As `polyhedron` does.
+    """
+    if len(faces) <= MOST_FACES:
+        return polyhedron(kind, vertices, faces)
+    regions = _curved_regions(vertices, faces)
+    curved = {face for region in regions for face in region}
+    names = {}
+    for number, face in enumerate((f for f in range(len(faces)) if f not in curved), 1):
+        names[face] = f"F{number}"
+    first = len(names) + 1
+    for number, region in enumerate(regions, first):
+        names |= {f: f"F{number}.{k}" if k > 1 else f"F{number}" for k, f in enumerate(region, 1)}
+    solid = polyhedron(kind, vertices, [Face(names[k], loops) for k, loops in enumerate(faces)])
+    blank = tuple(sorted(curved))
+    notes = (*solid.notes, *_notes(vertices, faces, regions, first))
+    return replace(solid, blank=blank, notes=notes)
+
+
+def _curved_regions(vertices: Floats, faces: list[Loops]) -> list[list[int]]:
+    """Return the faces of each curved surface, in order."""
+    normals, areas = _normals(vertices, faces)
+    owner: dict[tuple[int, int], int] = {}
+    pairs: list[tuple[int, int]] = []
+    lengths: list[float] = []
+    for number, loops in enumerate(faces):
+        for loop in loops:
+            for a, b in zip(loop, (*loop[1:], loop[0]), strict=True):
+                if (b, a) in owner:
+                    pairs.append((owner.pop((b, a)), number))
+                    lengths.append(float(np.linalg.norm(vertices[a] - vertices[b])))
+                else:
+                    owner[a, b] = number
+    one, other = np.array(pairs, np.intp).T
+    length = np.array(lengths)
+    cross = np.linalg.norm(np.cross(normals[one], normals[other]), axis=1)
+    turn = np.arctan2(cross, np.einsum("ij,ij->i", normals[one], normals[other]))
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    joined = turn <= SMOOTH_RAD
+    for face in (one, other):
+        width = areas[face] / np.maximum(length, 1e-9)
+        strip = (turn <= FAINT_RAD) & (width < STRIP * size)
+        joined &= strip | (width < BEND * size * turn)
+    label = cluster_labels(np.arange(len(faces)), one[joined], other[joined])
+    curved = np.zeros(len(faces), bool)
+    curved[one[joined]] = curved[other[joined]] = True
+    found: dict[int, list[int]] = {}
+    for face in np.flatnonzero(curved).tolist():
+        found.setdefault(int(label[face]), []).append(face)
+    return [found[key] for key in sorted(found)]
+
+
+def _normals(vertices: Floats, faces: list[Loops]) -> tuple[Floats, Floats]:
+    """Return unit normals (n, 3) and areas (n,)."""
+    vectors = np.array([face_vector([vertices[list(loop)] for loop in f]) for f in faces])
+    lengths = np.linalg.norm(vectors, axis=1)
+    return vectors / np.maximum(lengths, 1e-300)[:, None], lengths / 2
+
+
+def _notes(
+    vertices: Floats, faces: list[Loops], regions: list[list[int]], first: int
+) -> tuple[str, ...]:
+    if not regions:
+        return ()
+    facets = sum(map(len, regions))
+    told = []
+    for number, region in enumerate(regions[:LISTED], first):
+        points = vertices[[v for f in region for loop in faces[f] for v in loop]]
+        x, y, z = ((points.min(axis=0) + points.max(axis=0)) / 2).tolist()
+        told.append(f"F{number} about ({x:.4g}, {y:.4g}, {z:.4g})")
+    more = f" and {len(regions) - LISTED} more" if len(regions) > LISTED else ""
+    what = "region stays" if len(regions) == 1 else "regions stay"
+    note = (
+        f"{len(regions)} curved {what} blank, {facets} of {len(faces)} facets: "
+        f"{', '.join(told)}{more}; in STEP, cylinders and cones carry symbols"
+    )
+    return (note,)

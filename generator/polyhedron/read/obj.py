@@ -7,9 +7,9 @@ import codecs
 import numpy as np
 
 from generator.errors import ShapeError
-from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import Soup, soup_of_loops
 
+MOST_POLYGONS = 500_000  #: of a mesh: bounds time and memory
 _AGAIN = "export the model again as a mesh of polygons"
 # fmt: off
 _IGNORED = frozenset([
@@ -40,8 +40,8 @@ def read_obj(content: bytes, place: str) -> Soup:
             raise ShapeError(cause, fix=_AGAIN, place=where)
         elif word and word not in _IGNORED:
             raise ShapeError(f"'{word[:20]}' is no word of OBJ", fix=_AGAIN, place=where)
-    if len(faces) > MODEL.most_polygons:
-        cause = f"{len(faces)} polygons; {MODEL.most_polygons} are allowed"
+    if len(faces) > MOST_POLYGONS:
+        cause = f"{len(faces)} polygons; {MOST_POLYGONS} are allowed"
         raise ShapeError(cause, fix="simplify the model", place=place)
     return soup_of_loops(np.array(points, dtype=np.float64).reshape(-1, 3), faces, place)
 

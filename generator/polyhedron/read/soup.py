@@ -1,7 +1,9 @@
 """Polygons as a file holds them: loops of points, before anything is known of their order.
 
 The points of a mesh file are welded here: STL repeats every corner for each triangle, and
-float32 or short decimals move the copies apart by a rounding.
+float32 or short decimals move the copies apart by a rounding. T-vertices, corners that lie on
+another polygon's edge, divide that edge: programs that cut faces one by one leave an edge whole
+where its neighbour has two. Shares are of the size, the diagonal of the bounding box.
 """
 
 from __future__ import annotations
@@ -13,7 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.errors import ShapeError
-from generator.polyhedron.read.settings import MODEL
+
+Integers = NDArray[np.intp]
+
+MOST_FACETS = 6000  #: of a solid with round faces, or of a mesh after merging: bounds the time
+WELD = 1e-6  #: points nearer than this share of the size are one point
+COARSE_WELD = 1e-5  #: the same where `WELD` makes no solid: notches as wide as a rounding
+DIGITS = 1e-6  #: share of a coordinate that is noise: seven digits, in float32 as in ASCII STL (%e)
+LARGEST_COORDINATE_MM = 1e6  #: no object is larger than this; larger numbers are garbage
+TEE_NOISE = 4.0  #: a point this many times the noise off an edge lies on it
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +55,12 @@ def soup_of_triangles(corners: NDArray[np.float64], place: str) -> Soup:
 
 
 def weld_coarsely(soup: Soup) -> Soup:
-    """Return the soup with points joined that lie nearer than `MODEL.coarse_weld` says."""
+    """Return the soup with points joined that lie nearer than `COARSE_WELD` says."""
     after = np.append(soup.following[:-1] != np.arange(1, len(soup.following)), True)
     last = np.flatnonzero(after)  # half-edges of a loop stand one behind another
     lengths = np.diff(last, prepend=-1)
     owner = soup.face[last]
-    return _soup(soup.points, soup.origin, lengths, owner, "", MODEL.coarse_weld)
+    return _soup(soup.points, soup.origin, lengths, owner, "", COARSE_WELD)
 
 
 def _soup(
@@ -59,20 +69,20 @@ def _soup(
     lengths: NDArray[np.intp],
     owner: NDArray[np.intp],
     place: str,
-    share: float = MODEL.weld,
+    share: float = WELD,
 ) -> Soup:
     if len(starts) == 0:
         raise ShapeError("the file holds no faces", fix="export the solid as a mesh", place=place)
     used = points[starts]
     reach = float(np.abs(used).max()) if np.isfinite(used).all() else np.inf
-    if reach > MODEL.largest_coordinate_mm:
+    if reach > LARGEST_COORDINATE_MM:
         raise ShapeError(
-            f"a coordinate is {reach:.3g} mm; {MODEL.largest_coordinate_mm:.0e} mm are allowed",
+            f"a coordinate is {reach:.3g} mm; {LARGEST_COORDINATE_MM:.0e} mm are allowed",
             fix="check the unit of the export, or export the model again",
             place=place,
         )
     size = float(np.linalg.norm(np.ptp(used, axis=0)))
-    noise = share * size + MODEL.digits * reach
+    noise = share * size + DIGITS * reach
     welded, number = weld(points, noise)
     origin = number[starts]
     loop = np.repeat(np.arange(len(lengths)), lengths)
@@ -145,3 +155,54 @@ def cluster_labels(
             if (jumped == label).all():
                 break
             label = jumped
+
+
+def split_at_tees(soup: Soup) -> Soup:
+    """Return the soup with open edges divided at the open corners that lie on them."""
+    target = soup.origin[soup.following]
+    count = len(soup.points)
+    ahead, back = soup.origin * count + target, target * count + soup.origin
+    lonely = np.flatnonzero(~np.isin(ahead, back))
+    if len(lonely) == 0:
+        return soup
+    corners = np.unique(np.concatenate([soup.origin[lonely], target[lonely]]))
+    tolerance = TEE_NOISE * soup.noise
+    inserted: dict[int, list[int]] = {}
+    for edge in lonely.tolist():
+        on_edge = _corners_on(soup, int(soup.origin[edge]), int(target[edge]), corners, tolerance)
+        if on_edge:
+            inserted[edge] = on_edge
+    return _divided(soup, inserted) if inserted else soup
+
+
+def _corners_on(soup: Soup, start: int, end: int, corners: Integers, tolerance: float) -> list[int]:
+    """Return the corners inside an edge, from its start on."""
+    a, b = soup.points[start], soup.points[end]
+    along = b - a
+    length = float(np.linalg.norm(along))
+    from_a = soup.points[corners] - a
+    at = from_a @ along / length
+    beside = np.linalg.norm(from_a - np.outer(at / length, along), axis=1)
+    inside = (at > tolerance) & (at < length - tolerance) & (beside <= tolerance)
+    return [int(corners[k]) for k in np.flatnonzero(inside)[np.argsort(at[inside], kind="stable")]]
+
+
+def _divided(soup: Soup, inserted: dict[int, list[int]]) -> Soup:
+    """Return the soup with points put into edges: the new half-edges stand behind the old ones."""
+    origin, following, face = (list(a.tolist()) for a in (soup.origin, soup.following, soup.face))
+    for edge, points in inserted.items():
+        after = following[edge]
+        last = edge
+        for point in points:
+            following[last] = len(origin)
+            last = len(origin)
+            origin.append(point)
+            following.append(after)
+            face.append(face[edge])
+    return Soup(
+        soup.points,
+        np.array(origin, np.intp),
+        np.array(following, np.intp),
+        np.array(face, np.intp),
+        soup.noise,
+    )

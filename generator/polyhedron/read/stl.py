@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.errors import ShapeError
-from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import Soup, soup_of_triangles
 
+MOST_TRIANGLES = 500_000  #: of a mesh: bounds time and memory
+MOST_PART_TRIANGLES = 20_000_000  #: of a part that was written; in binary STL they take 1 GB
 _AGAIN = "export the model again; the file may be cut off"
 _HEAD, _RECORD = 84, 50
 _FRAME = {b"solid", b"facet", b"outer", b"endloop", b"endfacet", b"endsolid"}
@@ -24,7 +25,7 @@ def read_stl(content: bytes, place: str) -> Soup:
 
 
 def stl_triangles(
-    content: bytes, place: str, *, most: int = MODEL.most_triangles, padded: bool = True
+    content: bytes, place: str, *, most: int = MOST_TRIANGLES, padded: bool = True
 ) -> NDArray[np.float64]:
     """Return the corners (n, 3, 3) of a file's triangles, mm; exactly its numbers.
 

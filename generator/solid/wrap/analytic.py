@@ -26,10 +26,9 @@ from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
 from generator.layout.placement import FaceLayout
-from generator.polyhedron.developable import Developable
+from generator.polyhedron.check import directed_edges
 from generator.polyhedron.development import Development, development
-from generator.polyhedron.surface import directed_edges
-from generator.polyhedron.winged import Polyhedron
+from generator.polyhedron.winged import Developable, Polyhedron
 from generator.solid.emboss import turn
 from generator.solid.part import AnalyticFace, BentSymbol, Part, Points, Rim
 from generator.solid.settings import EMBOSS
@@ -217,7 +216,7 @@ def _plain_face(
     ends = polyhedron.vertices[d.vertices] @ inverse[:3, :3].T + inverse[:3, 3]
     angles = np.unwrap(np.arctan2(ends[:, 0, 1], ends[:, 0, 0]))
     height = float(ends[:, 1, 2].mean())
-    # Lines of a named shape stand outside its round face, see `polyhedron.round`.
+    # Lines of a named shape stand outside its round face, see `polyhedron.shapes`.
     pushed = reach[0] - surface.radius_mm if surface.radius_mm < reach[0] and closed else 0.0
     grown = 1.0 - pushed / reach[0]
     slack = EMBOSS.on_circle * max(1.0, *reach, height)

@@ -33,9 +33,8 @@ from generator.alphabet.outline import Tiers
 from generator.errors import SolidError
 from generator.layout.placement import FaceLayout
 from generator.plane.polygon import points_inside, signed_area
-from generator.polyhedron.developable import Developable
 from generator.polyhedron.development import Development, development
-from generator.polyhedron.winged import Polyhedron
+from generator.polyhedron.winged import Developable, Polyhedron
 from generator.solid.emboss import turn
 from generator.solid.part import Facet, WrappedSymbols
 from generator.solid.settings import EMBOSS

@@ -74,7 +74,7 @@ def empty_canvas(pitch_mm: float) -> Canvas:
     return Canvas(pitch_mm / MAGNIFIED, {})
 
 
-def lay_touch(canvas: Canvas, patch: TouchPatch, entry: CanvasEntry, sign: int = 1) -> Canvas:
+def add_to_canvas(canvas: Canvas, patch: TouchPatch, entry: CanvasEntry, sign: int = 1) -> Canvas:
     """Return the canvas with a touch added, or removed (sign -1)."""
     h, (half_x, half_y) = canvas.cell_mm, patch.sensor.half_mm
     x, y, theta = entry.pose.tolist()

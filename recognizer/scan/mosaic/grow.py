@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from recognizer.errors import MosaicError
-from recognizer.scan.mosaic.canvas import Canvas, CanvasEntry, empty_canvas, lay_touch
+from recognizer.scan.mosaic.canvas import Canvas, CanvasEntry, add_to_canvas, empty_canvas
 from recognizer.scan.mosaic.mosaic import (
     ALONE,
     PARTLY,
@@ -39,7 +39,7 @@ from recognizer.scan.mosaic.register import CONSTANT
 Array = NDArray[np.float64]
 
 SHOWN = ("", ALONE, PARTLY, CONSTANT)  #: reasons with which a touch is part of the image
-MOVED_TACTELS = 0.2  #: less than one cell, by which a touch moves before it is laid again
+MOVED_TACTELS = 0.2  #: less than one cell, by which a pose changes before its entry does
 ROUNDS = 3  #: in which touches are tried again
 GAIN_SPREAD_LOG = 0.5  #: standard deviation of gains from touch to touch
 PAIR_SPREAD_LOG = 0.05  #: standard deviation of the gain of a pair
@@ -97,7 +97,7 @@ def add_touch(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
         covariances=np.concatenate([mosaic.covariances, np.full((1, 3, 3), np.nan)]),
         reasons=(*_clear_alone(mosaic.reasons, place.constraints), place.reason),
         gains=np.append(mosaic.gains, place.gain),
-        laid=(*mosaic.laid, None),
+        entries=(*mosaic.entries, None),
         constraints=constraints,
     )
     fresh = {number, *(constraint.a for constraint in place.constraints if constraint.a >= 0)}
@@ -180,20 +180,20 @@ def _frame_for_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> M
 def _change_frame(mosaic: Mosaic, T_new_old: Array) -> Mosaic:
     """Return the mosaic in another frame."""
     turn = rotation(float(T_new_old[2]))
-    canvas, lying = empty_canvas(mosaic.sensor.pitch_mm), list(mosaic.laid)
-    for n, entry in enumerate(mosaic.laid):
+    canvas, entries = empty_canvas(mosaic.sensor.pitch_mm), list(mosaic.entries)
+    for n, entry in enumerate(mosaic.entries):
         if entry is not None:
             pose = compose_poses(T_new_old, entry.pose)
             moved = CanvasEntry(pose, turn @ entry.covariance @ turn.T, entry.gain)
-            lying[n] = moved
-            canvas = lay_touch(canvas, mosaic.patches[n], moved)
+            entries[n] = moved
+            canvas = add_to_canvas(canvas, mosaic.patches[n], moved)
     return replace(
         mosaic,
         poses=compose_poses(T_new_old, mosaic.poses),
         covariances=turn @ mosaic.covariances @ turn.T,
         arm=compose_poses(T_new_old, mosaic.arm),
         arm_covariance=turn @ mosaic.arm_covariance @ turn.T,
-        laid=tuple(lying),
+        entries=tuple(entries),
         canvas=canvas,
     )
 
@@ -237,9 +237,9 @@ def _apply_solution(
     kept = mosaic.covariances.copy()
     kept[numbers] = spread[: len(numbers)]
     canvas = empty_canvas(mosaic.sensor.pitch_mm) if again else mosaic.canvas
-    lying: list[CanvasEntry | None] = list(mosaic.laid)
+    entries: list[CanvasEntry | None] = list(mosaic.entries)
     for n in range(len(mosaic)):
-        canvas, lying[n] = _lay_again(mosaic, canvas, found, n, None if again else lying[n])
+        canvas, entries[n] = _move_entry(mosaic, canvas, found, n, None if again else entries[n])
     return replace(
         mosaic,
         poses=found.poses,
@@ -248,12 +248,12 @@ def _apply_solution(
         arm_covariance=spread[-1] if free else np.zeros((3, 3)),
         weights=found.weights,
         chi2=found.chi2,
-        laid=tuple(lying),
+        entries=tuple(entries),
         canvas=canvas,
     )
 
 
-def _lay_again(
+def _move_entry(
     mosaic: Mosaic, canvas: Canvas, found: PoseGraphSolution, n: int, now: CanvasEntry | None
 ) -> tuple[Canvas, CanvasEntry | None]:
     """Return the canvas with a touch at its pose, and its entry."""
@@ -263,12 +263,12 @@ def _lay_again(
         near = far_apart(now.pose, pose, mosaic.sensor) < MOVED_TACTELS
         if shown and near and abs(gain / now.gain - 1) < 0.02:
             return canvas, now
-        canvas = lay_touch(canvas, mosaic.patches[n], now, -1)
+        canvas = add_to_canvas(canvas, mosaic.patches[n], now, -1)
     if not shown:
         return canvas, None
     block = found.normal[3 * n : 3 * n + 3, 3 * n : 3 * n + 3].toarray()
     entry = CanvasEntry(np.array(pose), np.asarray(np.linalg.inv(block), np.float64), gain)
-    return lay_touch(canvas, mosaic.patches[n], entry), entry
+    return add_to_canvas(canvas, mosaic.patches[n], entry), entry
 
 
 def _gains(mosaic: Mosaic) -> Array:

@@ -23,9 +23,9 @@ from recognizer.scan.mosaic.canvas import (
     Canvas,
     CanvasEntry,
     GlobalImage,
+    add_to_canvas,
     empty_canvas,
     image_of,
-    lay_touch,
     reference,
 )
 from recognizer.scan.mosaic.patch import TouchPatch, covers_points, scales, seen_motions
@@ -93,7 +93,7 @@ class Mosaic:
     constraints: tuple[Constraint, ...]
     weights: Array  #: (m,) of the constraints
     chi2: Array  #: (m,)
-    laid: tuple[CanvasEntry | None, ...]  #: of each touch on the canvas
+    entries: tuple[CanvasEntry | None, ...]  #: of each touch on the canvas
     canvas: Canvas
 
     def __len__(self) -> int:
@@ -161,7 +161,7 @@ def no_touches(sensor: SensorType, period_mm: float = PERIOD_MM) -> Mosaic:
         constraints=(),
         weights=np.zeros(0),
         chi2=np.zeros(0),
-        laid=(),
+        entries=(),
         canvas=empty_canvas(sensor.pitch_mm),
     )
 
@@ -275,7 +275,7 @@ def _overlapping_neighbours(
     some = [j for j in np.flatnonzero(away < 2 * sensor.reach_mm).tolist() if j != number]
     shares = {}
     for j in some:
-        if mosaic.laid[j] is not None and mosaic.reasons[j] != CONSTANT:
+        if mosaic.entries[j] is not None and mosaic.reasons[j] != CONSTANT:
             T_j_touch = relative_pose(mosaic.poses[j], predicted.pose)
             shares[j] = float(
                 covers_points(sensor, transform_points(T_j_touch, patch.points_mm), 0.5).mean()
@@ -306,8 +306,8 @@ def _search_mosaic(
     if max(*reach, turn) <= NEAR_TACTELS * pitch:
         return "", predicted.pose
     canvas = mosaic.canvas
-    if number < len(mosaic) and (own := mosaic.laid[number]) is not None:
-        canvas = lay_touch(canvas, patch, own, -1)
+    if number < len(mosaic) and (own := mosaic.entries[number]) is not None:
+        canvas = add_to_canvas(canvas, patch, own, -1)
     around = mosaic.sensor.reach_mm + math.hypot(*reach) + pitch
     shown = reference(canvas, float(predicted.pose[0]), float(predicted.pose[1]), around)
     found = search_reference(shown, patch, predicted.pose, spread)

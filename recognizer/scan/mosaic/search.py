@@ -109,10 +109,10 @@ def search_reference(
     found: list[PlaceCandidate] = []
     turns = _turns(math.sqrt(covariance[2, 2]), patch)
     for turn in turns.tolist():
-        stands = np.array([believed[0], believed[1], believed[2] + turn])
+        at = np.array([believed[0], believed[1], believed[2] + turn])
         # shifts are along the turned axes: equal for the prior to second order
         away = np.stack([right * h, -down * h, np.full(right.shape, turn)], axis=-1)
-        seen = cross_correlate(laid_under(reference, wide, stands), image)
+        seen = cross_correlate(resample(reference, wide, at), image)
         tactels = seen.overlap / MAGNIFIED**2
         images = nats(seen.rho, tactels)
         score = images - 0.5 * np.einsum("kni,ij,knj->kn", away, prior, away)
@@ -120,7 +120,7 @@ def search_reference(
         for i, j, value in peaks(score, CANDIDATES):
             shift = np.array([(j - columns) * h, (rows - i) * h, 0.0])
             alone = float(images[round(i), round(j)])
-            found.append(PlaceCandidate(compose_poses(stands, shift), value, alone))
+            found.append(PlaceCandidate(compose_poses(at, shift), value, alone))
     found.sort(key=lambda candidate: -candidate.score)
     tried = down.size * len(turns) / MAGNIFIED**2
     return SearchResult(tuple(found[:CANDIDATES]), tried)
@@ -239,7 +239,7 @@ def points_mm(raster: KnownRaster) -> Array:
     return points
 
 
-def laid_under(source: KnownRaster, like: KnownRaster, T_source_like: Array) -> KnownRaster:
+def resample(source: KnownRaster, like: KnownRaster, T_source_like: Array) -> KnownRaster:
     """Return a raster resampled on the cells of another one, bilinearly.
 
     A cell is known where all four are.

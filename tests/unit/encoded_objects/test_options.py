@@ -8,7 +8,7 @@ import pytest
 
 from encoded_objects.base import console
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.options import Argument, Json, Option, Options, command
+from encoded_objects.base.options import Argument, Json, Option, Options, command, read_plain
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,3 +82,24 @@ def test_version_needs_nothing_else(capsys):
     assert run("--version", "--heat", "hot") == 0
     assert capsys.readouterr().out.endswith("stove: gas\n")
     assert not taken
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["soup"], ["--pots=4", "soup", "--salt", ".5"], ["-p", "7", "--keep-warm", "--json"],
+     ["--heat", "low", "--heat", "high"], []],
+)  # fmt: skip
+def test_a_plain_line_is_read_as_typer_reads_it(words):
+    taken.clear()
+    read_plain(app, words)()
+    app(words, standalone_mode=False)()
+    assert taken[0] == taken[1]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["soup", "stew"], ["--pots", "0"], ["--pots", "many"], ["--pots", "1" * 5000], ["--nope"],
+     ["-p3"], ["--heat"], ["--json=yes"], ["--salt", "-1"], ["--", "soup"], ["--keep-war"]],
+)  # fmt: skip
+def test_all_else_is_left_to_typer(words):
+    assert read_plain(app, words) is None

@@ -13,8 +13,8 @@ from generator.command.made_report import next_step
 from generator.errors import PrintError
 from generator.pipeline.encode import encode
 from generator.polyhedron import SHAPES
-from generator.polyhedron.assembly import assembly_order, face_area_mm2, telling_faces
-from generator.polyhedron.frame import face_frame
+from generator.polyhedron.assembly import assembly_order, distinct_faces
+from generator.polyhedron.frame import face_area, face_frame
 from generator.printed.slicer import PlateCost, read_cost
 from generator.spec import read_specs
 
@@ -45,11 +45,11 @@ def test_every_panel_meets_one_that_is_there(kind):
 
 def test_the_largest_face_lies_down_and_three_directions_are_touched():
     solid = SHAPES["box"]((80.0, 60.0, 20.0))
-    assert face_area_mm2(solid, assembly_order(solid)[0].face) == pytest.approx(4800.0)
-    chosen = telling_faces(solid, list(range(6)))
+    assert face_area(solid, assembly_order(solid)[0].face) == pytest.approx(4800.0)
+    chosen = distinct_faces(solid, list(range(6)))
     normals = np.array([face_frame(solid, face)[:3, 2] for face in chosen])
     assert np.abs(normals @ normals.T).sum() == pytest.approx(3.0)  # a corner of the box
-    assert telling_faces(solid, [2]) == (2,)
+    assert distinct_faces(solid, [2]) == (2,)
 
 
 def test_what_a_slicer_reckons():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from generator.database.round_face import Bend, RoundFace, round_face
-from generator.polyhedron.round import cone, cylinder
+from generator.polyhedron.shapes import cone, cylinder
 
 SOLIDS = [cylinder(60, 80), cylinder(200, 40), cone(110, 60, 70), cone(60, 60), cone(90, 25, 50)]
 CHORD = 0.02  # mm by which facets leave the round face

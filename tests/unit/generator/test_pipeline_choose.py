@@ -189,7 +189,7 @@ def test_a_set_too_large_for_the_profile_it_names_is_told_of_auto(tmp_path):
 
 @pytest.mark.parametrize("copies", [1, 3])
 def test_a_new_lab_lays_its_first_objects_out_once(tmp_path, monkeypatch, copies):
-    """The choice of the array, the rehearsal and, of one object, the making share the layout."""
+    """The choice of the array, the dry build and, of one object, the making share the layout."""
     shapes = []
 
     def counted(polyhedron, array, *rest, **more):

@@ -1,13 +1,10 @@
 """Vertices typed with a few decimals are moved onto the planes of their faces."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from generator.polyhedron import SHAPES, flatten
 from generator.polyhedron.flatten import flatten_faces
-from generator.polyhedron.settings import SOLID
 
 
 def rounded_dodecahedron():
@@ -34,12 +31,13 @@ def test_faces_become_planar_by_less_than_the_rounding():
 def test_many_equations_are_solved_as_few(monkeypatch):
     vertices, faces = rounded_dodecahedron()
     dense, _ = flatten_faces(vertices, faces)
-    monkeypatch.setattr(flatten, "SOLID", replace(SOLID, dense_equations=10))
+    monkeypatch.setattr(flatten, "DENSE_EQUATIONS", 10)
     sparse, _ = flatten_faces(vertices, faces)
     assert bend(sparse, faces) < 1e-12
     assert sparse == pytest.approx(dense, abs=1e-9)
     assert (sparse != vertices).any()
-    monkeypatch.setattr(flatten, "SOLID", replace(SOLID, dense_equations=10, most_equations=20))
+    monkeypatch.setattr(flatten, "DENSE_EQUATIONS", 10)
+    monkeypatch.setattr(flatten, "MOST_EQUATIONS", 20)
     assert (flatten_faces(vertices, faces)[0] == vertices).all()
 
 
@@ -48,5 +46,5 @@ def test_planar_enough_for_parts_stays_as_given_where_there_are_many(monkeypatch
     faces = [face.loops for face in solid.faces]
     vertices = solid.vertices + 1e-10 * np.random.default_rng(3).normal(size=solid.vertices.shape)
     assert flatten_faces(vertices, faces)[1] > 0.0
-    monkeypatch.setattr(flatten, "SOLID", replace(SOLID, dense_equations=10))
+    monkeypatch.setattr(flatten, "DENSE_EQUATIONS", 10)
     assert flatten_faces(vertices, faces)[1] == 0.0

@@ -3,7 +3,6 @@
 import itertools
 import struct
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ import pytest
 from generator.errors import ShapeError
 from generator.polyhedron import SHAPES, dihedral, face_area, surface_area, volume
 from generator.polyhedron.read import merge, read_shape
-from generator.polyhedron.read.settings import MODEL
 
 SHAPES_FOLDER = Path(__file__).parents[3] / "fixtures" / "shapes"
 HEXAGON = 1.5 * 3**0.5 * 12**2
@@ -253,7 +251,7 @@ def test_a_sphere_stays_blank(tmp_path):
 
 
 def test_too_many_faces_are_counted_not_called_curved(tmp_path, monkeypatch):
-    monkeypatch.setattr(merge, "MODEL", replace(MODEL, most_facets=1000))
+    monkeypatch.setattr(merge, "MOST_FACETS", 1000)
     error = refused(written(tmp_path, "s.stl", binary_stl(sphere(24, 48))))
     assert error.cause.startswith("1152 planar faces, the smallest of ")
     assert error.cause.endswith(" mm^2; 1000 are allowed")
@@ -399,7 +397,7 @@ def test_missing_and_large_files(tmp_path, monkeypatch):
     assert refused(tmp_path / "none.stl").cause == "no such file or directory"
     (tmp_path / "folder.stl").mkdir()
     assert "directory" in refused(tmp_path / "folder.stl").cause
-    monkeypatch.setattr("generator.polyhedron.read.MODEL", replace(MODEL, largest_bytes=100))
+    monkeypatch.setattr("generator.polyhedron.read.LARGEST_BYTES", 100)
     assert "MB are allowed" in refused(SHAPES_FOLDER / "l_bracket.stl").cause
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,9 +26,8 @@ from generator.errors import ShapeError
 from generator.polyhedron import volume
 from generator.polyhedron.development import development
 from generator.polyhedron.read import curved
-from generator.polyhedron.read.facets import polyhedron_of_facets
 from generator.polyhedron.read.kernel import describe_shape
-from generator.polyhedron.read.settings import MODEL
+from generator.polyhedron.read.step import polyhedron_of_facets
 from generator.spec import SpecError
 
 
@@ -129,12 +127,12 @@ def test_a_wall_thinner_than_the_division_says_so():
 
 
 def test_a_solid_of_many_facets_is_divided_more_coarsely_and_says_so(monkeypatch):
-    monkeypatch.setattr(curved, "MODEL", replace(MODEL, most_facets=600))
+    monkeypatch.setattr(curved, "MOST_FACETS", 600)
     solid = polyhedron_from(BRepPrimAPI_MakeTorus(20, 6).Shape())
     assert len(solid.faces) <= 600
     assert solid.notes[0].startswith("round faces were divided to ")
     assert volume(solid) == pytest.approx(2 * math.pi**2 * 20 * 6**2, rel=0.1)
-    monkeypatch.setattr(curved, "MODEL", replace(MODEL, most_facets=60))
+    monkeypatch.setattr(curved, "MOST_FACETS", 60)
     with pytest.raises(ShapeError, match=r"need \d+ facets, to 1 mm; 60 are allowed"):
         polyhedron_from(BRepPrimAPI_MakeTorus(20, 6).Shape())
 

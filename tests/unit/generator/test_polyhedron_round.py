@@ -9,9 +9,9 @@ import pytest
 
 from generator.errors import ShapeError
 from generator.polyhedron import volume
-from generator.polyhedron.developable import developable_from
 from generator.polyhedron.development import development
-from generator.polyhedron.round import cone, cylinder
+from generator.polyhedron.shapes import cone, cylinder
+from generator.polyhedron.winged import developable_from
 
 SOLIDS = [cylinder(60, 80), cylinder(12, 5), cone(70, 80, 30), cone(60, 60), cone(300, 40, 290)]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from generator.polyhedron.development import development
-from generator.polyhedron.round import cone, cylinder
+from generator.polyhedron.shapes import cone, cylinder
 from generator.polyhedron.winged import Face
 from generator.solid import emboss_whole, round_volume, volume
 from generator.solid.settings import EMBOSS

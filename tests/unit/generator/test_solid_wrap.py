@@ -16,7 +16,7 @@ from generator.errors import SolidError
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.plane.polygon import signed_area
 from generator.polyhedron.development import development
-from generator.polyhedron.round import cone, cylinder
+from generator.polyhedron.shapes import cone, cylinder
 from generator.printers import printer_named
 from generator.solid import body_mesh, emboss_whole, prove_closed, symbol_meshes, triangles, volume
 from generator.solid.closed import edges_once

@@ -8,14 +8,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from probe.arm.carried import sensor_pose
-from probe.arm.inverse import inverse
-from probe.arm.jacobian import GAIN, condition, jacobian, joint_speeds
-from probe.arm.links import Arm, forward, joint_frames
-from probe.arm.settings import ARM_MOTION
+from probe.arm import (
+    GAIN,
+    LEAST_SINGULAR,
+    LENGTH_MM,
+    Arm,
+    condition,
+    forward,
+    inverse,
+    jacobian,
+    joint_frames,
+    joint_speeds,
+    sensor_pose,
+)
 from probe.errors import PoseError
-from probe.wrist.distances import distances_at, wrist_pose
-from probe.wrist.geometry import Wrist, WristPose
+from probe.wrist import Wrist, WristPose, distances_at, wrist_pose
 
 ARM = Arm()
 DEG = math.pi / 180
@@ -193,21 +200,19 @@ def test_joint_speeds_stay_bounded_at_the_elbow_singularity():
     for bend in (0.0, 1e-15, 1e-9, 1e-6, 1e-3, 1e-2, 0.1):
         q[2] = bend
         for twist in twists:
-            size = np.linalg.norm(twist / np.repeat([ARM_MOTION.length_mm, 1.0], 3))
+            size = np.linalg.norm(twist / np.repeat([LENGTH_MM, 1.0], 3))
             assert (
                 np.linalg.norm(joint_speeds(ARM, q, twist))
-                <= GAIN / ARM_MOTION.least_singular * size * 1.000001
+                <= GAIN / LEAST_SINGULAR * size * 1.000001
             )
 
 
 def test_the_other_directions_are_followed_through_the_singularity():
     q = [0.2, -0.6, 0.0, 0.9, 0.1]
-    u, values, v = np.linalg.svd(
-        jacobian(ARM, q) / np.repeat([ARM_MOTION.length_mm, 1.0], 3)[:, None]
-    )
+    u, values, v = np.linalg.svd(jacobian(ARM, q) / np.repeat([LENGTH_MM, 1.0], 3)[:, None])
     for i in range(4):
-        assert values[i] > ARM_MOTION.least_singular
-        twist = values[i] * u[:, i] * np.repeat([ARM_MOTION.length_mm, 1.0], 3)
+        assert values[i] > LEAST_SINGULAR
+        twist = values[i] * u[:, i] * np.repeat([LENGTH_MM, 1.0], 3)
         assert joint_speeds(ARM, q, twist) == pytest.approx(v[i], abs=1e-9)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from probe.client.order import FrameOrder
+from probe.client.receiver import FrameOrder
 from probe.protocol import FramePacket, IdentPacket, StatisticsPacket
 
 STEP_US = 10_000

@@ -171,7 +171,7 @@ def test_points_that_were_not_foreseen_to_touch_are_taken_in(monkeypatch):
     touch = Touch(0.0, 0.0, 0.0, 200.0)
     right = tabs(HalfPlane(floor_mm=-0.3), SENSOR, touch)
     monkeypatch.setattr(tabs_module, "rest", counted)
-    monkeypatch.setattr(tabs_module, "foreseen_pose", too_high)
+    monkeypatch.setattr(tabs_module, "predicted_pose", too_high)
     found = tabs(HalfPlane(floor_mm=-0.3), SENSOR, touch)
     assert len(calls) > 1
     assert calls[-1] > calls[0]

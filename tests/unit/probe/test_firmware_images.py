@@ -7,7 +7,7 @@ import pytest
 
 from probe.errors import PortError
 from probe.firmware.build import SOURCES
-from probe.firmware.images import FeltImages
+from probe.firmware.emulator import FeltImages
 
 
 @pytest.fixture

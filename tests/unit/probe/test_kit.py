@@ -24,10 +24,9 @@ from probe.kit.board import connections, has_board, shore_a, wiring_svg
 from probe.kit.command import run
 from probe.kit.coupon import UNDATED, make_coupon
 from probe.kit.make import bed_for
-from probe.kit.mesh import mesh_of, step_text
-from probe.kit.settings import KIT
+from probe.kit.model import mesh_of, step_text
 from probe.kit.sheet import PrintedPart
-from probe.kit.sizes import frustum_mm3, kit_sizes
+from probe.kit.sizes import CLEARANCE_MM, HEAD_MM, PIN_MM, WALL_BETWEEN_MM, frustum_mm3, kit_sizes
 from probe.simulate.registered import registered_surface
 
 SMALL = SensorType(rows=4, columns=5, pitch_mm=3.0, name="small",
@@ -53,15 +52,15 @@ def test_what_must_fit_fits(name):
     sensor = sensor_type_named(name)
     k = kit_sizes(sensor, 5.0)
     if k.tip_mm:
-        assert k.tip_mm <= k.foot_mm <= min(sensor.step_mm) - KIT.wall_between_mm + 1e-9
+        assert k.tip_mm <= k.foot_mm <= min(sensor.step_mm) - WALL_BETWEEN_MM + 1e-9
         assert 0 < k.vent_mm < sensor.pitch_mm - k.tip_mm  # between two lines of tips
         assert k.thickness_mm - k.thickness_skin_mm - k.lip_mm == pytest.approx(0.8)
     (x, y), *_ = k.posts_mm
-    assert x - KIT.pin_mm / 2 > k.film_mm[0] / 2
-    assert y - KIT.pin_mm / 2 > k.film_mm[1] / 2
+    assert x - PIN_MM / 2 > k.film_mm[0] / 2
+    assert y - PIN_MM / 2 > k.film_mm[1] / 2
     screw, _ = model.screw_places(k)[0]
-    inside = k.skin_mm[0] / 2 + KIT.clearance_mm
-    assert screw - KIT.head_mm[0] / 2 > inside  # a screw's head beside the platform
+    inside = k.skin_mm[0] / 2 + CLEARANCE_MM
+    assert screw - HEAD_MM[0] / 2 > inside  # a screw's head beside the platform
     assert k.coupon_mm > 2 * max(sensor.half_mm)
 
 
@@ -88,7 +87,7 @@ def test_volumes_are_those_of_a_calculation_by_hand():
 def test_tabs_of_the_mould_stand_where_tactels_are():
     k = kit_sizes(SMALL, 7.0)
     solid = model.mould_plate(k)
-    mesh = mesh_of(solid, KIT)
+    mesh = mesh_of(solid)
     tips = mesh.vertices[np.abs(mesh.vertices[:, 2]) < 1e-9]
     around = [p for p in tips if np.abs(p[:2]).max() < 8]
     for row, column in np.ndindex(4, 5):
@@ -103,7 +102,7 @@ def test_files_of_a_part_are_the_same_on_every_run():
     k = kit_sizes(SMALL, 7.0)
     first, second = (model.housing_frame(k) for _ in range(2))
     assert step_text(first, "housing-frame") == step_text(second, "housing-frame")
-    one, two = mesh_of(first, KIT), mesh_of(second, KIT)
+    one, two = mesh_of(first), mesh_of(second)
     assert (one.vertices == two.vertices).all()
     assert (one.triangles == two.triangles).all()
 
@@ -192,7 +191,7 @@ def test_a_part_that_the_usual_bed_does_not_hold_says_so_and_lies_on_a_larger_on
     assert replace(small, size_mm=(249.0, 209.0, 7.0), resin=False).bed_hint == ""
     large = replace(small, size_mm=(108.0, 86.0, 7.0))
     assert large.bed_hint == "wants a bed of 108 x 86 mm, more than the usual 140 x 85"
-    box = mesh_of(model.PARTS["mould-lid"][1](kit_sizes(sensor_type_named("mat-32x32"), 6.0)), KIT)
+    box = mesh_of(model.PARTS["mould-lid"][1](kit_sizes(sensor_type_named("mat-32x32"), 6.0)))
     wide, deep = bed_for([box], (140.0, 85.0))
     assert wide == 140.0
     assert deep == pytest.approx(np.ptp(box.vertices[:, 1]))

@@ -15,8 +15,7 @@ import pytest
 
 from probe.client.client import Client
 from probe.errors import PortError
-from probe.port.marked import MARKER, MarkedImages
-from probe.port.settings import PORT
+from probe.port.flexitac import MARKER, PAUSE_LEAST_S, MarkedImages
 from probe.port.url import open_port, typed_port
 
 LENGTH = 512
@@ -68,7 +67,7 @@ def test_a_marker_inside_images_that_stand_still_is_told_by_the_pauses():
     marked, found = MarkedImages(LENGTH), []
     block = MARKER + image.tobytes()
     for part in [block[300:], *[block] * 20]:
-        found += marked.feed(part[:400], quiet_s=2 * PORT.pause_least_s)
+        found += marked.feed(part[:400], quiet_s=2 * PAUSE_LEAST_S)
         found += marked.feed(part[400:])
     assert len(found) >= 15
     assert all(one == image.tobytes() for one in found)

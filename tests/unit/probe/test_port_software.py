@@ -8,8 +8,8 @@ import pytest
 
 from probe.frame import Frame, frame_from
 from probe.port import open_port
-from probe.port.pattern import moving_pattern
 from probe.port.recorded import endless_frames
+from probe.port.simulated import moving_pattern
 from probe.port.software import SoftwareProbe
 from probe.protocol import FramePacket, IdentPacket, Splitter, StatisticsPacket, decode
 

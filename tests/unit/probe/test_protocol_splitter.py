@@ -1,7 +1,6 @@
 """Cutting the stream: every split gives the same blocks, and memory is bounded."""
 
-from probe.protocol import Splitter
-from probe.protocol.splitter import LONGEST
+from probe.protocol import LONGEST, Splitter
 
 
 def test_blocks_end_at_zeros():

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm.inverse import inverse
-from probe.arm.links import Arm, forward
+from probe.arm import Arm, forward, inverse
 from probe.contact.contract import Touch
 from probe.errors import ContactError, PoseError, SurfaceError
 from probe.scan.approach import ApproachLimits, guarded_approach

@@ -1,12 +1,10 @@
 """Written parts' files as triangles and height fields."""
 
 import struct
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from generator.polyhedron.read.settings import MODEL
 from probe.errors import SurfaceError
 from probe.simulate.written import part_mesh, written_triangles
 
@@ -62,8 +60,7 @@ def test_what_is_no_stl_is_refused(tmp_path, content, match):
 def test_files_that_are_too_large_are_refused(tmp_path, monkeypatch):
     file = tmp_path / "part.stl"
     file.write_bytes(binary([np.eye(3)] * 3))
-    few = replace(MODEL, most_part_triangles=2)
-    monkeypatch.setattr("generator.database.part_file.MODEL", few)
+    monkeypatch.setattr("generator.database.part_file.MOST_PART_TRIANGLES", 2)
     with pytest.raises(SurfaceError, match="3 triangles; 2 are allowed"):
         written_triangles(file)
     monkeypatch.setattr("generator.database.part_file.LARGEST_BYTES", 100)

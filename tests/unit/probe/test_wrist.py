@@ -8,15 +8,19 @@ import numpy as np
 import pytest
 
 from probe.errors import PoseError
-from probe.wrist.distances import counts_of, distances_at, distances_mm, wrist_pose
-from probe.wrist.geometry import (
+from probe.wrist import (
     Wrist,
     WristPose,
+    counts_of,
+    distances_at,
+    distances_mm,
     gripper_to_plate,
     plate_to_sensor,
+    pose_under_load,
+    stiffness,
     tilt_error_rad,
+    wrist_pose,
 )
-from probe.wrist.springs import pose_under_load, stiffness
 
 DEG = math.pi / 180
 

@@ -8,8 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from generator.database.as_built import AsBuilt
-from recognizer.as_built.estimate import FeltPrint, estimate_print, estimate_printer
-from recognizer.as_built.settings import EstimateSettings
+from recognizer.as_built.estimate import (
+    ALWAYS,
+    BETWEEN,
+    MeasuredPrint,
+    estimate_print,
+    estimate_printer,
+)
 from recognizer.as_built.verdict import AS_DESIGNED, CORRECTED, PRINT_AGAIN, judge_print
 from recognizer.errors import AsBuiltError
 from recognizer.touch.as_built import (
@@ -24,7 +29,6 @@ from recognizer.touch.as_built import (
     usual_print,
 )
 
-EXACT = EstimateSettings(always=(0.0, 0.0, 0.0, 0.0))
 NEAR = st.floats(0.94, 1.06)
 TOP = np.eye(3)
 WALL_X = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # face x along x, face y along z
@@ -48,7 +52,7 @@ def felt_on(as_built, R_part_face, error=(0, 0, 0, 0), covariance=None):
     """What an exact touch of a face tells: the metric of its plane as it is printed."""
     S, B = print_matrix(as_built), R_part_face[:, :2]
     E = (B.T @ S.T @ S @ B - np.eye(2)) / 2
-    return FeltPrint(
+    return MeasuredPrint(
         0, "Cube", "F1", "Cube-F1", R_part_face[:2, :2],
         np.array([E[0, 0], E[1, 1], E[0, 1]]) + error[:3], as_built.stroke_mm + error[3],
         np.eye(4) * 1e-6 if covariance is None else covariance,
@@ -60,7 +64,7 @@ def test_exact_touches_of_turned_faces_give_the_print_back(scale_x, scale_y, ske
     truth = print_with(scale_x, scale_y, skew, 1.55)
     faces = [turned(angle), turned(angle + 2) @ WALL_X, turned(angle) @ WALL_Y, SLOPE]
     felt = [felt_on(truth, faces[k % 4]) for k in range(12)]
-    found = estimate_print(felt, settings=EXACT)
+    found = estimate_print(felt)
     for name in ("scale_x", "scale_y", "skew_rad", "stroke_mm"):
         assert getattr(found, name) == pytest.approx(getattr(truth, name), abs=1e-9)
     assert found.touches == 12
@@ -70,7 +74,7 @@ def test_one_bad_touch_in_twenty_five_moves_little():
     truth, rng = print_with(0.98, 0.99, 0.004), np.random.default_rng(3)
     felt = [felt_on(truth, TOP, rng.normal(0, 1e-3, 4)) for _ in range(24)]
     bad = felt_on(truth, TOP, (0.06, -0.05, 0.03, 0.3))
-    without, found = estimate_print(felt, settings=EXACT), estimate_print([*felt, bad])
+    without, found = estimate_print(felt), estimate_print([*felt, bad])
     assert abs(found.scale_x - without.scale_x) < 2e-4
     assert abs(found.skew_rad - without.skew_rad) < 2e-4
 
@@ -81,9 +85,11 @@ def test_how_sure_it_is_comes_from_the_spread_of_the_touches(said):
     chi2 = []
     for _ in range(60):
         felt = [felt_on(truth, TOP, rng.normal(0, 2e-3, 4), np.eye(4) * said) for _ in range(30)]
-        found = estimate_print(felt, settings=EXACT)
+        found = estimate_print(felt)
         away = np.array([found.scale_x - 0.98, found.scale_y - 0.99, found.skew_rad - 0.004])
-        chi2.append(away @ np.linalg.solve(found.covariance[:3, :3], away))
+        chi2.append(
+            away @ np.linalg.solve(found.covariance[:3, :3] - np.diag(np.square(ALWAYS[:3])), away)
+        )
     assert 2.4 < np.mean(chi2) < 4.2  # three degrees of freedom
 
 
@@ -108,7 +114,7 @@ def test_a_printer_is_what_its_parts_are_and_how_far_they_differ():
     spread = np.diag([1e-8, 1e-8, 1e-8, 1e-4])
     one = estimate_printer([print_with(0.99, 0.995, 0.001, covariance=spread)])
     assert (one.object_id, one.part, one.printer, one.material) == (None, None, "mk4", "PLA")
-    between = np.square(EstimateSettings().between)
+    between = np.square(BETWEEN)
     np.testing.assert_allclose(np.diag(one.covariance), np.diag(spread) + 2 * between)
     apart = [print_with(0.98, covariance=spread), print_with(1.0, covariance=spread)]
     both = estimate_printer(apart)

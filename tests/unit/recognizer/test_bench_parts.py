@@ -523,7 +523,7 @@ def test_loads_that_tell_nothing_are_refused_with_what_is_missing():
 
 @pytest.mark.parametrize(
     "url",
-    ["touch:?firmware=z80", "touch:?rate=0", "touch:?rate=nan", "touch:?x=1", "touch:?hold=a"],
+    ["sim:touch?firmware=z80", "touch:?rate=0", "touch:?rate=nan", "touch:?x=1", "touch:?hold=a"],
 )
 def test_a_simulated_probe_that_cannot_be_had(url):
     with pytest.raises(BenchError):

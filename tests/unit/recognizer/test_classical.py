@@ -9,7 +9,7 @@ import pytest
 from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
-from probe.arm.links import Arm
+from probe.arm import Arm
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.scan.kinesthetic import JointErrors, follow_poses
@@ -17,11 +17,10 @@ from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.simulate.registered import registered_surface
 from recognizer.scan.mosaic.planar import relative_pose, transform_points
-from recognizer.thesis.image import average_touches, merge_touches, relative_poses
+from recognizer.thesis.merge import average_touches, merge_touches, relative_poses
 from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_scan, read_while_scanning
-from recognizer.thesis.settings import MergingSettings, ThesisSettings
-from recognizer.thesis.skeleton.symbols import symbols
+from recognizer.thesis.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW
 from recognizer.touch.tactile_image import ImageError, tactile_image, touch_image
@@ -117,9 +116,7 @@ def test_poses_in_any_frame_become_those_in_the_first_sensor_frame():
 
 def test_touches_lie_where_they_were_felt():
     poses = np.array([[0.0, 0, 0], [6.7, 0.3, 0.02], [6.9, -6.6, -0.01]])
-    found = merge_touches(
-        SENSOR, [felt_at(pose) for pose in poses], poses, MergingSettings(placing="believed")
-    )
+    found = merge_touches(SENSOR, [felt_at(pose) for pose in poses], poses, "believed")
     image = found.image
     assert image.step_mm == pytest.approx(SENSOR.pitch_mm / 4)
     at = image.xy_mm(*np.indices(image.values.shape))
@@ -156,7 +153,7 @@ def test_bad_tactels_are_filled_by_other_touches():
     trust = np.ones((16, 16))
     trust[:, 9] = 0
     readings = [np.where(trust > 0, felt_at(pose), np.nan) for pose in poses]
-    found = merge_touches(SENSOR, readings, poses, MergingSettings(placing="believed"), trust)
+    found = merge_touches(SENSOR, readings, poses, "believed", trust=trust)
     at = found.image.xy_mm(*np.indices(found.image.values.shape))
     inner = (np.abs(at[..., 0] - 2.4) < 0.5) & (np.abs(at[..., 1]) < 10)
     assert found.image.defined[inner].all()
@@ -179,9 +176,7 @@ def test_image_of_one_touch_is_the_magnified_touch():
 def test_bounded_errors_do_not_add_up(scan):
     errors = {
         placing: off_mm(
-            merge_touches(
-                SENSOR, scan.readings, scan.believed, MergingSettings(placing=placing)
-            ).poses,
+            merge_touches(SENSOR, scan.readings, scan.believed, placing).poses,
             scan.true,
         )
         for placing in ("product", "bounded", "believed")
@@ -196,9 +191,7 @@ def test_bounded_errors_do_not_add_up(scan):
 
 @pytest.mark.parametrize("placing", ["product", "bounded"])
 def test_a_scan_names_object_face_and_place(lab, scan, placing):
-    found = read_scan(
-        lab, SENSOR, scan.readings, scan.believed, merging=MergingSettings(placing=placing)
-    )
+    found = read_scan(lab, SENSOR, scan.readings, scan.believed, placing)
     answer = found.recognition
     assert (answer.object, answer.face) == ("Cube", "F2")
     assert found.reading.grid.window.shape == (6, 6)
@@ -225,9 +218,7 @@ def test_a_scan_names_object_face_and_place(lab, scan, placing):
 
 def test_a_turned_scan_of_a_triangle(url, lab):
     scan = Scan(url, "Prism", "F1", seed=4, theta=0.35)
-    found = read_scan(
-        lab, SENSOR, scan.readings, scan.believed, merging=MergingSettings(placing="bounded")
-    )
+    found = read_scan(lab, SENSOR, scan.readings, scan.believed, "bounded")
     if found.recognition:
         assert (found.recognition.object, found.recognition.face) == ("Prism", "F1")
         assert math.dist(found.recognition.T_face_probe[:2, 3], scan.true[-1, :2]) < 3
@@ -238,10 +229,8 @@ def test_a_turned_scan_of_a_triangle(url, lab):
 
 @pytest.mark.parametrize("conversion", ["likelihood", "good tuple", "exact"])
 def test_every_conversion_reads_the_window(lab, scan, conversion):
-    image = merge_touches(
-        SENSOR, scan.readings, scan.believed, MergingSettings(placing="believed")
-    ).image
-    answer = read_classically(lab, image, ThesisSettings(conversion=conversion)).recognition
+    image = merge_touches(SENSOR, scan.readings, scan.believed, "believed").image
+    answer = read_classically(lab, image, conversion).recognition
     assert (answer.object, answer.face) in {("Cube", "F2"), (None, None)}
     if conversion == "likelihood":
         assert answer.object == "Cube"
@@ -249,9 +238,8 @@ def test_every_conversion_reads_the_window(lab, scan, conversion):
 
 def test_an_answer_comes_before_the_scan_is_over_and_never_a_wrong_one(lab, scan):
     first = None
-    merging = MergingSettings(placing="bounded")
     for found in read_while_scanning(
-        lab, SENSOR, scan.readings, scan.believed, merging=merging, every=15
+        lab, SENSOR, scan.readings, scan.believed, "bounded", every=15
     ):
         if found.recognition:
             assert (found.recognition.object, found.recognition.face) == ("Cube", "F2")
@@ -278,16 +266,13 @@ def test_no_contact_and_blank_surfaces_are_told(lab):
 
 def test_an_object_of_another_lab_is_not_taken_for_one_of_ours(lab, tmp_path):
     scan = Scan(made(tmp_path, OTHER), "Stranger", "F1", seed=5)
-    merging = MergingSettings(placing="believed")
-    found = read_scan(lab, SENSOR, scan.readings, scan.believed, merging=merging)
+    found = read_scan(lab, SENSOR, scan.readings, scan.believed, "believed")
     assert len(found.reading.grid.members) > 24  # its symbols are read, and are none of ours
     assert not found.recognition
 
 
 def test_symbols_of_a_face_are_read_as_the_database_has_them(lab, scan):
-    image = merge_touches(
-        SENSOR, scan.readings, scan.true, MergingSettings(placing="believed")
-    ).image
+    image = merge_touches(SENSOR, scan.readings, scan.true, "believed").image
     encoding = lab.arrays[0]
     found = symbols(image, encoding.alphabet, encoding.style)
     named = [symbol for symbol in found if symbol.label >= 0]

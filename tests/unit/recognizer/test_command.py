@@ -20,8 +20,7 @@ from probe.contact.press import press
 from probe.frame import frame_from
 from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
-from probe.wrist.distances import counts_of, distances_at
-from probe.wrist.geometry import Wrist
+from probe.wrist import Wrist, counts_of, distances_at
 from recognizer.command import run
 from recognizer.command.scanning import ScanError, pose_during, read_joints
 from recognizer.touch.robot import Seating

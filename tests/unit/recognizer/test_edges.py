@@ -12,13 +12,23 @@ from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
-from recognizer.thesis.edges.find import classical_edges, face_edges, outline
-from recognizer.thesis.edges.hough import segments
-from recognizer.thesis.edges.line import corner_between, fit_line
-from recognizer.thesis.edges.points import EdgePoints, edge_points
-from recognizer.thesis.edges.response import felt_at, responses
-from recognizer.thesis.edges.syntax import fuse_segments, vertices
-from recognizer.thesis.settings import EDGE_RESPONSE, EdgeSearchSettings
+from recognizer.thesis.edge_fit import (
+    BLURS_MM,
+    REACH_MM,
+    face_edges,
+    outline,
+    response_at,
+    responses,
+)
+from recognizer.thesis.edges import (
+    EdgePoints,
+    classical_edges,
+    edge_points,
+    fuse_segments,
+    segments,
+    vertices,
+)
+from recognizer.thesis.line import corner_between, fit_line
 from recognizer.touch.tactile_image import tactile_image, touch_image
 
 SENSOR = SensorType()
@@ -31,7 +41,7 @@ def on_line(angle, offset, along, rng, across=0.1):
     t = np.array([n[1], -n[0]])
     at = offset * n + np.asarray(along)[:, None] * t
     at = at + rng.normal(0, across, len(along))[:, None] * n
-    return EdgePoints(at, np.tile(n, (len(at), 1)), np.ones(len(at)))
+    return EdgePoints(at, np.tile(n, (len(at), 1)))
 
 
 def joined(*parts):
@@ -77,9 +87,7 @@ def test_longest_segment_is_taken_first_and_noise_is_none():
     rng = np.random.default_rng(1)
     long = on_line(0.5, 4.0, np.linspace(-10, 10, 30), rng)
     short = on_line(-1.2, -6.0, np.linspace(0, 6, 10), rng)
-    specks = EdgePoints(
-        rng.uniform(-12, 12, (12, 2)), rng.normal(0, 1, (12, 2)) * 0.1 + [0, 1], np.ones(12)
-    )
+    specks = EdgePoints(rng.uniform(-12, 12, (12, 2)), rng.normal(0, 1, (12, 2)) * 0.1 + [0, 1])
     found = segments(joined(short, specks, long))
     assert found[0].edge.angle_rad == pytest.approx(0.5, abs=0.02)
     assert found[0].edge.offset_mm == pytest.approx(4.0, abs=0.1)
@@ -136,13 +144,13 @@ def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
 @pytest.mark.parametrize("kind", ["tab", "pad"])
 def test_response_rises_from_nothing_to_all(kind):
     table = responses(SensorType(overlay=Overlay(kind=kind)))
-    assert len(table) == len(EDGE_RESPONSE.blurs_mm)
+    assert len(table) == len(BLURS_MM)
     assert (np.diff(table, axis=1) > -1e-12).all()
     for row in table:
-        assert felt_at(
-            row, np.array([-EDGE_RESPONSE.reach_mm - 1, EDGE_RESPONSE.reach_mm + 1])
-        ) == pytest.approx([0, 1], abs=1e-4)
-    sharp = felt_at(table[0], np.array([-0.5, 0.0, 0.5]))
+        assert response_at(row, np.array([-REACH_MM - 1, REACH_MM + 1])) == pytest.approx(
+            [0, 1], abs=1e-4
+        )
+    sharp = response_at(table[0], np.array([-0.5, 0.0, 0.5]))
     assert 0 < sharp[0] < 0.4 < sharp[1] < 0.66 < sharp[2]
 
 
@@ -249,4 +257,4 @@ def test_dead_tactels_are_left_out():
         values[r, c], trust[r, c] = 0.0, 0.0
     edge = face_edges(touch_image(SENSOR, values, trust), SENSOR)[0]
     assert worst_mm(edge, *truth(touch, (0, 80), (0, 0))) < 0.5
-    assert classical_edges(touch_image(SENSOR, values, trust), EdgeSearchSettings(median=False))
+    assert classical_edges(touch_image(SENSOR, values, trust), despike=False)

@@ -6,7 +6,7 @@ from scipy import ndimage
 
 from encoded_objects.base.sensor_type import SensorType
 from recognizer.thesis.filters import magnify_image, median, sobel, subtract_bias
-from recognizer.thesis.product import magnify_samples as by_convolution
+from recognizer.thesis.merge import magnify_samples as by_convolution
 from recognizer.touch.tactile_image import ImageError, tactile_image, touch_image
 
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from recognizer.thesis.grid import grid
-from recognizer.thesis.settings import AcceptanceSettings
-from recognizer.thesis.skeleton.count import KeyPoints
-from recognizer.thesis.skeleton.symbols import Symbol
+from recognizer.thesis.skeleton import KeyPoints
+from recognizer.thesis.symbols import Symbol
 
 NONE = KeyPoints(np.zeros((0, 2)), np.zeros((0, 2)), 0)
 PITCH = 12.0
@@ -78,7 +77,8 @@ def test_of_two_candidates_the_better_fit_is_chosen():
 def test_threshold_is_a_share_of_the_pitch():
     far = [symbol(0, 0, 0.0), symbol(12 + 2.9, 0, 0.0)]
     assert grid(far, PITCH).window.shape == (1, 2)
-    assert len(grid(far, PITCH, AcceptanceSettings(off=0.2)).members) == 1
+    farther = [symbol(0, 0, 0.0), symbol(12 + 3.1, 0, 0.0)]  # .25 of 12 mm are 3
+    assert len(grid(farther, PITCH).members) == 1
 
 
 def test_symbols_beyond_a_gap_join_the_grid():

@@ -29,7 +29,7 @@ def noisy(rng, pose, information):
     return pose + rng.multivariate_normal(np.zeros(3), np.linalg.inv(information))
 
 
-def test_ties_without_errors_give_the_truth_from_afar():
+def test_constraints_without_errors_give_the_truth_from_afar():
     rng = np.random.default_rng(1)
     true, near = scene(rng)
     arm = np.array([5.0, -8.0, 0.6])
@@ -51,7 +51,7 @@ def test_ties_without_errors_give_the_truth_from_afar():
     assert found.steps < 15
 
 
-def test_wrong_pairs_are_let_go_and_named():
+def test_wrong_pairs_are_switched_off_and_named():
     rng = np.random.default_rng(2)
     true, near = scene(rng, 16)
     constraints = [
@@ -93,7 +93,7 @@ def test_covariances_are_true():
     assert 0.9 < np.mean(inside) < 0.99
 
 
-def test_a_tie_along_a_ridge_leaves_the_rest_to_belief():
+def test_a_constraint_along_a_ridge_leaves_the_rest_to_belief():
     across_only = np.diag([500.0, 0.0, 1e5])
     constraints = [
         Constraint(ARM, 0, np.zeros(3), SURE, "believed"),

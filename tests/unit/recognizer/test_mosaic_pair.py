@@ -110,7 +110,7 @@ def test_a_stronger_touch_is_a_gain():
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.6, 1.9])
-def test_ridges_define_what_lies_across_them(angle):
+def test_ridges_define_the_motion_across_them(angle):
     true = np.array([3.0, 2.0, 0.01])
     off = np.array([0.8, -0.6, 0.003])
     found = register_patches(*two(Ridges(angle), true), true + off, BELIEF, period_mm=math.inf)

@@ -12,9 +12,9 @@ from probe.scan.places import surface_to_sensor
 from recognizer.errors import MosaicError
 from recognizer.scan.mosaic.canvas import (
     CanvasEntry,
+    add_to_canvas,
     empty_canvas,
     image_of,
-    lay_touch,
     reference,
 )
 from recognizer.scan.mosaic.patch import (
@@ -39,12 +39,12 @@ from recognizer.scan.mosaic.planar import (
 from recognizer.scan.mosaic.search import (
     KnownRaster,
     cross_correlate,
-    laid_under,
     magnify_patch,
     peaks,
     points_mm,
+    resample,
 )
-from recognizer.thesis.product import product_shift
+from recognizer.thesis.merge import product_shift
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
 
@@ -211,11 +211,11 @@ def test_bad_tactels_are_filled_from_around():
     assert patch(broken, np.zeros((16, 16))).scale == 0
 
 
-def test_a_raster_laid_under_another():
+def test_a_raster_is_resampled_on_another():
     found = magnify_patch(patch(sampled()))
     assert found.values.shape == (64, 64)
     pose = np.array([2.0, -1.0, 0.3])
-    under = laid_under(found, found, pose)
+    under = resample(found, found, pose)
     at = transform_points(pose, points_mm(found)[under.known])
     inside = (np.abs(at) < 10).all(axis=1)
     scale = patch(sampled()).scale
@@ -224,7 +224,7 @@ def test_a_raster_laid_under_another():
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.2])
-def test_a_ridge_moved_along_itself_is_not_seen(angle):
+def test_a_ridge_moved_along_itself_is_invisible(angle):
     points = SENSOR.centres_mm().reshape(-1, 2)
     across = points @ [math.cos(angle), math.sin(angle)]
     ridge = patch(np.exp(-((across - 1.0) ** 2) / 4).reshape(16, 16))
@@ -238,7 +238,7 @@ def test_a_ridge_moved_along_itself_is_not_seen(angle):
     assert np.linalg.eigvalsh(information).min() > -1e-6
 
 
-def test_a_dome_turned_about_its_middle_is_not_seen():
+def test_a_dome_turned_about_its_middle_is_invisible():
     points = SENSOR.centres_mm().reshape(-1, 2)
     dome = patch(np.exp(-((points - [2, 1]) ** 2).sum(axis=1) / 18).reshape(16, 16))
     everywhere = np.ones(256, bool)
@@ -251,19 +251,19 @@ def test_a_dome_turned_about_its_middle_is_not_seen():
 # --- canvas and image ----------------------------------------------------------------------
 
 
-def test_what_is_taken_off_again_leaves_nothing():
+def test_a_removed_touch_leaves_nothing():
     canvas = empty_canvas(P)
     sure = np.diag([1e-4, 1e-4, 1e-7])
     first = CanvasEntry(np.array([5.0, 40.0, 0.2]), sure, 1.0)
     second = CanvasEntry(np.array([-9.0, 33.0, -0.7]), sure, 1.3)
-    one = lay_touch(canvas, patch(sampled()), first)
-    both = lay_touch(one, patch(sampled((1, 0))), second)
-    back = lay_touch(both, patch(sampled((1, 0))), second, -1)
+    one = add_to_canvas(canvas, patch(sampled()), first)
+    both = add_to_canvas(one, patch(sampled((1, 0))), second)
+    back = add_to_canvas(both, patch(sampled((1, 0))), second, -1)
     assert not canvas.tiles
     assert back.tiles.keys() == one.tiles.keys()
     for key, tile in one.tiles.items():
         assert back.tiles[key] == pytest.approx(tile, rel=1e-9, abs=1e-6)
-    assert not lay_touch(back, patch(sampled()), first, -1).tiles
+    assert not add_to_canvas(back, patch(sampled()), first, -1).tiles
     assert image_of(canvas).values.shape == (0, 0)
 
 
@@ -272,7 +272,7 @@ def test_the_image_is_the_mean_with_its_errors():
     sure = np.diag([1e-4, 1e-4, 1e-7])
     for k, level in enumerate((1.0, 1.0, 1.3)):
         how = CanvasEntry(np.array([0.0, 0.0, 0.0]), sure, 1.0)
-        canvas = lay_touch(canvas, patch(np.full((16, 16), level)), how)
+        canvas = add_to_canvas(canvas, patch(np.full((16, 16), level)), how)
         image = image_of(canvas)
         assert image.values.shape == (64, 64)
         assert (image.count == k + 1).all()
@@ -287,7 +287,7 @@ def test_the_image_is_the_mean_with_its_errors():
 
 def test_the_canvas_shows_a_touch_where_it_lies():
     how = CanvasEntry(np.array([30.0, -20.0, 0.4]), np.diag([1e-4, 1e-4, 1e-7]), 1.0)
-    canvas = lay_touch(empty_canvas(P), patch(sampled()), how)
+    canvas = add_to_canvas(empty_canvas(P), patch(sampled()), how)
     shown = reference(canvas, 30.0, -20.0, 12.0)
     at = transform_points(inverse(how.pose), points_mm(shown)[shown.known])
     inside = (np.abs(at) < 9).all(axis=1)
@@ -298,7 +298,7 @@ def test_the_canvas_shows_a_touch_where_it_lies():
 def test_a_doubtful_place_counts_little_at_edges_only():
     points = SENSOR.centres_mm().reshape(-1, 2)
     step = patch(1 + (points[:, 0] > 0).reshape(16, 16).astype(float))
-    canvas = lay_touch(
+    canvas = add_to_canvas(
         empty_canvas(P), step, CanvasEntry(np.zeros(3), np.diag([1.0, 1.0, 1e-4]), 1.0)
     )
     error = image_of(canvas).error

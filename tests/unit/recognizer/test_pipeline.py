@@ -18,6 +18,7 @@ from probe.simulate.registered import registered_surface
 from recognizer.touch.chance import expected_matches
 from recognizer.touch.evidence import weigh_cells
 from recognizer.touch.hypothesis import (
+    CAP,
     Hypothesis,
     find_hypotheses,
     find_rivals,
@@ -262,7 +263,7 @@ def test_a_sure_lattice_is_placed_and_a_wrong_cell_costs_its_cap(reader):
     middle = int(np.flatnonzero((fit.cells == 0).all(axis=1))[0])
     scores[middle] = [*np.roll(scores[middle][:-1], 1).tolist(), -30.0]
     spoiled = replace(fit, scores=scores)
-    assert log_likelihood(encoding, spoiled, place) == pytest.approx(-5.0 - PLACES.cap)
+    assert log_likelihood(encoding, spoiled, place) == pytest.approx(-5.0 - CAP)
     best = find_hypotheses(encoding, (spoiled,))[0]
     assert (best.row, best.column, best.face) == (place.row, place.column, place.face)
 

@@ -7,11 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm.carried import SensorPose
-from probe.arm.links import Arm, forward
+from probe.arm import Arm, SensorPose, forward
 from probe.errors import PoseError
-from probe.wrist.distances import counts_of, distances_at
-from probe.wrist.geometry import Wrist, gripper_to_plate, plate_to_sensor
+from probe.wrist import Wrist, counts_of, distances_at, gripper_to_plate, plate_to_sensor
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.robot import Seating, carried_pose, object_pose
 
@@ -110,7 +108,7 @@ def test_arm_and_wrist_carry_the_sensor():
     arm, wrist = Arm(), Wrist()
     counts = counts_of(wrist, distances_at(wrist, 5.0, 0.02, 0.03))
     at = carried_pose(arm, wrist, JOINTS, np.full(5, 1e-3), counts)
-    from probe.wrist.distances import distances_mm, wrist_pose
+    from probe.wrist import distances_mm, wrist_pose
 
     hanging = wrist_pose(wrist, distances_mm(wrist, counts))
     expected = forward(arm, JOINTS) @ gripper_to_plate(wrist, hanging) @ plate_to_sensor(wrist)

@@ -8,7 +8,7 @@ import pytest
 from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from probe.contact.contract import Touch
 from probe.scan.places import surface_to_sensor
 from probe.simulate.registered import registered_surface
@@ -76,7 +76,7 @@ PLACES = [(x, y) for n, y in enumerate((26.0, 40.0, 54.0)) for x in (22, 32, 42,
 
 
 @pytest.mark.parametrize("level", [TYPICAL, MISMATCH], ids=lambda level: level.name)
-def test_a_scan_tells_what_one_touch_cannot(lab, reader, level):
+def test_a_scan_identifies_what_one_touch_cannot(lab, reader, level):
     surface = registered_surface(lab.url, "Cube", "F3").surface
     touches, true = scanned(surface, PLACES, 0.8, level, 5)
     scan, answers = begin_scan(reader), []

@@ -1,4 +1,4 @@
-"""What touches of several faces say of an object together."""
+"""Touches of several faces of one object, joined."""
 
 from types import SimpleNamespace
 
@@ -64,7 +64,7 @@ def test_one_face_decides_what_another_leaves_open(touched):
     assert join_faces(last, [weak, weak]).object == "A"
 
 
-def test_what_another_face_says_is_bounded(touched):
+def test_the_evidence_of_another_face_is_bounded(touched):
     last = touched((0, -40.0, 20.0), (1, -65.0, 20.0))
     other = touched((1, -10.0, 9.0))  # of B alone; 20 nats at most, and 25 speak for A
     assert join_faces(last, [other]).reason == AMBIGUOUS
@@ -88,7 +88,7 @@ def test_where_the_motion_is_known_the_object_must_lie_in_one_place(touched):
     assert join_faces(last, [unknown]).reason == AMBIGUOUS
 
 
-def test_what_a_face_says_of_the_object(touched):
+def test_object_hypotheses_of_a_face(touched):
     found = _hypotheses_of(touched((0, -40.0, 20.0), (1, -42.0, 20.0), at=(100.0, 0.0, 0.0)))
     assert [(one.object, one.score) for one in found] == [("A", 0.0), ("B", -2.0)]
     height = 30.0 + 1.2  # the sensor stands on the tops of the symbols

@@ -94,7 +94,7 @@ def test_touches_on_one_lattice_agree_and_their_cells_meet():
     assert both.fit.y_mm + PITCH * origin[1] == pytest.approx(true[-1, 1], abs=1e-6)
 
 
-def test_the_lattice_is_found_better_than_the_arm_stands():
+def test_the_lattice_is_more_precise_than_the_arm():
     _true, touch_poses, fits = a_scan(number=25, sigma_mm=0.4)
     views = views_from([(f,) for f in fits])
     found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 3), PITCH)
@@ -137,7 +137,7 @@ def test_a_touch_that_plainly_shows_another_lattice_is_left_out():
     assert found.chosen.tolist() == [0, 1, -1, 4, 5, 6]
 
 
-def test_a_touch_whose_whole_pitches_are_not_told_is_left_out():
+def test_a_touch_with_ambiguous_whole_pitches_is_left_out():
     _true, touch_poses, fits = a_scan()
     views = views_from([(f,) for f in fits])
     wide = touch_poses.covariances.copy()
@@ -154,7 +154,7 @@ def test_a_touch_whose_whole_pitches_are_not_told_is_left_out():
     assert (both.fit.scores.max(axis=1) == 0).all()
 
 
-def test_looks_at_a_cell_are_no_independent_witnesses():
+def test_touches_of_one_cell_share_errors():
     true, touch_poses, _fits = a_scan(number=30, sigma_mm=0.1)
     still = true[:1].repeat(30, axis=0)
     touch_poses = TouchPoses(compose_poses(T_PLANE_LATTICE, still), touch_poses.covariances, None)
@@ -166,7 +166,7 @@ def test_looks_at_a_cell_are_no_independent_witnesses():
     assert -both.fit.scores.min() < 2.0 / CORRELATION
 
 
-def test_one_touch_says_a_bounded_amount_of_a_cell():
+def test_the_evidence_of_one_touch_is_bounded():
     true, touch_poses, _fits = a_scan(number=1)
     views = views_from([(fit_at(true[0], (0, 0), sure=500.0),)])
     only = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
@@ -194,7 +194,7 @@ def test_a_touch_that_contradicts_all_others_is_left_out():
     assert math.hypot(there.x_mm - both.fit.x_mm, there.y_mm - both.fit.y_mm) < 1e-9
 
 
-def test_fits_that_know_nothing_of_their_place_are_no_views():
+def test_fits_with_an_indefinite_pose_are_no_views():
     _true, touch_poses, fits = a_scan(number=2)
     lost = replace(fits[1], covariance=np.zeros((3, 3)))
     vague = replace(fits[1], covariance=np.diag([900.0, 0.01, 1e-4]))

@@ -1,4 +1,4 @@
-"""Touches whose motion nobody measured, followed along registered places."""
+"""Touches without measured motion, followed along registered places."""
 
 import math
 
@@ -70,7 +70,7 @@ def followed(encoding, views, steps=None):
     return follow_path(encoding, views, steps)
 
 
-def test_places_that_one_touch_leaves_open_are_told_by_a_path(encoding):
+def test_a_path_decides_places_that_one_touch_leaves_open(encoding):
     row, column = corner(encoding, 0)
     true = [(0, 0), (1, 0), (2, 0), (3, 0), (3, 1), (2, 1), (1, 1)]
     views = []
@@ -123,7 +123,7 @@ def test_a_measured_step_holds_a_path(encoding):
         assert (path.placed.all() and np.allclose(made, [12, 0])) == agrees
 
 
-def test_steps_are_what_somebody_measured():
+def test_steps_follow_from_measurements():
     signal = signal_of(np.zeros((16, 16)))
     touches = [
         PlacedTouch(signal, believed=planar_belief([1.0, 2.0, 0.0], (0.3, 0.3, 0.01))),

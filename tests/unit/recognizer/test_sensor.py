@@ -18,13 +18,9 @@ from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
 from recognizer.command import run
 from recognizer.errors import SensorStateError, WiringError
-from recognizer.sensor.answering import answering_of
-from recognizer.sensor.file import read_state, write_state
-from recognizer.sensor.learn import learn_sensor
-from recognizer.sensor.mounting import find_mounting
-from recognizer.sensor.settings import LEARNING
-from recognizer.sensor.wiring import wiring_hint, wiring_named
-from recognizer.sensor.words import state_entry, state_words
+from recognizer.sensor.file import read_state, state_entry, state_words, write_state
+from recognizer.sensor.learn import LEAST_TOUCHES, answering_of, learn_sensor
+from recognizer.sensor.wiring import find_mounting, wiring_hint, wiring_named
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import Recognition
@@ -65,10 +61,10 @@ def test_a_raised_tactel_that_still_answers_keeps_its_offset():
 
 
 def test_nothing_is_said_of_few_touches_or_of_what_no_touch_loaded():
-    few = answering_of(pressed(LEARNING.least - 1))
+    few = answering_of(pressed(LEAST_TOUCHES - 1))
     assert not few.dead.any()
     assert not few.hot.any()
-    enough = answering_of(pressed(LEARNING.least))
+    enough = answering_of(pressed(LEAST_TOUCHES))
     assert enough.dead[3, 4]
     images = pressed()
     images[:, :, 8:] = 0.0  # every touch hung over an edge
@@ -220,7 +216,7 @@ def test_touches_tell_gains_and_where_tips_stand(lab, felt):
     images, tips, gain = felt
     reader = Reader(open_lab(lab / "lab.db"))
     shares = []
-    state = learn_sensor(reader, images, settings=replace(LEARNING, rounds=1), name="left",
+    state = learn_sensor(reader, images, rounds=1, name="left",
                          done=shares.append)  # fmt: skip
     assert sorted(map(tuple, np.argwhere(state.masked).tolist())) == DEAD
     live = ~state.dead

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from generator.alphabet import SymbolStyle, alphabet_named
-from recognizer.thesis.settings import CountingSettings, SkeletonSettings
-from recognizer.thesis.skeleton.count import points_of_glyph, points_of_skeleton
-from recognizer.thesis.skeleton.graph import graph, length
-from recognizer.thesis.skeleton.symbols import COUNTS, CUT, symbols
+from recognizer.thesis.skeleton import graph, length, points_of_glyph, points_of_skeleton
+from recognizer.thesis.symbols import COUNTS, CUT, symbols
 from recognizer.touch.tactile_image import tactile_image
 
 STEP = 0.4
@@ -89,7 +87,7 @@ def test_spurs_are_pruned_and_the_line_runs_through():
 
 def test_a_ring_is_one_loop_without_ends():
     ring = skeleton(".....\n..#..\n.#.#.\n..#..\n.....")
-    points = points_of_skeleton(ring, 100.0, CountingSettings(spur=0, hook=0, bow=1))
+    points = points_of_skeleton(ring, 100.0)
     assert points.counts == (0, 0, 1)
 
 
@@ -130,5 +128,5 @@ def test_right_counts_in_the_wrong_shape_are_rejected():
     wide = drawn(alphabet, [(0, 0, 0, 0.0)], size_mm=40, pitch=22.0, half_mm=0.9)
     (found,) = symbols(wide, alphabet, style(alphabet))
     assert (found.label, found.rejected) == (-1, "shape")
-    (found,) = symbols(wide, alphabet, style(alphabet), SkeletonSettings(shape=math.inf))
+    (found,) = symbols(wide, alphabet, style(alphabet), most_residual=math.inf)
     assert found.label == 0

@@ -10,7 +10,7 @@ from encoded_objects import encode
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.simulate.registered import registered_surface
-from recognizer.as_built.touches import feel_prints
+from recognizer.as_built.touches import measure_prints
 from recognizer.errors import AsBuiltError
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
@@ -59,7 +59,7 @@ def test_a_touch_tells_scales_and_skew_of_the_print(reader, matrix):
     touches = [
         felt(reader, matrix, Touch(18.0, 21.5, turn, 80.0)) for turn in (0.3, 1.9, -2.2, -0.8)
     ]
-    found = np.mean([one.strain for one in feel_prints(reader, touches)], axis=0)
+    found = np.mean([one.strain for one in measure_prints(reader, touches)], axis=0)
     E = (matrix.T @ matrix - np.eye(2)) / 2
     np.testing.assert_allclose(found, (E[0, 0], E[1, 1], E[0, 1]), atol=0.002)
 
@@ -79,10 +79,10 @@ def test_an_answer_carries_scale_and_stroke(reader):
 def test_touches_that_tell_no_print_are_named(reader):
     blank = TouchImage(0, 0, 1, np.zeros((16, 16)), np.zeros(4), None)
     with pytest.raises(AsBuiltError, match=r"none of 2 touches tells of a print: 2 no contact"):
-        feel_prints(reader, [blank, blank])
+        measure_prints(reader, [blank, blank])
     with pytest.raises(AsBuiltError, match="no touch"):
-        feel_prints(reader, [])
+        measure_prints(reader, [])
     at = Touch(18.0, 21.5, math.radians(20), 80.0)
     both = [felt(reader, np.eye(2), at, name) for name in ("Cube", "Other", "Cube")]
     with pytest.raises(AsBuiltError, match=r"touches of 2 objects: Cube \(2\), Other \(1\)"):
-        feel_prints(reader, both, place="touch.h5")
+        measure_prints(reader, both, place="touch.h5")

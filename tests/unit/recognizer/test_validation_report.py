@@ -185,7 +185,9 @@ def test_worlds_of_several_runs_keep_their_order_commands_and_times():
         ("A", "low", 90), ("A", "half dead", 0), ("B", "low", 80),
     ]  # fmt: skip
     assert [line["drawing_ms"] for line in found["worlds"]] == [4.0, 5.0, 4.0]
-    assert [line["command"] for line in found["runs"]] == [each.command for each in runs]
+    assert [line["command"] for line in found["runs"]] == [
+        each.results["provenance"]["command"] for each in runs
+    ]
     json.dumps(found, allow_nan=False)
     drawn = draw_answers(found["worlds"]), draw_errors(found["worlds"])
     assert "2 wrong" in drawn[0]

@@ -1,0 +1,63 @@
+"""What a sheet for people says -> one HTML page: no network, no script, prints on paper.
+
+Build sheets of objects and sets, and the sheet of a probe kit, are sections in one template,
+`sheet.html.j2`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A cell with what a part bears, or a link."""
+
+    text: str
+    url: str = ""
+
+
+Cell = str | Mark
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """Drawings with their caption."""
+
+    drawing: str  #: SVG; empty where there is none
+    text: str
+    name: str = ""
+    mark: str = ""
+    small: bool = False  #: the text
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One heading and what is under it, in this order; what is empty is left out."""
+
+    title: str = ""
+    text: str = ""
+    head: Sequence[str] = ()  #: of the table; without one the first cell of a row is its name
+    rows: Sequence[Sequence[Cell]] = ()
+    figures: Sequence[Figure] = ()
+    wide: bool = False  #: two figures a row
+    steps: Sequence[str] = ()
+    drawing: str = ""  #: SVG
+    notes: Sequence[str] = ()
+
+
+def sheet_html(title: str, sections: Sequence[Section]) -> str:
+    """Return the page."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template("sheet.html.j2").render(title=title, sections=sections)

@@ -1,0 +1,436 @@
+"""What faces must be, and how they must join, to be a solid; and how faults are named.
+
+Vertices (V, 3) mm and faces as tuples of loops (outer counter-clockwise seen from outside,
+holes clockwise). Single faces: no duplicate vertices, slivers, bends, loops that cross or touch
+themselves, holes outside. Together: every edge lies between exactly two faces that run it in
+opposite directions; around a vertex they form one fan; all hang together; none cuts through
+another. Nothing is repaired. Tolerances are shares of the size, the diagonal of the bounding
+box. Thesis 6.3.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.errors import ShapeError
+from generator.plane.polygon import (
+    area_vector,
+    closest_pair,
+    is_convex,
+    plane_axes,
+    side_of_polygon,
+    signed_area,
+)
+from generator.plane.rings import distance
+
+PLANARITY = 1e-4  #: most a vertex may lie off its face's plane, of the size: more is no rounding
+CLOSENESS = 1e-6  #: two points, or a point and an edge, nearer than this share touch: float32
+
+Loops = tuple[tuple[int, ...], ...]
+Vertices = NDArray[np.float64]
+Users = dict[tuple[int, int], list[tuple[int, bool]]]  # edge -> (face, runs upward in number)
+
+LISTED = 8  #: problems spelled out in one message
+
+
+@dataclass(frozen=True, slots=True)
+class FaceProblem:
+    """One thing that is wrong, where, and what to do about it."""
+
+    place: str  #: name of a face, or "" for the solid as a whole
+    cause: str
+    fix: str
+
+    def __str__(self) -> str:
+        head = f"face {self.place}: " if self.place else ""
+        return f"{head}{self.cause}; {self.fix}"
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Faces to be checked: their names, and their loops of vertex numbers."""
+
+    vertices: Vertices  #: (V, 3) mm
+    names: tuple[str, ...]
+    faces: tuple[Loops, ...]
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the bounding box, mm."""
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+    def vertex(self, number: int) -> str:
+        """Return how a message calls a vertex: its number, from 0, and its coordinates."""
+        x, y, z = self.vertices[number]
+        return f"vertex {number} ({x:.6g}, {y:.6g}, {z:.6g})"
+
+
+def raise_problems(problems: Sequence[FaceProblem]) -> None:
+    """Raise one `ShapeError` that holds all problems; nothing if there are none."""
+    if not problems:
+        return
+    if len(problems) == 1:
+        (one,) = problems
+        raise ShapeError(one.cause, fix=one.fix, place=f"face {one.place}" if one.place else "")
+    lines = [f"\n  {problem}" for problem in problems[:LISTED]]
+    if len(problems) > LISTED:
+        lines.append(f"\n  and {len(problems) - LISTED} more")
+    raise ShapeError(
+        f"the polyhedron has {len(problems)} problems:" + "".join(lines),
+        fix="correct them and try again",
+    )
+
+
+def directed_edges(loops: Iterable[Sequence[int]]) -> Iterable[tuple[int, int]]:
+    """Yield the edges (start, end) of all loops of a face, in order."""
+    for loop in loops:
+        yield from zip(loop, (*loop[1:], loop[0]), strict=True)
+
+
+def face_axes(vertices: Vertices, loops: Loops) -> tuple[Vertices, Vertices, Vertices]:
+    """Return the unit axes of a face's frame: x along its first edge, z its Newell normal."""
+    outer = vertices[list(loops[0])]
+    return plane_axes(area_vector(outer), outer[1] - outer[0])
+
+
+def euler_characteristic(vertices: int, edges: int, faces: Sequence[Loops]) -> int:
+    """Return V - E + F - (loops - faces): 2 (shells - genus) of a closed solid."""
+    return vertices - edges + 2 * len(faces) - sum(map(len, faces))
+
+
+def number_problems(surface: Surface) -> list[FaceProblem]:
+    """Return what is wrong with counts, coordinates and indices; the rest needs these right."""
+    vertices, problems = surface.vertices, []
+    if len(vertices) < 4 or len(surface.faces) < 4:
+        problems.append(
+            FaceProblem(
+                "",
+                f"{len(vertices)} vertices and {len(surface.faces)} faces: a solid has at least "
+                "4 of each",
+                "give every vertex and every face",
+            )
+        )
+    for number in np.flatnonzero(~np.isfinite(vertices).all(axis=1)):
+        problems.append(
+            FaceProblem(
+                "", f"vertex {number} is not a point: {vertices[number]}", "give three lengths"
+            )
+        )
+    for name, loops in zip(surface.names, surface.faces, strict=True):
+        if not loops:
+            problems.append(FaceProblem(name, "it has no vertices", "list at least 3 vertices"))
+        for loop in loops:
+            outside = [v for v in loop if not 0 <= v < len(vertices)]
+            if outside:
+                problems.append(
+                    FaceProblem(
+                        name,
+                        f"there is no vertex {outside[0]}; they are 0 to {len(vertices) - 1}",
+                        "count vertices from 0",
+                    )
+                )
+            elif len(loop) < 3:
+                problems.append(
+                    FaceProblem(name, f"a loop of {len(loop)} vertices", "list at least 3 vertices")
+                )
+    return problems
+
+
+def edge_problems(surface: Surface) -> list[FaceProblem]:
+    """Return what is wrong with the way faces join: open, branching or reversed edges, shells."""
+    users: Users = defaultdict(list)
+    for face, loops in enumerate(surface.faces):
+        for a, b in directed_edges(loops):
+            users[min(a, b), max(a, b)].append((face, a < b))
+    problems = [
+        _edge_problem(surface, edge, faces) for edge, faces in users.items() if len(faces) != 2
+    ]
+    problems += [
+        FaceProblem("", f"{surface.vertex(int(v))} belongs to no face", "remove it, or use it")
+        for v in np.setdiff1d(np.arange(len(surface.vertices)), np.unique(list(users)))
+    ]
+    if problems:
+        return problems
+    problems = _orientation_problems(surface, users)
+    return problems or _fan_problems(surface) or _shell_problems(surface, users)
+
+
+def _edge_problem(
+    surface: Surface, edge: tuple[int, int], users: list[tuple[int, bool]]
+) -> FaceProblem:
+    a, b = edge
+    names = [surface.names[face] for face, _ in users]
+    where = f"the edge between {surface.vertex(a)} and {surface.vertex(b)}"
+    if len(users) == 1:
+        return FaceProblem(
+            names[0], f"open: {where} has no second face", "add the face that is missing"
+        )
+    cause = f"{where} joins {len(users)} faces ({', '.join(names)}); a solid has 2 at each edge"
+    return FaceProblem(names[0], cause, "separate them there, or leave one out")
+
+
+def _orientation_problems(surface: Surface, users: Users) -> list[FaceProblem]:
+    """Name the faces that run against the majority of their shell."""
+    neighbours: dict[int, list[tuple[int, bool]]] = defaultdict(list)
+    for (f, forward), (g, same) in users.values():
+        neighbours[f].append((g, forward == same))
+        neighbours[g].append((f, forward == same))
+    turned: dict[int, bool] = {}
+    problems = []
+    for seed in range(len(surface.faces)):
+        if seed in turned:
+            continue
+        turned[seed] = False
+        shell = [seed]
+        for face in shell:
+            for other, against in neighbours[face]:
+                wanted = turned[face] ^ against
+                if other not in turned:
+                    turned[other] = wanted
+                    shell.append(other)
+                elif turned[other] != wanted:
+                    cause = "the surface has no outside: it turns over on the way round"
+                    return [FaceProblem(surface.names[other], cause, "correct how its faces join")]
+        minority = 2 * sum(turned[f] for f in shell) <= len(shell)
+        for face in sorted(shell):
+            if turned[face] == minority:
+                cause = "it runs the other way round than its neighbours"
+                fix = "reverse the order of its vertices"
+                problems.append(FaceProblem(surface.names[face], cause, fix))
+    return problems
+
+
+def _fan_problems(surface: Surface) -> list[FaceProblem]:
+    """Faces around a vertex must form one fan: rotate from edge to edge and count."""
+    turn: dict[tuple[int, int], int] = {}  # (vertex, edge towards) -> next edge around the vertex
+    degree: dict[int, int] = defaultdict(int)
+    first: dict[int, int] = {}
+    for loops in surface.faces:
+        for loop in loops:
+            for before, v, after in zip(
+                (loop[-1], *loop[:-1]), loop, (*loop[1:], loop[0]), strict=True
+            ):
+                turn[v, after] = before
+                degree[v] += 1
+                first.setdefault(v, after)
+    problems = []
+    for v, start in first.items():
+        steps, other = 1, turn[v, start]
+        while other != start:
+            steps, other = steps + 1, turn[v, other]
+        if steps != degree[v]:
+            cause = f"the solid touches itself at {surface.vertex(v)}"
+            problems.append(FaceProblem("", cause, "move the parts apart or join them by more"))
+    return problems
+
+
+def _shell_problems(surface: Surface, users: Users) -> list[FaceProblem]:
+    parent = list(range(len(surface.faces)))
+
+    def root(face: int) -> int:
+        while parent[face] != face:
+            parent[face] = parent[parent[face]]
+            face = parent[face]
+        return face
+
+    for (f, _), (g, _) in users.values():
+        parent[root(f)] = root(g)
+    shells = {root(f): surface.names[f] for f in reversed(range(len(parent)))}
+    if len(shells) == 1:
+        return []
+    starts = ", ".join(list(shells.values())[::-1][:LISTED])
+    cause = f"{len(shells)} separate shells (they start at faces {starts}); one solid has one"
+    return [FaceProblem("", cause, "give each body a file of its own, and fill inner voids")]
+
+
+def face_problems(surface: Surface) -> list[FaceProblem]:
+    """Return what is wrong with single faces: repeated points, slivers, bends, crossings."""
+    tolerance = CLOSENESS * surface.size
+    problems = _duplicate_vertices(surface, tolerance)
+    if problems:
+        return problems  # every other measure would only repeat it
+    for name, loops in zip(surface.names, surface.faces, strict=True):
+        problems += _loop_problems(surface, name, loops, tolerance)
+    return problems
+
+
+def crossing_problems(surface: Surface) -> list[FaceProblem]:
+    """Return the faces that are cut or touched by edges and vertices that are not their own.
+
+    A convex solid has no vertex in front of any face and is done after one product.
+    """
+    tolerance = CLOSENESS * surface.size
+    vertices, problems = surface.vertices, []
+    edges = np.array(sorted({(min(e), max(e)) for f in surface.faces for e in directed_edges(f)}))
+    for name, loops in zip(surface.names, surface.faces, strict=True):
+        own = np.zeros(len(vertices), dtype=bool)
+        own[[v for loop in loops for v in loop]] = True
+        origin = vertices[loops[0][0]]
+        x, y, z = face_axes(vertices, loops)
+        problems += _chord_problems(surface, name, loops, edges[own[edges].all(axis=1)])
+        height = (vertices - origin) @ z
+        height[own] = 0.0
+        if height.max() <= tolerance and not (np.abs(height[~own]) <= tolerance).any():
+            continue
+        axes = np.stack([x, y], axis=1)
+        polygon = [(vertices[list(loop)] - origin) @ axes for loop in loops]
+        touching = np.flatnonzero(~own & (np.abs(height) <= tolerance))
+        for v in touching[
+            _in_widened_polygon(polygon, (vertices[touching] - origin) @ axes, tolerance)
+        ]:
+            cause = f"{surface.vertex(int(v))} of another face lies on it"
+            problems.append(FaceProblem(name, cause, "move it away, or join the faces there"))
+        a, b = height[edges[:, 0]], height[edges[:, 1]]
+        cut = np.flatnonzero((np.minimum(a, b) < -tolerance) & (np.maximum(a, b) > tolerance))
+        t = a[cut] / (a[cut] - b[cut])
+        start, end = vertices[edges[cut, 0]], vertices[edges[cut, 1]]
+        point = start + t[:, None] * (end - start)
+        for k in np.flatnonzero(_in_widened_polygon(polygon, (point - origin) @ axes, tolerance)):
+            v, w = edges[cut[k]]
+            cause = f"the edge between vertices {v} and {w} runs through it at {_point(point[k])}"
+            problems.append(FaceProblem(name, cause, "a solid must not cut through itself"))
+    return problems
+
+
+def _chord_problems(
+    surface: Surface, name: str, loops: Loops, joined: NDArray[np.intp]
+) -> list[FaceProblem]:
+    """Find edges of other faces between two vertices of this one that lie on it."""
+    own = {(min(edge), max(edge)) for edge in directed_edges(loops)}
+    chords = [(int(v), int(w)) for v, w in joined if (v, w) not in own]
+    if not chords:
+        return []
+    origin = surface.vertices[loops[0][0]]
+    axes = np.stack(face_axes(surface.vertices, loops)[:2], axis=1)
+    polygon = [(surface.vertices[list(loop)] - origin) @ axes for loop in loops]
+    middle = surface.vertices[np.array(chords)].mean(axis=1)
+    inside = side_of_polygon(polygon, (middle - origin) @ axes) > 0
+    fix = "move it away, or join the faces there"
+    return [
+        FaceProblem(name, f"the edge between vertices {v} and {w} of other faces lies on it", fix)
+        for (v, w), hit in zip(chords, inside, strict=True)
+        if hit
+    ]
+
+
+def _duplicate_vertices(surface: Surface, tolerance: float) -> list[FaceProblem]:
+    vertices, problems = surface.vertices, []
+    order = np.argsort(vertices[:, 0], kind="stable")
+    x = vertices[order, 0]
+    last = np.searchsorted(x, x + tolerance, side="right")
+    for i in np.flatnonzero(last > np.arange(len(x)) + 1):
+        near = order[i + 1 : last[i]]
+        for j in near[np.linalg.norm(vertices[near] - vertices[order[i]], axis=1) <= tolerance]:
+            a, b = sorted((int(order[i]), int(j)))
+            cause = (
+                f"{surface.vertex(a)} and vertex {b} are the same point within {tolerance:.2g} mm"
+            )
+            problems.append(FaceProblem("", cause, f"use vertex {a} for both"))
+    return problems
+
+
+def _loop_problems(
+    surface: Surface, name: str, loops: Loops, tolerance: float
+) -> list[FaceProblem]:
+    for loop in loops:
+        if len(set(loop)) < len(loop):
+            twice = next(v for k, v in enumerate(loop) if v in loop[:k])
+            return [
+                FaceProblem(
+                    name,
+                    f"its loop visits {surface.vertex(twice)} twice",
+                    "a loop must not touch itself; split the face there",
+                )
+            ]
+    vertices = surface.vertices
+    outer = vertices[list(loops[0])]
+    normal = area_vector(outer)
+    area = float(np.sqrt(normal @ normal))
+    longest = float(np.sqrt(((np.roll(outer, -1, axis=0) - outer) ** 2).sum(axis=1).max()))
+    if area <= longest * tolerance:
+        return [_no_area(name, outer, area, tolerance)]
+    x, y, z = plane_axes(normal, outer[1] - outer[0])
+    every = [v for loop in loops for v in loop]
+    height = (vertices[every] - outer.mean(axis=0)) @ z
+    worst = int(np.abs(height).argmax())
+    allowed = PLANARITY * surface.size
+    if abs(height[worst]) > allowed:
+        return [
+            FaceProblem(
+                name,
+                f"not planar: its vertices lie up to {abs(height[worst]):.3g} mm off their plane, "
+                f"{allowed:.2g} mm is allowed; the farthest is {surface.vertex(every[worst])}",
+                "correct the coordinates or split the face into triangles",
+            )
+        ]
+    axes = np.stack([x, y], axis=1)
+    polygon = [(vertices[list(loop)] - outer[0]) @ axes for loop in loops]
+    if len(polygon) == 1 and is_convex(polygon[0]):
+        return []
+    gap, i, j = closest_pair(polygon)
+    if gap <= tolerance:
+        edges = list(directed_edges(loops))
+        cause = (
+            f"its edges {_edge(edges[i])} and {_edge(edges[j])} cross or touch "
+            f"near {_point(vertices[edges[i][0]])}"
+        )
+        return [FaceProblem(name, cause, "list its vertices in the order in which the edge runs")]
+    return _hole_problems(name, polygon)
+
+
+def _no_area(name: str, outer: Vertices, area: float, tolerance: float) -> FaceProblem:
+    """Tell a loop that crosses itself from a sliver."""
+    spread = np.linalg.svd(outer - outer.mean(axis=0), compute_uv=False)
+    if spread[1] > tolerance:
+        fix = "list its vertices in the order in which the edge runs"
+        return FaceProblem(
+            name, f"its loop crosses itself: the parts of its area cancel to {area:.2g} mm^2", fix
+        )
+    fix = "remove it and join its neighbours, or correct its vertices"
+    return FaceProblem(name, f"its area is {area:.2g} mm^2: a line, not a face", fix)
+
+
+def _hole_problems(name: str, polygon: list[Vertices]) -> list[FaceProblem]:
+    problems = []
+    for k, hole in enumerate(polygon[1:], start=1):
+        others = [loop for i, loop in enumerate(polygon) if i not in (0, k)]
+        if side_of_polygon(polygon[:1], hole[:1])[0] < 0:
+            problems.append(
+                FaceProblem(name, f"hole {k} lies outside it", "list the outer loop first")
+            )
+        elif any(side_of_polygon([loop], hole[:1])[0] > 0 for loop in others):
+            problems.append(
+                FaceProblem(name, f"hole {k} lies inside another hole", "make it a face of its own")
+            )
+        elif signed_area(hole) > 0:
+            problems.append(
+                FaceProblem(
+                    name,
+                    f"hole {k} runs counter-clockwise where the outer loop does",
+                    "reverse the order of its vertices",
+                )
+            )
+    return problems
+
+
+def _in_widened_polygon(
+    polygon: list[Vertices], points: Vertices, tolerance: float
+) -> NDArray[np.bool_]:
+    """Whether points lie in a polygon, its boundary widened by the tolerance."""
+    if len(points) == 0:
+        return np.zeros(0, dtype=bool)
+    inside = side_of_polygon(polygon, points) >= 0
+    return inside | (distance(points, polygon) <= tolerance)
+
+
+def _edge(edge: tuple[int, int]) -> str:
+    return f"{edge[0]}-{edge[1]}"
+
+
+def _point(point: Vertices) -> str:
+    return "({:.6g}, {:.6g}, {:.6g})".format(*point)
