@@ -22,7 +22,7 @@ from recognizer.touch.hypothesis import (
     Hypothesis,
     find_hypotheses,
     find_rivals,
-    labels_at,
+    labels_of,
     log_likelihood,
 )
 from recognizer.touch.lab import open_lab
@@ -216,7 +216,7 @@ def test_the_reading_behind_an_answer(url, reader):
 def test_the_index_of_windows_lists_every_window(reader):
     encoding = reader.lab.arrays[0]
     order = encoding.array.order
-    for windows in encoding.windows():
+    for windows in encoding.windows:
         down, right = windows.shape
         assert (np.diff(windows.codes) >= 0).all()
         for code, cell in list(zip(windows.codes, windows.cells, strict=True))[::97]:
@@ -231,7 +231,7 @@ def test_the_index_of_windows_lists_every_window(reader):
 
 def test_a_large_array_is_looked_up_like_a_small_one(reader):
     encoding = reader.lab.arrays[0]
-    sparse = replace(encoding, dense=None, known={}, indexed=[])
+    sparse = replace(encoding, dense=None, known={})
     rng = np.random.default_rng(2)
     rows = rng.integers(encoding.array.rows, size=500)
     columns = rng.integers(encoding.array.columns, size=500)
@@ -244,7 +244,7 @@ def place_of(encoding, at=40):
     row, column = divmod(int(encoding.keys[at]), encoding.array.columns)
     place = Hypothesis(0, row, column, int(encoding.owners[at]), 0.0)
     cells = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3)), axis=-1).reshape(-1, 2)
-    shown = labels_at(encoding, place, cells)
+    shown = labels_of(encoding, place, cells)
     scores = np.full((len(cells), encoding.array.order + 1), -30.0)
     scores[np.arange(len(cells)), shown] = 0.0
     fit = Fit(3.5, 3.5, 0.0, np.zeros(4), np.zeros(4), cells, scores, np.full(len(cells), 20.0),
@@ -274,7 +274,7 @@ def test_a_place_that_fits_nearly_as_well_is_found_wherever_it_is(reader, other)
     place, fit = place_of(encoding)
     row, column = divmod(int(encoding.keys[other]), encoding.array.columns)
     second = Hypothesis(0, row, column, int(encoding.owners[other]), 0.0)
-    shown = labels_at(encoding, second, fit.cells)
+    shown = labels_of(encoding, second, fit.cells)
     rows = np.arange(len(shown))
     scores = fit.scores.copy()
     scores[rows, shown] = np.maximum(scores[rows, shown], -0.25)
@@ -333,7 +333,7 @@ def test_a_cell_that_says_hardly_anything_does_not_speak_for_a_place(url, reader
     read = read_touch(reader, signal_of(forces, newtons=True)).best
     encoding, fit, place = read.embossed, read.fit, read.hypothesis
     told = weigh_cells(encoding, fit, place).agree
-    held = labels_at(encoding, place, fit.cells)
+    held = labels_of(encoding, place, fit.cells)
     assert told.sum() >= MANY_INLIERS
     assert (held[told] < encoding.array.order).all()
     scores = fit.scores.copy()
