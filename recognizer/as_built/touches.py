@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-#: Of a reader of prints that are farther off than usual.
+#: Options of a reader that accepts prints farther off than usual.
 WIDE_SCALE = ReaderOptions(scale_sd=0.04, scale_most=0.12)
 
 
@@ -40,7 +40,7 @@ def measure_prints(
     Parameters
     ----------
     reader
-        With the options `WIDE_SCALE`, so that a print far off is read too.
+        With the options `WIDE_SCALE`, which read prints far off, too.
     place
         Of the touches, for messages.
 

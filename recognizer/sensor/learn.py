@@ -100,9 +100,9 @@ def learn_sensor(
         for number, image in enumerate(inverted):
             signal = under.signal(image, calibration=calibration)
             reading = read_touch(under, signal, number)
-            answer, best = reading.answer, reading.best
-            if answer and best is not None and (answer.margin or 0.0) > MARGIN:
-                evidence.append(evidence_of(best))
+            answer, verified = reading.answer, reading.best
+            if answer and verified is not None and (answer.margin or 0.0) > MARGIN:
+                evidence.append(evidence_of(verified))
             if done is not None:
                 done((turn + (number + 1) / len(inverted)) / rounds)
         state = refine_tactels(state, evidence, before)

@@ -18,7 +18,7 @@ import numpy as np
 
 from probe.contact.engines import ENGINES, engine_named
 from probe.simulate.world.levels import LEVELS
-from recognizer.touch.options import DEFAULTS, Effort
+from recognizer.touch.options import DEFAULTS
 from recognizer.touch.reader import Reader
 from recognizer.validation.draw import FOREIGN
 from recognizer.validation.encoded_set import COPY, NEAR, SAME_PROFILE, SIDE, SMALL
@@ -194,7 +194,14 @@ def reader_with(reader: Reader, name: str) -> Reader:
     """Return a reader that spends as `READERS` says, and no second try beyond it."""
     if name == AS_IS:
         return reader
-    spent = Effort(*READERS[name])
+    candidates, steps, finalists, final_steps = READERS[name]
+    effort: dict[str, int] = {
+        "candidates": candidates,
+        "steps": steps,
+        "finalists": finalists,
+        "final_steps": final_steps,
+    }
+    spent = replace(reader.options.first, **effort)
     return replace(reader, options=replace(reader.options, first=spent, thorough=spent))
 
 

@@ -58,7 +58,9 @@ class Watched:
 
     module: str
     tests: tuple[str, ...]
-    within: tuple[str, ...] = ()  #: classes, functions, fields and constants that decide; all by default
+    within: tuple[
+        str, ...
+    ] = ()  #: classes, functions, fields and constants that decide; all by default
 
     def mutants(self) -> list[Mutant]:
         """Return every change of it."""

@@ -1,12 +1,11 @@
 """Image -> symbols: one maximum-likelihood fit of pose, gain and every visible symbol.
 
-template    what the sensor feels of each symbol, through the overlay; pad   pressed once
-pressing    depth of the plate -> force; gain   the image under a plane of depths
-noise       how far readings may lie from what a symbol gives
+template    what the sensor feels of each symbol, through the overlay
+kernels     the compiled loops, and the numbers that they use
+image       the image that is fitted, and its gain: depth of the plate -> force
 search      coarse: all rotations and shifts of the lattice at once, one matrix product
-projection  what lies under the tactels: cells, templates, labels
-refine      fine: damped least squares over pose and gain, labels chosen anew at every step
-covariance  how sure the pose is
-kernels     the library of compiled loops, where it is there; compiled   those over an image
-fit         all of it, and the scores of every cell; bends   a round face by forces alone
+linearize   forces of known symbols, and their derivatives by pose and gain
+fit         refinement of candidates, scores of every cell, covariance
+posterior   the last fit of a pose whose symbols are known, and the share it explains
+stretch     of the lattice of one touch; curvature   of a round face, from forces alone
 """
