@@ -58,9 +58,7 @@ class Watched:
 
     module: str
     tests: tuple[str, ...]
-    within: tuple[
-        str, ...
-    ] = ()  #: classes, functions, fields and constants that decide; all by default
+    within: tuple[str, ...] = ()  #: names (constants too) of what decides; all by default
 
     def mutants(self) -> list[Mutant]:
         """Return every change of it."""
