@@ -97,7 +97,7 @@ def test_limits_of_margins_are_reached_but_for_rounding():
 
 
 def wide_unless_sure(reader, signal, answer, judged, best):
-    """Ask for the second try as under a pad: `test_first_look` has when it is asked for."""
+    """Ask for the second try as under a pad: `test_search_gate` has when it is asked for."""
     assert reader is READER
     assert answer or judged is answer
     return not (answer and best.evidence.inliers >= MANY_INLIERS)
