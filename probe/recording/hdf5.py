@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     import h5py
 
 _FILE_FORMAT: Final = ("v110", "v110")
-_CACHE: Final = 4 << 20  #: bytes of chunks that are held while a file is written
 _OURS: Final = ("format", "format_version", "tool_version", "piece")
 _IMPORT: Final = "import the array that holds the images (N, rows, columns)"
 #: by kind of numbers: the values of a dataset, and what to do with others
@@ -82,7 +81,7 @@ def write_hdf5(
         stream = _Draft(draft)
     try:
         with explain_errors(place, "write"), stream:
-            with h5py.File(stream, "w", libver=_FILE_FORMAT, rdcc_nbytes=_CACHE) as file:
+            with h5py.File(stream, "w", libver=_FILE_FORMAT, rdcc_nbytes=0) as file:
                 file.attrs.update(_attributes(origin, piece))
                 for block in blocks:
                     _append_block(file, block, written)
@@ -130,11 +129,13 @@ class _Draft(io.FileIO):
 
 
 def _append_block(file: h5py.File, block: FrameBlock, first: int) -> None:
-    end = first + len(block)
-    for name, values in block.datasets().items():
+    """Append frames: the datasets are made first, and what belongs to a frame lies near it.
+
+    A truncated copy then holds all of the frames that reached it.
+    """
+    datasets = {name: values for name, values in block.datasets().items() if values is not None}
+    for name in datasets:
         if name not in file:
-            if values is None:
-                continue
             shape = block.counts.shape[1:] if name == "frames" else DATASETS[name][0]
             file.create_dataset(
                 name,
@@ -147,9 +148,13 @@ def _append_block(file: h5py.File, block: FrameBlock, first: int) -> None:
                 compression_opts=1,
                 fillvalue=np.nan if name == "pose" else None,
             )
-        file[name].resize(end, axis=0)
-        if values is not None:
-            file[name][first:end] = values
+    written = {name: file[name] for name in DATASETS if name in file}
+    for dataset in written.values():
+        dataset.resize(first + len(block), axis=0)
+    for start in range(0, len(block), CHUNK):
+        stop = min(start + CHUNK, len(block))
+        for name, values in datasets.items():
+            written[name][first + start : first + stop] = values[start:stop]
 
 
 def _attributes(origin: RecordingOrigin, piece: int) -> dict[str, Any]:
