@@ -11,6 +11,7 @@
     yaml_tree         YAML -> values that remember their lines and columns
     settings          blocks of settings (pydantic), quantities, errors in plain words
     json_schema       the schema of such blocks
+    pages        HTML by Jinja2 templates
     compiled          loops compiled from C: where their library lies, and whether it may be used
     options           options of commands, each declared once
     sensor_type       matrix, overlay and values of a sensor, and which type images are of

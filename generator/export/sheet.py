@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from encoded_objects.base.pages import page_environment
+
 
 @dataclass(frozen=True, slots=True)
 class Mark:
@@ -50,14 +52,5 @@ class Section:
 
 def sheet_html(title: str, sections: Sequence[Section]) -> str:
     """Return the page."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    environment = page_environment(Path(__file__).parent)
     return environment.get_template("sheet.html.j2").render(title=title, sections=sections)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from encoded_objects.base.errors import require
+from encoded_objects.base.pages import page_environment
 from recognizer.validation import pictures
 from recognizer.validation.campaign import FILES, PRINTED, series_of
 from recognizer.validation.extremes import extremes
@@ -76,16 +77,7 @@ def page_of(
 @lru_cache(maxsize=1)
 def environment() -> Environment:
     """Return what renders the templates; numbers and shares as the pages write them."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    made = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    made = page_environment(Path(__file__).parent)
     tints = {HOLDS: "good", FAILS: "bad", UNTOLD: "untold"}  # classes of cells
     made.filters.update(size=_size, percent=_percent, share=_share, count=_count,
                         interval=_interval, tint=lambda state: tints.get(state, ""))  # fmt: skip
