@@ -204,20 +204,21 @@ def _run(file: Path, settings: str, middle: str, gcode: Path) -> None:
 def _repeatable_command() -> tuple[str, ...]:
     """Return the command's beginning that makes the slicer give the same G-code again."""
     steady: tuple[str, ...] = ()
-    if _works("setarch", "-R"):
-        steady += ("setarch", "-R")
+    setarch, taskset = (shutil.which(name) or "" for name in ("setarch", "taskset"))
+    if _works(setarch, "-R"):
+        steady += (setarch, "-R")
     allowed = sorted(os.sched_getaffinity(0))
-    if _works("taskset", "-c", str(allowed[0])):
+    if _works(taskset, "-c", str(allowed[0])):
         # Any one processor does; slicers that run at once take one after the other.
         turn = os.getpid() + next(_TURNS)
-        steady += ("taskset", "-c", str(allowed[turn % len(allowed)]))
+        steady += (taskset, "-c", str(allowed[turn % len(allowed)]))
     return steady
 
 
 @lru_cache(maxsize=8)
 def _works(*beginning: str) -> bool:
     """Whether a program is there and allowed; some containers forbid it."""
-    if not shutil.which(beginning[0]):
+    if not beginning[0]:
         return False
     command = [*beginning, "true"]
     return not subprocess.run(command, capture_output=True, check=False).returncode  # noqa: S603
