@@ -138,7 +138,7 @@ class Scan:
         Parameters
         ----------
         touch
-            Of one object: counts (rows, columns), a signal, or a `recognizer.touch.source.TouchImage`.
+            Of one object: counts (rows, columns), a signal, or a `TouchImage` of `touch.source`.
             Without poses, touches of a face should lie within 8 mm or so of the one before.
         pose
             (4, 4) T_base_sensor, mm, in any fixed frame, with a covariance if it is a `SensorPose`;
