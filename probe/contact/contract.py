@@ -67,7 +67,7 @@ class Contact:
     z_mm: float  #: height of the centre of the tips' plane over the surface frame; inf: no contact
     tilt_x_rad: float
     tilt_y_rad: float
-    level: str  #: footprint, tabs, layer, elements
+    level: str  #: footprint, tabs, layer, gel
     iterations: int
 
 

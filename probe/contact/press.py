@@ -3,14 +3,14 @@
 Levels, from cheap to dear:
 
     tab overlay    footprint < tabs-7 < tabs-19 < tabs-61
-    pad overlay    footprint < layer-2 < layer-4 < layer-8 < layer-16; elements by name alone
+    pad overlay    footprint < layer-2 < layer-4 < layer-8 < layer-16
     gel            gel
 
 Error and cost of each level are measured by `tests/bench/contact_precision.py` on
 several indenters against finer references, and kept in `precision.json`. The error of an
 image is the norm of its deviation over the norm of the reference: the cost of the level's
 fineness, not of what the model leaves out (tabs are columns, the layer has no free sides: where a
-pad's own edge is pressed, take elements).
+pad's own edge is pressed, see docs/contact.md).
 
 Level "footprint" shares the force by cover alone: the force on a tactel is F times the share of
 its tip under which the surface reaches to within a depth of its highest place, over the sum of all
@@ -46,7 +46,7 @@ Accuracy = str | float
 
 LEVELS: dict[str, tuple[str, ...]] = {
     "tab": ("footprint", "tabs-7", "tabs-19", "tabs-61"),
-    "pad": ("footprint", "layer-2", "layer-4", "layer-8", "layer-16", "elements"),
+    "pad": ("footprint", "layer-2", "layer-4", "layer-8", "layer-16"),
     "gel": ("gel",),
 }
 DEFAULTS = {"tabs": "tabs-19", "layer": "layer-4"}  #: a name without its fineness
@@ -72,8 +72,7 @@ def press(
         Surface, sensor, pose and force.
     accuracy
         "auto" holds `AUTO_ERROR`; a number is the error to hold (0.003: 0.3 %); a name
-        takes that level: footprint, tabs, tabs-7, tabs-19, tabs-61, layer, layer-2 ... layer-16,
-        elements.
+        takes that level: footprint, tabs, tabs-7, tabs-19, tabs-61, layer, layer-2 ... layer-16.
 
     Returns
     -------
@@ -169,17 +168,11 @@ def _tabs(points: int, surface: HeightMap, sensor: SensorType, touch: Touch) -> 
     return tabs(surface, sensor, touch, Tips(points))
 
 
-# Loaded where they are used: scipy and scikit-fem take their time.
+# Loaded where they are used: scipy takes its time.
 def _layer(cells: int, surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     from probe.contact.layer import layer
 
     return layer(surface, sensor, touch, cells_per_tactel=cells)
-
-
-def _elements(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
-    from probe.contact.elements import elements
-
-    return elements(surface, sensor, touch)
 
 
 def _gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
@@ -245,7 +238,6 @@ MODELS: dict[str, Callable[[HeightMap, SensorType, Touch], Contact]] = {
     "footprint": footprint,
     **{f"tabs-{points}": partial(_tabs, points) for points in (7, 19, 61)},
     **{f"layer-{cells}": partial(_layer, cells) for cells in (2, 4, 8, 16)},
-    "elements": _elements,
     "gel": _gel,
 }
 ENGINE = Engine(press_tips, points=19, overlays=("tab", "pad", "gel"))

@@ -221,7 +221,7 @@ def checked_tabs(overlay: Overlay) -> None:
     if overlay.kind != "tab":
         raise ContactError(
             f"the overlay is a {overlay.kind}; this level knows tabs alone",
-            fix='take the level "layer" or "elements" for a pad',
+            fix='take the level "layer" for a pad',
         )
     sizes = (overlay.height_mm, overlay.tab_diameter_mm, overlay.young_mpa)
     if not (min(sizes) > 0 and max(sizes) < math.inf):

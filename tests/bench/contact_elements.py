@@ -25,11 +25,11 @@ from pathlib import Path
 import numpy as np
 from reference.elements_axisymmetric import section
 from reference.elements_round import indented, washer_pad
+from reference.elements_space import condensed_pad, elements
 from reference.elements_tab import Tab, compressed, partly_covered
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Contact, Touch, WristStiffness
-from probe.contact.elements import condensed_pad, elements
 from probe.contact.layer import layer
 from probe.surface.contract import HeightMap
 from probe.surface.indenters import Cross, FlatPlate, Paraboloid, RaisedStrip, Sphere

@@ -31,7 +31,7 @@ from probe.errors import ContactError
 from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip, Sphere, Washer
 from probe.surface.mesh import mesh
 
-LEVELS = {"tab": ("footprint", "tabs-19"), "pad": ("layer-2", "layer-4", "elements")}
+LEVELS = {"tab": ("footprint", "tabs-19"), "pad": ("layer-2", "layer-4")}
 TEN = math.radians(10)
 FREE = WristStiffness(0.0, 0.0)
 

@@ -42,10 +42,7 @@ GLYPHS = (
     (((-1, -1), (0, -1)), ((0, -1), (0, 0)), ((0, 0), (1, 1)), ((0, 0), (-1, 0))),
     (((-1, 1), (-1, -1)), ((-1, -1), (1, -1)), ((1, -1), (1, 1))),
 )
-EVERY_LEVEL = [
-    (kind, level) for kind, levels in LEVELS.items() for level in levels if level != "elements"
-]
-
+EVERY_LEVEL = [(kind, level) for kind, levels in LEVELS.items() for level in levels]
 OF_FORCES = [pair for pair in EVERY_LEVEL if pair[0] != "gel"]  #: a gel's image is of depths
 
 FELT = ReaderOptions(contact_counts=0.1)  #: of newtons without a calibration

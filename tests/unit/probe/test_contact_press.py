@@ -30,9 +30,7 @@ def test_pick_is_the_cheapest_that_holds_the_error(sensor):
 @pytest.mark.parametrize("sensor", [TAB, PAD])
 def test_finer_is_measured_better_and_dearer(sensor):
     lines = table()[sensor.overlay.kind]
-    assert [line.level for line in lines] == [
-        level for level in LEVELS[sensor.overlay.kind] if level != "elements"
-    ]
+    assert [line.level for line in lines] == [*LEVELS[sensor.overlay.kind]]
     assert np.all(np.diff([line.error for line in lines]) < 0)
     assert np.all(np.diff([line.ms for line in lines]) > 0)
 
