@@ -18,13 +18,13 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from reference.emulated_probe import emulated_probe
 
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.circuit import QUIET, Electronics, fsr_of, read_counts
 from probe.command import run
 from probe.errors import RecordingError
-from probe.firmware.emulator import emulated_probe
 from probe.frame import frame_from
 from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
