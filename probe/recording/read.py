@@ -54,7 +54,9 @@ class Recording:
 
     Examples
     --------
-    >>> import h5py, tempfile
+    >>> import tempfile
+    >>> import h5py
+    >>> import numpy as np
     >>> from encoded_objects import Recording
     >>> path = Path(tempfile.mkdtemp()) / "mine.h5"
     >>> with h5py.File(path, "w") as file:  # any HDF5 file with /frames will do
