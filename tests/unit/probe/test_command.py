@@ -15,8 +15,7 @@ from encoded_objects.base.output import write_json
 from probe.calibration import calibration_from, even_load, write_calibration
 from probe.circuit import QUIET, Electronics, fsr_of, read_sequence
 from probe.command import run
-from probe.command.calibrated import board_from
-from probe.command.loads import loads_given
+from probe.command.calibrated import board_from, loads_given
 from probe.errors import CalibrationError, CircuitError
 from probe.frame import frame_from, median_filter
 from probe.recording.read import Recording

@@ -10,8 +10,8 @@ from probe.calibration import calibration_from, even_load, expected_counts
 from probe.calibration.load import BIAS_FRAMES
 from probe.circuit import Electronics, fsr_of, read_sequence
 from probe.client import ClientStatistics
+from probe.command.live import KEYS, SHADES, heat_map, line_of, render_frame
 from probe.command.live_state import LiveState
-from probe.command.live_view import KEYS, SHADES, heat_map, line_of, render_frame
 from probe.frame import frame_from
 from probe.protocol import IdentPacket
 from probe.recording.files import next_free
