@@ -403,8 +403,8 @@ class SimulateOptions(Options):
     accuracy: Annotated[
         str,
         Option(
-            "auto, a level of the contact model (footprint, tabs, layer, elements), or the "
-            "largest error, as 0.01."
+            "auto, a level of the contact model (footprint, tabs, layer), or the largest "
+            "error, as 0.01."
         ),
     ] = "auto"
     noise: Annotated[str, Option("Noise of contacts and board.", choices=("typical", "quiet"))] = (
