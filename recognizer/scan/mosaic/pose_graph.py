@@ -99,7 +99,7 @@ def solve_pose_graph(
 
 
 def covariances(normal: Any, numbers: Sequence[int]) -> Array:
-    """Return covariances (k, 3, 3) of some poses, x, y (mm) and theta (rad); the arm is the n-th."""
+    """Return covariances (k, 3, 3) of some poses (mm and rad); the arm is the n-th."""
     from scipy.sparse.linalg import splu
 
     factor, size = splu(normal.tocsc()), normal.shape[0]
