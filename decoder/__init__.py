@@ -1,19 +1,9 @@
 """Window -> index: the code conversions of thesis 5.1, 5.4.3 and appendix 5, and their heirs.
 
-Windows (N, rows, columns) -> `Decodings`, one `Decoded` each: place, margin, reason::
-
-    window, decoded        labels and log-likelihoods in, places out
-    view                   rank and minimum distance of any set of visible cells
-    exact                  windows without errors, by one of four methods:
-      milestones             the thesis's: parallel (table), serial, serial-parallel
-      logarithm              closed form, any size
-    likelihood             wrong and missing symbols, soft scores, prior, rotations:
-      ranking                all places, those of a prior, or of a product array
-      transform, ordered     folded arrays: small ones exactly, large ones nearly
-    good_tuple             the thesis's way with wrong symbols, the baseline
-    element, register      field elements; symbols seen as linear equations of them
-    any_method, registered one window by any method, on a lab's array too
-    command, plot          decode-window
+Windows (N, rows, columns) -> `Decodings`, one `Decoded` each: place, margin, reason.
+Without errors (`exact`): the thesis's `milestones` (table, serial, serial-parallel), or
+`logarithm`, closed form, any size. With wrong and missing symbols: `likelihood`, whose `ranking`
+weighs all places; `good_tuple` is the thesis's way, the baseline.
 """
 
 from __future__ import annotations

@@ -77,19 +77,7 @@ class Terms:
 
 
 def convert_terms(sequence: Sequence, offsets: list[int], labels: Labels, method: str) -> Terms:
-    """Find the indices of symbols seen at given offsets of one sequence.
-
-    Parameters
-    ----------
-    sequence
-        The m-sequence.
-    offsets
-        (k,) relative indices.
-    labels
-        (N, k) symbols, -1 where none is seen.
-    method
-        A key of `METHODS`.
-    """
+    """Find the indices of symbols (N, k), -1 where none is seen, at offsets of one sequence."""
     number = len(labels)
     found = Terms(np.zeros(number, np.uint64), np.zeros(number, np.uint8), {})
     prepared = conversion(sequence, method)
@@ -154,9 +142,9 @@ def _list_candidates(
 def convert_product(array: ProductArray, labels: Labels, method: str) -> tuple[Terms, Terms]:
     """Return the indices along the rows and along the columns of (N, a, b) windows.
 
-    Every symbol gives the term of its row and the term of its column, so one visible symbol in
-    every row and every column that is needed serves: max(k1, k2) of them for a k1 x k2 window,
-    not p + q - 1 as the thesis says for figure 5.11. Symbols of one row must agree.
+    Every symbol gives the term of its row and the term of its column: one visible symbol in every
+    row and every column that is needed serves, max(k1, k2) of them for a k1 x k2 window, not
+    p + q - 1 as the thesis says for figure 5.11. Symbols of one row must agree.
     """
     factors = np.concatenate([array.factors, np.full((1, 2), ERASED)])[labels]
     found = []
@@ -181,32 +169,13 @@ def _agreement(factors: Labels, axis: int) -> tuple[Labels, NDArray[np.bool_]]:
 def decode_exact(
     array: FoldedArray | ProductArray, windows: ArrayLike, method: str = "logarithm"
 ) -> Decodings:
-    """Decode windows without wrong symbols.
+    """Decode windows without wrong symbols: (N, rows, columns) labels, -1 where none is seen.
 
-    Parameters
-    ----------
-    array
-        The array.
-    windows
-        (rows, columns) or (N, rows, columns) labels, -1 where a symbol is not seen.
-    method
-        "table", "serial", "milestones" or "logarithm".
+    Or one window. "too few symbols" (and up to 64 candidates) where the cells seen have not full
+    rank, "not an encoded surface" where they contradict the array. Raises `WindowError` if the
+    windows are not of this array's symbols, `MethodError` if the method is unknown or the array too
+    large for it.
 
-    Returns
-    -------
-    Decodings
-        With "too few symbols" (and up to 64 candidates) where the cells seen have not full
-        rank, "not an encoded surface" where they contradict the array.
-
-    Raises
-    ------
-    WindowError
-        If the windows are not of this array's symbols.
-    MethodError
-        If the method is unknown, or the array is too large for it.
-
-    Examples
-    --------
     >>> from generator.array import profile
     >>> window = [[0, 1], [1, 1], [0, 1], [0, 1], [0, 0], [0, 1]]  # figure 6.17
     >>> decode_exact(profile("thesis").array(), window)[0].t

@@ -40,10 +40,8 @@ class Likelihood:
 
     Parameters
     ----------
-    array
-        The array.
-    prior
-        (P, 2) rows and columns of the cells at which a window may lie; all by default.
+    array, prior
+        The array, and (P, 2) rows and columns at which a window may lie; all by default.
     rotations
         Quarter turns, counter-clockwise (`numpy.rot90`), that may bring a window upright.
     error
@@ -99,20 +97,11 @@ class Likelihood:
         return self._places[shape]
 
     def decode(self, windows: ArrayLike, top: int = 0) -> Decodings:
-        """Decode windows.
+        """Decode windows (N, rows, columns), labels with -1 where no symbol is seen; or one window.
 
-        Parameters
-        ----------
-        windows
-            (rows, columns) or (N, rows, columns) labels, -1 where a symbol is not seen; or
-            (rows, columns, q) or (N, rows, columns, q) log-likelihoods, floating point.
-        top
-            Candidates to list for every window; by default 16 for those not answered.
-
-        Raises
-        ------
-        WindowError
-            If labels or scores are not of this array.
+        Or log-likelihoods (N, rows, columns, q), floating point. `top`: candidates to list for
+        every window; by default 16 for those not answered. Raises `WindowError` if they are not of
+        this array.
         """
         given = np.asarray(windows)
         if given.dtype.kind == "f":

@@ -26,13 +26,7 @@ MOST_ENTRIES = 1 << 24  #: 64 MB
 
 
 class Table:
-    """The index of every window, by the key of its field element.
-
-    Raises
-    ------
-    MethodError
-        If the sequence has more than 2^24 terms.
-    """
+    """The index of every window by the key of its element; `MethodError` beyond 2^24 terms."""
 
     def __init__(self, sequence: Sequence) -> None:
         if sequence.period > MOST_ENTRIES:
@@ -68,17 +62,8 @@ _BLOCK = 1 << 17  #: registers held at a time
 
 
 def optimal_distance(period: int, k1: float = 1.0, k4: float = 1.0) -> int:
-    """Return t_opt, the distance of milestones that costs least.
+    """Return t_opt, the distance of milestones that costs least: k1 each, k4 a back shift.
 
-    Parameters
-    ----------
-    period
-        Length of the sequence, 2^n - 1.
-    k1, k4
-        Cost of one milestone, and of one back shift.
-
-    Examples
-    --------
     >>> optimal_distance(2**16 - 1, 1, 4), optimal_distance(2**16 - 1, 4, 1)
     (128, 512)
     """
@@ -98,19 +83,9 @@ def requested_milestones(period: int, k1: float = 1.0, k4: float = 1.0) -> int:
 
 
 class Milestones:
-    """Back shifts to the nearest milestone.
+    """Back shifts to the nearest milestone, `distance` steps apart; t_opt for k1 = k4 by default.
 
-    Parameters
-    ----------
-    sequence
-        The m-sequence.
-    distance
-        t, steps between milestones; t_opt for k1 = k4 by default.
-
-    Raises
-    ------
-    MethodError
-        If it would take more than 2^22 milestones or 2^24 back shifts.
+    Raises `MethodError` if it would take more than 2^22 milestones or 2^24 back shifts.
     """
 
     def __init__(self, sequence: Sequence, distance: int | None = None) -> None:
@@ -165,13 +140,7 @@ def _block(windows: int, shifts: int) -> int:
 
 
 def serial(sequence: Sequence) -> Milestones:
-    """Return the serial conversion of a sequence.
-
-    Raises
-    ------
-    MethodError
-        If the sequence has more than 2^24 terms.
-    """
+    """Return the serial conversion of a sequence; `MethodError` beyond 2^24 terms."""
     if sequence.period > MOST_SHIFTS:
         raise MethodError(
             f"serial conversion of {sequence.period} terms would take up to as many back shifts; "

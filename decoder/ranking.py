@@ -107,17 +107,7 @@ _CODEBOOK = 1 << 27  #: entries: cells times symbols times places, 0.5 GB
 
 
 class Places:
-    """Candidate places of windows of one shape.
-
-    Parameters
-    ----------
-    array
-        The array.
-    shape
-        Rows and columns of the window.
-    prior
-        (P, 2) rows and columns of the places that are possible, P >= 1.
-    """
+    """Candidate places of windows of one shape; `prior` (P, 2) rows and columns, P >= 1."""
 
     def __init__(self, array: SymbolArray, shape: tuple[int, int], prior: ArrayLike) -> None:
         given = np.asarray(prior)

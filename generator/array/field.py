@@ -1,17 +1,12 @@
-"""GF(q) for every prime power q: labels and exact tables.
+"""GF(q) for every prime power q, labels and exact tables; and how its polynomials are written.
 
 Labels 0 ... q - 1 name the elements. Prime q: the integers modulo q. Extension q = p^m:
 0 is 0 and k >= 1 is A^(k - 1), A a root of a primitive polynomial over GF(p). For 4, 8, 9
 it is the thesis's (the relations under table 5.3); it is Conway's for these and all others
 up to 256, and beyond that the first primitive one by the value of its coefficients.
 
-    thesis    4: A^2+A+1     8: A^3+A+1     9: A^2+2A+2
-    others   16: A^4+A+1    25: A^2+4A+2   27: A^3+2A+1   and so on, `MINIMAL_POLYNOMIALS`
-
-How polynomials and elements of GF(q) are written.
-
-As in the thesis's table 5.3 ("x^10+x^3+A(x^2+x+1)", "2x^3+1"), and "0x1099" over GF(2):
-bit k for x^k. Numbers are integers of the prime field, A the element of label 2.
+Polynomials are written as in table 5.3 ("x^10+x^3+A(x^2+x+1)", "2x^3+1"), or "0x1099" over
+GF(2): bit k for x^k. Numbers are integers of the prime field, A the element of label 2.
 """
 
 from __future__ import annotations
@@ -99,23 +94,12 @@ class Field:
 
 
 def field_of_order(order: int, minimal: Sequence[int] | None = None) -> Field:
-    """Return GF(order), the same object for the same arguments.
+    """Return GF(order), order a prime power from 2 to 1024, the same object for the same arguments.
 
-    Parameters
-    ----------
-    order
-        A prime power from 2 to 1024.
-    minimal
-        Minimal polynomial of A over GF(p), coefficients from A^0 to A^m = 1; the one of
-        `MINIMAL_POLYNOMIALS` by default. Not used for prime orders.
+    `minimal` (m + 1,): A's minimal polynomial over GF(p), coefficients from A^0 to A^m = 1; that of
+    `MINIMAL_POLYNOMIALS` by default, not used for prime orders. Raises `ArrayError` if the order is
+    no prime power or too large, or `minimal` is not primitive.
 
-    Raises
-    ------
-    ArrayError
-        If the order is no prime power or too large, or `minimal` is not primitive.
-
-    Examples
-    --------
     >>> field_of_order(4).add(2, 3)  # A + A^2 = 1
     array(1)
     """
@@ -208,10 +192,7 @@ _GROUP = re.compile(r"([^()+]*)\(([^()]*)\)")
 
 
 def parse_polynomial(field: Field, text: str) -> tuple[int, ...]:
-    """Return the polynomial written as `text`, e.g. "x^6+x^2+x+A" or "0x1099".
-
-    Raises `ArrayError` that shows the term which is not understood.
-    """
+    """Return the polynomial of a text; `ArrayError` shows the term which is not understood."""
     plain = re.sub(r"[\s*]", "", text)
     if re.fullmatch(r"0[xX][0-9a-fA-F]+", plain):
         if field.order != 2:

@@ -4,20 +4,14 @@ Any coprime n1 n2 = q^n - 1 serves (the thesis takes n1 = q^k1 - 1, n = k1 k2, f
 With e1 = 1 (mod n1), 0 (mod n2) and e2 the other way round, cell (r, c) has the index
 t = r e1 + c e2 and the field element beta^r gamma^c, beta = x^e1, gamma = x^e2: rows and
 columns are prepared apart, and a symbol is one inner product. Nothing is materialised.
-Which symbol shows which term may be permuted (`keyed`); ranks are those of the terms.
 A set of visible cells names its place if the functionals of its cells have rank n.
+The most square folds with n1 = q^k - 1 are 15x17, 31x33, 63x65, ... over GF(2), 15x17, 63x65,
+255x257, ... over GF(4). Thesis 5.2.
 
-Sizes of folded arrays: which rows and columns a degree allows, and which decode.
-
-n1 n2 = q^n - 1, coprime (thesis 5.2; the general fold). The most square ones with
-n1 = q^k - 1 over GF(2): 15x17, 31x33, 63x65, 127x129, 255x257, ...; over GF(4): 15x17,
-63x65, 255x257, 1023x1025, 4095x4097.
-
-Which symbol shows which term of a sequence, and where objects begin: what a key may change.
-
-Of the q! permutations of the symbols most give an array that another polynomial or a shift
-gives as well: multiplying by an element of GF(q) shifts an m-sequence, and A -> A^p gives that
-of the conjugate polynomial. What is left for q = 4 are the 4 translations x -> x + k.
+A key may permute which symbol shows which term. Of the q! permutations most give an array that
+another polynomial or a shift gives as well: multiplying by an element of GF(q) shifts an
+m-sequence, and A -> A^p gives that of the conjugate polynomial. What is left for q = 4 are the 4
+translations x -> x + k.
 """
 
 from __future__ import annotations
@@ -98,11 +92,8 @@ def nearest_sizes(order: int, degree: int) -> list[tuple[int, tuple[int, int]]]:
 def require_foldable(order: int, degree: int) -> tuple[int, int]:
     """Return the usual fold of a degree that folds and decodes.
 
-    Raises
-    ------
-    ArrayError
-        Naming the nearest sizes, if q^n - 1 has no coprime factors or a prime factor beyond
-        2^40, which is too large for the discrete logarithm.
+    Raises `ArrayError` with the nearest sizes if q^n - 1 has no coprime factors, or a prime factor
+    beyond 2^40, which is too large for the discrete logarithm.
     """
     largest = max(period_factors(order, degree), default=1)
     fold = usual_fold(order, degree)
@@ -125,14 +116,7 @@ def require_foldable(order: int, degree: int) -> tuple[int, int]:
 
 
 def translation(field: Field, label: int) -> tuple[int, ...]:
-    """Return the permutation x -> x + label of GF(q).
-
-    Examples
-    --------
-    >>> from generator.array.field import field_of_order
-    >>> translation(field_of_order(4), 2)
-    (2, 3, 0, 1)
-    """
+    """Return the permutation x -> x + label of GF(q)."""
     return tuple(field.addition[:, label].tolist())
 
 
@@ -166,24 +150,12 @@ _CHUNK = 1 << 14  # cells at a time where digits are not packed
 class FoldedArray:
     """A folded m-sequence; an unfolded one (PRBS, PRMVS) has one row.
 
-    Parameters
-    ----------
-    sequence
-        The m-sequence, N terms.
-    rows, columns
-        Coprime, rows * columns = N.
-    window
-        Rows and columns of a window that must be unique; the smallest one by default.
-    permutation
-        (q,) the symbol that shows each label of the sequence; by default the label itself.
-    first
-        Cell at which the placing of objects begins; it changes no symbol.
+    Rows and columns are coprime, their product the number of terms. The window must be unique; the
+    smallest one by default. `permutation` (q,): the symbol that shows each label of the sequence.
+    `first`: the cell at which the placing of objects begins; it changes no symbol.
 
-    Raises
-    ------
-    ArrayError
-        If the fold is not one, or the window is not unique; the error names one that is. If
-        the permutation is none, or `first` is no cell.
+    Raises `ArrayError` if the fold is not one, the window is not unique (it names one that is), the
+    permutation is none, or `first` is no cell.
     """
 
     def __init__(
@@ -337,7 +309,7 @@ class FoldedArray:
         return self.rank(np.arange(window[0])[:, None], np.arange(window[1]))
 
     def _smallest_window(self, at_least: tuple[int, int] = (1, 1)) -> tuple[int, int]:
-        """Fewest cells, at most four times as long as wide: a touch sees a compact patch.
+        """Return the window of fewest cells, at most four times as long as wide: a compact patch.
 
         Of these the most square one, the higher one of two.
         """

@@ -1,12 +1,9 @@
-"""Polynomials over GF(q): arithmetic modulo h, order, primitivity. Thesis 5.4.1.
+"""Polynomials over GF(q): arithmetic modulo h, order, primitivity; those on file. Thesis 5.4.1.
 
-A polynomial is a sequence of labels, coefficient of x^0 first.
-
-Primitive polynomials on file, and how to find one more.
-
-`primitive_polynomials.json` holds, for each order and degree, texts with their source: the
-thesis's tables 5.1 and 5.3 and appendix 4 as printed, the recommended ones for folds, and
-for the rest the first one that `search_primitive` finds. The first entry is the default.
+A polynomial is a sequence of labels, coefficient of x^0 first. `primitive_polynomials.json` holds
+texts with their source for each order and degree, the default first: the thesis's tables 5.1 and
+5.3 and appendix 4 as printed, the recommended ones for folds, and for the rest the first one that
+`search_primitive` finds.
 """
 
 from __future__ import annotations
@@ -68,10 +65,9 @@ def powmod(field: Field, a: Sequence[int], exponent: int, h: Sequence[int]) -> t
 
 
 def order(field: Field, h: Sequence[int]) -> int:
-    """Return the least t > 0 with x^t = 1 modulo h, the period of its recurrence.
+    """Return the least t > 0 with x^t = 1 modulo h, monic with a constant term; h may be reducible.
 
-    h is monic with a constant term; it may be reducible. Slow for large degrees: meant for
-    looking at one polynomial, while `is_primitive` is quick.
+    Slow for large degrees: `is_primitive` is quick.
     """
     checked = monic(field, h)
     degree = len(checked) - 1
@@ -96,8 +92,8 @@ def order(field: Field, h: Sequence[int]) -> int:
 def norm(field: Field, h: Sequence[int]) -> tuple[int, ...]:
     """Return the product of h and its conjugates: the polynomial over GF(p) of h's roots.
 
-    For a primitive h of degree n it is their minimal polynomial, degree n m, so that GF(q)[x]/h
-    and GF(p)[x]/norm are the same field with the same x.
+    For a primitive h of degree n it is their minimal polynomial, degree n m: GF(q)[x]/h and
+    GF(p)[x]/norm are the same field with the same x.
     """
     result: tuple[int, ...] = (1,)
     conjugate = tuple(h)
@@ -114,10 +110,7 @@ def _frobenius(field: Field, label: int) -> int:
 
 
 def is_primitive(field: Field, h: Sequence[int]) -> bool:
-    """Whether the monic polynomial h, of degree n, has the period q^n - 1.
-
-    h is primitive over GF(q) exactly if its norm is primitive over GF(p) (same roots).
-    """
+    """Whether the monic h has the period q^n - 1: then its norm is primitive over GF(p)."""
     if len(h) < 2 or h[-1] != 1 or h[0] == 0:
         return False
     factors = period_factors(field.order, len(h) - 1)
@@ -188,22 +181,10 @@ def known_polynomials() -> tuple[PrimitivePolynomial, ...]:
 
 
 def primitive_polynomial(order: int, degree: int, source: str | None = None) -> tuple[int, ...]:
-    """Return a primitive polynomial of `degree` over GF(order) that is on file.
+    """Return the primitive polynomial of `degree` over GF(order) that is on file.
 
-    Parameters
-    ----------
-    order, degree
-        q and n.
-    source
-        The one of this source ("table 5.1", "robust"); the default one otherwise.
+    Raises `ArrayError` if none is.
 
-    Raises
-    ------
-    ArrayError
-        If none is on file.
-
-    Examples
-    --------
     >>> primitive_polynomial(4, 2)
     (2, 1, 1)
     """
@@ -235,10 +216,8 @@ def _ranges(numbers: list[int]) -> str:
 def search_primitive(order: int, degree: int) -> tuple[int, ...]:
     """Return the primitive polynomial with the fewest terms, then the lowest exponents.
 
-    Takes milliseconds to seconds; the result is the same every time.
+    Takes milliseconds to seconds.
 
-    Examples
-    --------
     >>> search_primitive(2, 7)
     (1, 1, 0, 0, 0, 0, 0, 1)
     """
@@ -248,10 +227,9 @@ def search_primitive(order: int, degree: int) -> tuple[int, ...]:
 
 
 def _candidates(field: Field, degree: int) -> Iterator[tuple[int, ...]]:
-    """Monic polynomials that may be primitive, few terms first.
+    """Yield monic polynomials that may be primitive, few terms first.
 
-    (-1)^n h(0), the product of the roots, must generate GF(q)'s group; and h(1) is not 0
-    unless n = 1.
+    (-1)^n h(0), the product of the roots, must generate GF(q)'s group; h(1) is not 0 unless n = 1.
     """
     negative = field.negative if degree % 2 else range(field.order)
     constants = sorted(int(negative[label]) for label in field.primitive_labels)

@@ -26,17 +26,10 @@ from generator.errors import ArrayError
 
 
 class ProductArray:
-    """A product array of two m-sequences.
+    """A product array of two m-sequences: SR, one term for each row, and SC, one for each column.
 
-    Parameters
-    ----------
-    row_sequence, column_sequence
-        SR, one term for each row, and SC, one term for each column.
-    window
-        Rows and columns of the window; the two degrees (the smallest one) by default.
-    law
-        (q_r, q_c) labels of the symbols, each of 0 ... q_r q_c - 1 once;
-        law[a][b] = q_c a + b by default.
+    The window is at least the two degrees, its default. `law` (q_r, q_c): labels of the symbols,
+    each of 0 ... q_r q_c - 1 once; law[a][b] = q_c a + b by default.
     """
 
     def __init__(
@@ -109,10 +102,7 @@ class ProductArray:
         )
 
     def rank(self, rows: ArrayLike, columns: ArrayLike) -> int:
-        """Return rank of the visible rows over SR plus rank of the visible columns over SC.
-
-        Each is at most its degree, so the sum is full only if both are.
-        """
+        """Return the rank of the visible rows over SR plus that of the visible columns over SC."""
         r, c = self._cells(rows, columns)
         if not r:
             return 0
@@ -126,7 +116,7 @@ class ProductArray:
     def minimum_distance(self, rows: ArrayLike, columns: ArrayLike) -> int:
         """Return the least number of these cells in which two places differ; 0: look alike.
 
-        A row of cells changes as a whole, so d = min(b d_row, a d_column) for an a x b window.
+        A row of cells changes as a whole: d = min(b d_row, a d_column) for an a x b window.
         """
         r, c = self._cells(rows, columns)
         pairs = set(zip(r, c, strict=True))

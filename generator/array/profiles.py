@@ -144,12 +144,10 @@ def profile(name: str = DEFAULT_PROFILE) -> Profile:
 
 
 def next_larger(smaller: Profile) -> Profile:
-    """Return the profile on the next larger array of the same field: `large` "and up".
+    """Return the profile on the next larger array of the same field, its window the smallest one.
 
-    Over GF(4) 511x513, 825x1271, 2047x2049 and 3133x5355, then the most square folds; the
-    window is the smallest one.
-
-    Raises `ArrayError` for a product array, or if no larger one decodes.
+    Over GF(4) 511x513, 825x1271, 2047x2049 and 3133x5355, then the most square folds. Raises
+    `ArrayError` for a product array, or if no larger one decodes.
     """
     array = smaller.array()
     if isinstance(array, ProductArray) or array.rows == 1:

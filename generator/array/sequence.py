@@ -36,24 +36,13 @@ _REMEMBERED = 1 << 16  # offsets whose functionals are kept
 class Sequence:
     """A pseudo-random multi-valued sequence (PRMVS; PRBS over GF(2)).
 
-    Parameters
-    ----------
-    field
-        GF(q).
-    polynomial
-        (n + 1,) labels of the primitive polynomial h, from x^0 to x^n = 1.
-    initial
-        (n,) labels s[0] ... s[n-1], not all zero; 0 ... 0 1 by default (appendix 4).
+    `polynomial` (n + 1,): labels of the primitive polynomial h, from x^0 to x^n = 1. `initial`
+    (n,): labels s[0] ... s[n-1], not all zero; 0 ... 0 1 by default (appendix 4).
 
-    Raises
-    ------
-    ArrayError
-        If the polynomial is not primitive, the start is zero, the sequence is longer than
-        2^64 - 1, or its length has a prime factor beyond 2^40, so that no index could be
-        recovered from a window (the error names the nearest degrees).
+    Raises `ArrayError` if the polynomial is not primitive, the start is zero, the sequence is
+    longer than 2^64 - 1, or its length has a prime factor beyond 2^40: no index could be recovered
+    from a window then (the error names the nearest degrees).
 
-    Examples
-    --------
     >>> from generator.array.field import field_of_order
     >>> Sequence(field_of_order(4), (2, 1, 1)).symbols(range(6))
     array([0, 1, 1, 3, 1, 0])
@@ -180,10 +169,7 @@ class Sequence:
         return self.powers.at(t.ravel()).reshape(*t.shape, self.ring.degree)
 
     def coefficients(self, offsets: ArrayLike) -> Labels:
-        """Return c with s[t + offset] = sum_j c_j s[t + j] for all t: (..., n) labels.
-
-        c is x^offset modulo h over GF(q), also the field element of index `offset`.
-        """
+        """Return c, (..., n) labels, with s[t + offset] = sum_j c_j s[t + j]: x^offset modulo h."""
         elements = self.element(offsets)
         digits = self.ring.reduced(elements @ self._to_labels)
         return self.field.labels(
@@ -191,10 +177,7 @@ class Sequence:
         )
 
     def functionals(self, elements: Digits) -> Digits:
-        """Return F with digits(s[t + d]) = F @ element(t), for elements x^d: (..., m, D).
-
-        Digits are those of `Field.digits`; all of it modulo p.
-        """
+        """Return F (..., m, D), modulo p: digits(s[t + d]) = F @ element(t), for elements x^d."""
         flat = self.ring.reduced(elements @ self._hankel)
         return flat.reshape(*elements.shape[:-1], self.field.degree, self.ring.degree)
 

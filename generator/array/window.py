@@ -1,8 +1,9 @@
-"""What a set of visible terms of an m-sequence tells: minimum distance, unique windows.
+"""The minimum distance of a set of visible terms of an m-sequence.
 
 The terms at given offsets are a linear code of dimension n over GF(q): its codewords are
 what is seen at the N = q^n - 1 places. A minimum distance d means that d - 1 erasures or
 (d - 1)/2 wrong symbols never lead to another place; 0 means that places look alike.
+F. J. MacWilliams, N. J. A. Sloane, The Theory of Error-Correcting Codes, chapter 5.
 """
 
 from __future__ import annotations
@@ -24,31 +25,11 @@ WINDOWS_LIMIT = 1 << 26  #: symbols compared by `windows_are_unique`
 
 
 def minimum_distance(sequence: Sequence, offsets: list[int], weights: list[int]) -> int:
-    """Return the least number of visible cells that tell two places apart.
+    """Return the least number of visible cells that tell two places apart; 0 without full rank.
 
-    Parameters
-    ----------
-    sequence
-        The m-sequence.
-    offsets
-        Distinct indices seen, relative to the place, taken modulo the period.
-    weights
-        Number of cells that show each (1 in a folded array).
-
-    Returns
-    -------
-    int
-        Exact; 0 if the offsets have not full rank.
-
-    Raises
-    ------
-    ArrayError
-        If neither the sequence (2^20 terms) nor the dual code (2^16 words, weights 1) is
-        short enough to be listed.
-
-    References
-    ----------
-    F. J. MacWilliams, N. J. A. Sloane, The Theory of Error-Correcting Codes, chapter 5.
+    `offsets` are distinct indices relative to the place, `weights` the number of cells that show
+    each (1 in a folded array). Raises `ArrayError` if neither the sequence (2^20 terms) nor the
+    dual code (2^16 words, weights 1) is short enough to be listed.
     """
     if sequence.rank(offsets) < sequence.degree:
         return 0

@@ -18,7 +18,6 @@ from probe.port.listing import list_ports as found_ports
 ALWAYS = {
     "sim:": "a moving pattern, 100 frames a second",
     "sim:lab.db#Cube/F1": "touches of a registered face; also sim:part.stl",
-    "sim:?firmware=avr": "the pattern through the firmware on an emulated AVR",
     "file:touch.h5": "a recording, played",
 }
 

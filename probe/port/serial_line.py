@@ -1,4 +1,4 @@
-"""A probe on a serial line: real, or the pty of the emulated one.
+"""A probe on a serial line, or on a pseudo-terminal in its place.
 
 The line is locked for one client (`exclusive`), and the driver is asked to hand on bytes at
 once: FTDI chips collect them for 16 ms otherwise. Baud rates 500,000, 1,000,000 and

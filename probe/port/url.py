@@ -5,8 +5,6 @@ serial:///dev/ttyACM0?baud=1000000         a probe on a serial line
 flexitac:///dev/ttyUSB0                    a FlexiTac board, by its own protocol
 sim:?rate=100                              a moving pattern from a probe in software
 sim:part.stl, sim:lab.db#Cube/face         touches of a part, by `probe.simulate.source`
-sim:...?firmware=avr                       the same images through the firmware on an
-                                           emulated ATmega328P
 file:recording.h5?speed=1&loop=1           a recording; speed=0: as fast as it is read
 =========================================  ===================================================
 

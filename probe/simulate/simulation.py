@@ -139,7 +139,7 @@ class SimulatedProbe:
     overlay
         tab or pad instead of the type's own overlay.
     accuracy
-        auto, a level of the contact model (footprint, tabs, layer, elements), or the largest
+        auto, a level of the contact model (footprint, tabs, layer), or the largest
         error of an image, as "0.01".
     noise
         Of contacts and board: typical or quiet.

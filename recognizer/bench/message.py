@@ -101,7 +101,9 @@ def filter_image(
     """
     if filter_name == "raw":
         return readings
-    image = subtract_bias(tactile_image(readings, step_mm=sensor.pitch_mm), bias)
+    over = readings if bias is None else np.maximum(readings - bias, 0.0)
+    image = tactile_image(over, step_mm=sensor.pitch_mm)
+    image = subtract_bias(image) if bias is None else image
     if filter_name == "bias-free":
         return image.values
     image = median(image)

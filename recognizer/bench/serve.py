@@ -30,7 +30,6 @@ from recognizer.bench.guard import RequestGuard, access_rules, is_loopback
 from recognizer.bench.session import Session
 
 SOFTWARE = ("sim:touch", "Simulated probe: click on the part")
-FIRMWARE = ("sim:touch?firmware=avr", "Simulated probe, through the firmware")
 PATTERN = ("sim:", "Moving pattern")
 
 CONNECTIONS = 900  #: open at once, below the files that a process may have open
@@ -159,7 +158,7 @@ def _database(url: str) -> str:
 
 
 def _ports(port: str) -> tuple[tuple[str, str], ...]:
-    always = (SOFTWARE, FIRMWARE, PATTERN)
+    always = (SOFTWARE, PATTERN)
     return ((port, port), *always) if port and port not in ("sim:touch", "touch:") else always
 
 

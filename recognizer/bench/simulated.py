@@ -1,11 +1,10 @@
 """A probe that comes down on a registered part where the bench says.
 
-    sim:touch                     in software
-    sim:touch?firmware=avr        through the probe's own firmware on an emulated processor
+    sim:touch
 
-Options: rate (frames a second, 100), noise (typical, quiet), hold (s, 2), seed. Either way it
-is a device on a serial line, which can be unplugged, and its frames say nothing of where it
-stands. `touch:` is the old spelling.
+Options: rate (frames a second, 100), noise (typical, quiet), hold (s, 2), seed. It is a device
+on a serial line, which can be unplugged, and its frames say nothing of where it stands. `touch:`
+is the old spelling.
 """
 
 from __future__ import annotations
@@ -18,16 +17,14 @@ import threading
 import tty
 from collections import OrderedDict
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import parse_qsl
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.errors import ProbeError
-from probe.firmware.emulator import emulated_probe
 from probe.frame import Frame
-from probe.port.simulated import FULL_MV
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
 from probe.simulate.registered import registered_object, registered_surface
@@ -42,7 +39,7 @@ AT_ONCE = 4096  #: bytes read
 LOST = 65536  #: bytes that wait for a reader; more are thrown away, as on a real line
 SCENES = 32  #: surfaces that are kept
 UNPLUGGED_S = 60.0  #: at most
-_OPTIONS = ("firmware", "rate", "noise", "hold", "seed")
+_OPTIONS = ("rate", "noise", "hold", "seed")
 
 
 class TouchProbe:
@@ -61,34 +58,17 @@ class TouchProbe:
     ------
     BenchError
         When an option is unknown or no number.
-    PortError
-        When the emulator cannot be built.
     """
 
     def __init__(self, url: str, database: str, sensor: SensorType) -> None:
-        firmware, manner = parse_simulation(url)
         self.database = database
-        self.firmware = firmware
-        self._presses = PressSequence(sensor, manner)
-        self._full = sensor.full
+        self._presses = PressSequence(sensor, parse_simulation(url))
         self._scenes: OrderedDict[tuple[str, str], Scene] = OrderedDict()
         self._last: tuple[str, str, float, float, float, float] | None = None
         self._turn = threading.Lock()
         self._closed = threading.Event()
-        with ExitStack() as stack:
-            if firmware:
-                self._emulator = stack.enter_context(emulated_probe())
-                self.url = self._emulator.url
-                thread = threading.Thread(target=self._show, name="images", daemon=True)
-                stack.callback(thread.join)
-                stack.callback(self._closed.set)
-                thread.start()
-            else:
-                self._line = SoftwareLine(self._presses.frames(), "bench", sensor.shape)
-                self.url = self._line.url
-                stack.callback(self._line.close)
-            stack.callback(self._closed.set)
-            self._stack = stack.pop_all()
+        self._line = SoftwareLine(self._presses.frames(), "bench", sensor.shape)
+        self.url = self._line.url
 
     def touch(
         self, object_name: str, face: str, x_mm: float, y_mm: float, theta_deg: float,
@@ -148,10 +128,7 @@ class TouchProbe:
         """Pull the plug, and put it in again after so many seconds."""
         if not 0 < seconds <= UNPLUGGED_S:
             raise BenchError(f"unplugged for {seconds:g} s", fix=f"give up to {UNPLUGGED_S:g} s")
-        if self.firmware:
-            self._emulator.fault(f"unplug {seconds:g}")
-        else:
-            self._line.unplug(seconds)
+        self._line.unplug(seconds)
 
     def forget(self) -> None:
         """Read the surfaces from the database again."""
@@ -160,7 +137,8 @@ class TouchProbe:
 
     def close(self) -> None:
         """End the simulation; the port is gone."""
-        self._stack.close()
+        self._closed.set()
+        self._line.close()
 
     def _scene(self, object_name: str, face: str) -> Scene:
         key = (object_name, face)
@@ -170,16 +148,6 @@ class TouchProbe:
         while len(self._scenes) > SCENES:
             self._scenes.popitem(last=False)
         return self._scenes[key]
-
-    def _show(self) -> None:
-        period_s = 1 / self._presses.manner.rate
-        for frame in self._presses.frames():
-            try:
-                self._emulator.show(frame.counts * (FULL_MV / self._full))
-            except ProbeError:  # the emulator ended, and its port is gone
-                return
-            if self._closed.wait(period_s):
-                return
 
 
 def is_simulation(url: str) -> bool:
@@ -252,16 +220,16 @@ class SoftwareLine:
         self._pull()
 
 
-def parse_simulation(url: str) -> tuple[bool, SimulationSettings]:
-    """Read the options of a URL: whether by firmware, and how the probe moves."""
+def parse_simulation(url: str) -> SimulationSettings:
+    """Read the options of a URL: how the probe moves."""
     _, _, query = url.partition("?")
     given = dict(parse_qsl(query, keep_blank_values=True))
     unknown = sorted(set(given) - set(_OPTIONS))
-    firmware, noise = given.get("firmware", ""), given.get("noise", "typical")
-    if unknown or firmware not in ("", "avr") or noise not in ("typical", "quiet"):
+    noise = given.get("noise", "typical")
+    if unknown or noise not in ("typical", "quiet"):
         raise BenchError(
             f"the simulated probe cannot be had with {query}",
-            fix=f"its options are {', '.join(_OPTIONS)}; firmware=avr, noise=typical or quiet",
+            fix=f"its options are {', '.join(_OPTIONS)}; noise=typical or quiet",
             place=url,
         )
     numbers = {}
@@ -273,7 +241,7 @@ def parse_simulation(url: str) -> tuple[bool, SimulationSettings]:
         if not low <= value <= high:
             raise BenchError(f"{name}={given[name]!r}", fix=f"give {low:g} to {high:g}", place=url)
         numbers[name] = value
-    return bool(firmware), SimulationSettings(
+    return SimulationSettings(
         rate=numbers["rate"], noise=noise, hold_s=numbers["hold"], seed=int(numbers["seed"])
     )
 

@@ -12,7 +12,7 @@ from recognizer.touch.recognition import NO_CONTACT
 
 if TYPE_CHECKING:
     from probe.frame import Frame
-    from recognizer.thesis.line import Edge
+    from recognizer.thesis.edges import Edge
     from recognizer.touch.recognition import Recognition
     from recognizer.touch.robot import ObjectPose
     from recognizer.touch.source import TouchImage

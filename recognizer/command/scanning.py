@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Iterator
 from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from probe.arm import SensorPose
 from recognizer.errors import RecognizerError
@@ -18,10 +18,11 @@ from recognizer.errors import RecognizerError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from recognizer.thesis.line import Edge
+    from recognizer.scan.session import Scan
+    from recognizer.thesis.edges import Edge
+    from recognizer.thesis.scan import ThesisScan
     from recognizer.touch.lab import EmbossedArray
     from recognizer.touch.reader import Reader
-    from recognizer.touch.recognition import Recognition
     from recognizer.touch.signal import Signal
     from recognizer.touch.source import TouchImage
 
@@ -32,29 +33,12 @@ class ScanError(RecognizerError):
     """Touches that are no scan."""
 
 
-class Belief(Protocol):
-    """Touches so far, joined: `Scan`, or the thesis's way of doing so."""
-
-    @property
-    def answer(self) -> Recognition:
-        """The best answer so far."""
-
-    @property
-    def touches(self) -> int:
-        """How many touches it rests on."""
-
-    def add(
-        self, touch: Signal, pose: SensorPose | ArrayLike | None = None, *, seq: int | None = None
-    ) -> Recognition:
-        """Return what all touches say by now."""
-
-
-def belief_for(reader: Reader, method: str) -> Belief:
+def belief_for(reader: Reader, method: str) -> Scan | ThesisScan:
     """Return an empty belief of a method, `joint` or `thesis`."""
     if method == "thesis":
         from recognizer.thesis.scan import ThesisScan
 
-        return ThesisScan(reader.lab, sensor=reader.sensor)
+        return ThesisScan(reader.lab, reader.sensor)
     from recognizer.scan.session import Scan
 
     return Scan(reader)

@@ -1,9 +1,8 @@
 """Accumulated evidence -> places of the database -> Recognition. Thesis 6.3.
 
-Evidence is located like the fit of one touch (`find_hypotheses`): its strongest cells list
-places, all cells compare them. The pose of the last touch is fitted once more with the symbols of
-the database. `recognizer.touch.verdict` judges all cells together; the number of contradictions
-that are allowed grows with them.
+Evidence is located like the fit of one touch (`find_hypotheses`): its strongest cells list places,
+all cells compare them. The pose of the last touch is fitted once more with the registered symbols.
+`recognizer.touch.verdict` judges all cells together; more of them may contradict than in one touch.
 """
 
 from __future__ import annotations
@@ -139,8 +138,8 @@ def refine_last_pose(reader: Reader, image: Image, found: ScanHypothesis) -> Sca
 def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Recognition:
     """Return the answer by `distinct_places`, the last touch fitted to the first.
 
-    Without measured steps the touches must agree better with the database, paths that end
-    elsewhere count as places, and each path that the touches allow matches by chance.
+    Without measured steps the touches must agree better with the database, paths that end elsewhere
+    count as places, and each path that the touches allow matches by chance.
     """
     if not found:
         return refusal(seq, TOO_FEW)

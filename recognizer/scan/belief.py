@@ -1,8 +1,8 @@
 """The belief of one face: its touches, their accumulated evidence and the answer. Thesis 6.3.
 
 `extend_scan` adds a touch. Where the image matches a predicted pose, the touch is taken there;
-otherwise it is read by itself first. Its lattices join those of the other touches, and the
-evidence of all touches is located in the database.
+otherwise it is read by itself first. Its lattices join those of the other touches, and the evidence
+of all touches is located in the database.
 """
 
 from __future__ import annotations
@@ -108,10 +108,8 @@ def read_scan(
 ) -> Recognition:
     """Return object and face of a scan, and the probe's pose at its last touch.
 
-    Parameters
-    ----------
-    touches
-        Of one face, in their order, each with a pose by the arm or a step from the touch before.
+    `touches` of one face, in their order, each with a pose by the arm or a step from the touch
+    before.
 
     Raises
     ------
@@ -127,9 +125,9 @@ def read_scan(
 def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
     """Return a scan with one touch added.
 
-    A touch without contact is answered by that reason and not kept. A touch with an answer of its
-    own that contradicts the prediction begins a new belief: the probe or the object slipped, or
-    the object was changed.
+    A touch without contact is refused and not kept. A touch with an answer of its own that
+    contradicts the prediction begins a new belief: the probe or the object slipped, or the object
+    was changed.
 
     Raises
     ------
@@ -244,12 +242,8 @@ def _join_touch(
 ) -> _JoinedTouch:
     """Join the last of the touches with those before it.
 
-    Parameters
-    ----------
-    touch_poses
-        Of all touches; None: a step was not measured.
-    use_prediction
-        Whether the touch may be taken at its predicted pose, if its image matches.
+    Without `touch_poses` a step was not measured; with `use_prediction` the touch may be taken at
+    its predicted pose, if its image matches.
     """
     reader, seq = scan.reader, touches[-1].seq
     images, views, alone, rivals = _view_touch(scan, touches[-1], touch_poses, use_prediction)

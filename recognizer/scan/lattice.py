@@ -115,7 +115,7 @@ def same_lattice(a: PlaneLattice, b: PlaneLattice, at: Array, pitch_mm: float) -
 def predict_pose(
     lattice: PlaneLattice, touch_poses: TouchPoses, touch: int = -1
 ) -> tuple[Array, Array]:
-    """Return T_lattice_touch (3,) of a touch by its pose in the plane, and its covariance."""
+    """Return T_lattice_touch (3,) of the last touch by its pose in the plane, and its spread."""
     at = compose_poses(lattice.T_lattice_plane, touch_poses.poses[touch])
     lever = _lever(at[None])[0]
     turned = _rotate(touch_poses.covariances[touch], lattice.T_lattice_plane)

@@ -68,12 +68,7 @@ def follow_path(
 ) -> RegisteredPath:
     """Return the likeliest path; without placed touches where no touch has a place.
 
-    Parameters
-    ----------
-    views
-        Of each touch.
-    steps
-        To each touch from the one before, by `known_steps`.
+    `views` of each touch, `steps` by `known_steps`.
     """
     places = [_places_of_touch(embossed, each) for each in views]
     trellis = _Trellis([], [])
@@ -139,16 +134,8 @@ def path_ambiguity(
     """Return -log of the probability of a path by the touches alone.
 
     Whole pitches away, a touch shows known cells with other symbols, or with the right ones by
-    chance.
-
-    Parameters
-    ----------
-    fits
-        Of the touches that are placed, in their order.
-    poses
-        (n, 3) of all touches, in array axes.
-    order
-        Number of symbols.
+    chance. `fits` are those of the placed touches in their order, `poses` (n, 3) of all touches in
+    array axes; `order` is the number of symbols.
     """
     known: dict[tuple[int, int], Array] = {}
     total, before = 0.0, -1

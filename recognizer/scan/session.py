@@ -138,13 +138,11 @@ class Scan:
         Parameters
         ----------
         touch
-            Of one object: counts (rows, columns), a signal, or a touch of
-            `recognizer.touch.source`. Without poses, touches of a face should lie within 8 mm
-            or so of the one before (`ScanSettings.by_hand`).
+            Of one object: counts (rows, columns), a signal, or a `TouchImage` of `touch.source`.
+            Without poses, touches of a face should lie within 8 mm or so of the one before.
         pose
-            (4, 4) T_base_sensor, mm, in any fixed frame; with the arm's own covariance if it
-            is a `SensorPose`; by default the touch's own, if it has one. It shows when another
-            face is touched.
+            (4, 4) T_base_sensor, mm, in any fixed frame, with a covariance if it is a `SensorPose`;
+            by default the touch's own, if it has one. It shows when another face is touched.
         seq
             Number of the touch; counted if not given.
 
@@ -201,13 +199,7 @@ class Scan:
 
 
 class TouchPlaces:
-    """Poses in any frame -> places in the plane of the first touch.
-
-    Parameters
-    ----------
-    settings
-        Uncertainty of poses and steps without a covariance.
-    """
+    """Poses in any frame -> places in the plane of the first touch."""
 
     def __init__(self, settings: ScanSettings) -> None:
         self.settings = settings

@@ -89,8 +89,8 @@ def estimate_poses(
 ) -> TouchPoses:
     """Return the poses of touches, the last one being new.
 
-    The mosaic is used from the first touch on that the arm places with a standard deviation of
-    more than `UNCERTAIN_PITCHES`.
+    The mosaic is used from the first touch on that the arm places with a standard deviation of more
+    than `UNCERTAIN_PITCHES`.
     """
     believed = touches[-1].believed
     pitch = min(embossed.style.pitch_mm for embossed in reader.lab.arrays)
@@ -141,14 +141,9 @@ def flat_views(
     """Return the likeliest lattices of an image, and those near predicted poses.
 
     Where the image contains more than symbols, such as the edge of a face, both leave more
-    unexplained, so each cell has less evidence.
-
-    Parameters
-    ----------
-    near
-        (k, 3) T_lattice_touch that other touches predict.
-    alone
-        Fits of the touch read by itself, best first; searched for if there are none.
+    unexplained, so each cell has less evidence. `near` (k, 3) T_lattice_touch are predicted by
+    other touches; `alone` are fits of the touch by itself, best first, searched for if there are
+    none.
     """
     found: list[Fit] = []
     for fit in alone:
@@ -171,12 +166,7 @@ def round_views(
 ) -> tuple[LatticeView, ...]:
     """Return the likeliest lattices of an image of a round face, and those near predicted poses.
 
-    Parameters
-    ----------
-    image
-        As of a flat face.
-    near
-        (k, 3) as for `flat_views`.
+    `image` is as of a flat face, `near` (k, 3) as for `flat_views`.
     """
     effort, views = reader.options.first, list[LatticeView]()
     for guess in guess_bends(image, reader.sensor, embossed.radii_mm, BENDS):

@@ -4,7 +4,7 @@
 
     merge      frames -> one image of several touches (product)
     filters    median, Sobel, background
-    edges      image -> lines and corners; line   one edge;  edge_fit   edges of one touch, refined
+    edges      image -> lines and corners;  edge_fit   edges of one touch, refined
     skeleton   ink -> end-points and vertices;    symbols   image -> symbols
     grid       symbols -> rows and columns
     read       window -> place of the database;   scan      a recording

@@ -30,14 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.thesis.edges import classical_edges, vertices
+from recognizer.thesis.edges import Edge, classical_edges
 from recognizer.thesis.filters import subtract_bias
-from recognizer.thesis.line import Corner, Edge, corner_between
 from recognizer.touch.signal import Signal
 from recognizer.touch.tactile_image import TactileImage, touch_image
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # Response
 STEP_MM = 0.05  #: between the distances of a table
@@ -71,24 +69,11 @@ MOST_RESIDUAL = 3.0  #: rms residual, expected standard deviations
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outline:
-    """The visible part of a face's outline."""
-
-    edges: tuple[Edge, ...]  #: image frame, the longest first
-    corners: tuple[Corner, ...]
-    inside: NDArray[np.bool_]  #: (h, w) samples that lie on the face
-    off: float  #: rms of what is not explained, in expected standard deviations; NaN: not fitted
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class FittedEdges:
-    """Edges with their residual."""
+    """Edges that explain the readings of a touch."""
 
-    edges: tuple[Edge, ...]
-    covariance: Array  #: (2 k, 2 k) of angle (rad) and offset (mm) of each, in order
-    blur_mm: float
-    off: float  #: rms of what is not explained, in expected standard deviations
-    inside: Mask  #: (rows, columns) tactels that lie on the face
+    edges: tuple[Edge, ...]  #: each with the covariance of its angle and offset
+    off: float  #: rms residual, expected standard deviations
 
 
 def touch_edges(sensor: SensorType, signal: Signal) -> tuple[Edge, ...]:
@@ -103,18 +88,7 @@ def touch_edges(sensor: SensorType, signal: Signal) -> tuple[Edge, ...]:
 
 
 def face_edges(image: TactileImage, sensor: SensorType) -> tuple[Edge, ...]:
-    """Return the edges of a blank face in one touch, in the sensor frame.
-
-    Parameters
-    ----------
-    image
-        `touch_image` of the touch.
-    sensor
-        Of the touch.
-
-    Returns
-    -------
-    None, one, or several; each with the covariance of its angle and offset.
+    """Return the edges of a blank face by the `touch_image` of a touch, in the sensor frame.
 
     Examples
     --------
@@ -125,16 +99,9 @@ def face_edges(image: TactileImage, sensor: SensorType) -> tuple[Edge, ...]:
     >>> bool(abs(edge.angle_rad) < 0.02 and abs(edge.offset_mm + 1.5875) < 0.2)
     True
     """
-    return outline(image, sensor).edges
-
-
-def outline(image: TactileImage, sensor: SensorType) -> Outline:
-    """Return edges and corners of a blank face in the sensor frame; see `face_edges`."""
     over = subtract_bias(image)
     rough = tuple(edge for edge in classical_edges(image) if _bounds(over, edge))[:MOST_EDGES]
-    if not rough:
-        return Outline((), (), over.values > 0, math.nan)
-    best = _best(over, sensor, rough)
+    best = _best(over, sensor, rough) if rough else None
     if best is not None:
         kept = tuple(
             edge
@@ -143,62 +110,49 @@ def outline(image: TactileImage, sensor: SensorType) -> Outline:
         )
         if len(kept) < len(rough):
             best = _best(over, sensor, kept) if kept else None
-    if best is None or best.off > MOST_RESIDUAL:
-        return Outline((), (), over.values > 0, math.nan if best is None else best.off)
-    return Outline(best.edges, _corners(best), best.inside, best.off)
+    return () if best is None or best.off > MOST_RESIDUAL else best.edges
 
 
 def fit_edges(
     image: TactileImage,
     sensor: SensorType,
     edges: tuple[Edge, ...],
-    *,
-    reflex: bool = False,
+    reflex: bool,
     blurs_mm: Sequence[float] = BLURS_MM,
 ) -> FittedEdges | None:
-    """Fit one, two or more edges at once.
+    """Fit edges at once; None where too few tactels lie on the face.
 
     Parameters
     ----------
     image
         One touch over its bias, a sample to each tactel.
-    sensor
-        Of the touch.
     edges
-        Roughly right: within a tactel, ten degrees.
+        Right within a tactel and ten degrees.
     reflex
         The face is inside of any edge, not of all edges.
     blurs_mm
-        Blurs to try, of `BLURS_MM`.
-
-    Returns
-    -------
-    None where too few tactels lie on the face.
+        Of `BLURS_MM`, to try.
     """
-    rows, columns = np.indices(image.values.shape)
-    at = image.xy_mm(rows, columns)[image.defined]
+    at = image.xy_mm(*np.indices(image.values.shape))[image.defined]
     readings = image.values[image.defined]
     tables = responses(sensor)
-    lines = np.array([[edge.angle_rad, edge.offset_mm] for edge in edges])
-    best: tuple[float, Array, float, Array] | None = None
-    for blur in blurs_mm:
-        table = tables[BLURS_MM.index(blur)]
-        found = _fit_with_blur(at, readings, table, lines, reflex)
-        if found is not None and (best is None or found[0] < best[0]):
-            best = (found[0], found[1], blur, found[2])
-    if best is None:
+    start = np.array([[edge.angle_rad, edge.offset_mm] for edge in edges])
+    fits = [
+        _fit_with_blur(at, readings, tables[BLURS_MM.index(blur)], start, reflex)
+        for blur in blurs_mm
+    ]
+    found = min((fit for fit in fits if fit is not None), key=lambda fit: fit[0], default=None)
+    if found is None:
         return None
-    cost, lines, blur, information = best
-    off = math.sqrt(cost)
+    cost, lines, information = found
     model = np.diag(np.tile([MODEL_RAD**2, MODEL_MM**2], len(lines)))
-    covariance = np.asarray(np.linalg.pinv(information), np.float64) * max(1.0, off) ** 2 + model
+    covariance = np.asarray(np.linalg.pinv(information), np.float64)
+    covariance = covariance * max(1.0, math.sqrt(cost)) ** 2 + model
     moved = tuple(
         _edge_on_line(edge, lines[k], covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2])
         for k, edge in enumerate(edges)
     )
-    inside = np.zeros(image.values.shape, np.bool_)
-    inside[image.defined] = _combine_edges(_depth_inside(at, lines), reflex) > 0
-    return FittedEdges(moved, covariance, blur, off, inside)
+    return FittedEdges(moved, math.sqrt(cost))
 
 
 @lru_cache(maxsize=8)
@@ -206,9 +160,8 @@ def responses(sensor: SensorType) -> Array:
     """Return responses (blurs, n) at -reach_mm ... reach_mm inside, every step_mm."""
     from scipy.ndimage import gaussian_filter1d
 
-    step = STEP_MM
-    steps = round(REACH_MM / step)
-    inside = np.arange(-steps, steps + 1) * step
+    steps = round(REACH_MM / STEP_MM)
+    inside = np.arange(-steps, steps + 1) * STEP_MM
     overlay = sensor.overlay
     if overlay.kind == "tab":
         t = np.clip(inside / (overlay.tab_diameter_mm / 2), -1, 1)
@@ -216,9 +169,8 @@ def responses(sensor: SensorType) -> Array:
         tip = cover * (1 + BULGE * (1 - cover))
     else:
         share = np.clip(inside / sensor.pitch_mm + 0.5, 0, 1)
-        tip = gaussian_filter1d(share, PAD_BLUR * overlay.height_mm / step, mode="nearest")
-    blurs = [blur / step for blur in BLURS_MM]
-    table = np.array([gaussian_filter1d(tip, blur, mode="nearest") for blur in blurs])
+        tip = gaussian_filter1d(share, PAD_BLUR * overlay.height_mm / STEP_MM, mode="nearest")
+    table = np.array([gaussian_filter1d(tip, b / STEP_MM, mode="nearest") for b in BLURS_MM])
     table.setflags(write=False)
     return table
 
@@ -235,29 +187,18 @@ def _best(image: TactileImage, sensor: SensorType, edges: tuple[Edge, ...]) -> F
     """Return the fit of a face inside of all edges, or of any, whichever explains more."""
     reflex = False
     if len(edges) > 1:
-        ways = [
-            fit_edges(
-                image,
-                sensor,
-                edges,
-                reflex=way,
-                blurs_mm=BLURS_MM[1:2],
-            )
-            for way in (False, True)
-        ]
+        ways = [fit_edges(image, sensor, edges, way, BLURS_MM[1:2]) for way in (False, True)]
         off = [math.inf if way is None else way.off for way in ways]
         reflex = off[1] < off[0]
-    return fit_edges(image, sensor, edges, reflex=reflex)
+    return fit_edges(image, sensor, edges, reflex)
 
 
 def _bounds(image: TactileImage, edge: Edge) -> bool:
     """Whether the pressed face ends here.
 
-    Other edges have pressure beyond them, too: folds of it. Where the plate lifts off
-    the face, there is hardly any pressure inside, either.
+    Folds have pressure beyond them; where the plate lifts off the face, there is hardly any inside.
     """
-    rows, columns = np.indices(image.values.shape)
-    at = image.xy_mm(rows, columns)
+    at = image.xy_mm(*np.indices(image.values.shape))
     inside = edge.inside_mm(at) / image.step_mm
     way = (edge.end_mm - edge.start_mm) / max(edge.length_mm, 1e-9)
     along = (at - edge.start_mm) @ way
@@ -276,24 +217,11 @@ def _moved_mm(edge: Edge, before: Edge) -> float:
     return float(np.abs(edge.inside_mm(ends)).max())
 
 
-def _corners(found: FittedEdges) -> tuple[Corner, ...]:
-    """Return the corners with the covariance of edges that were fitted together."""
-    corners = []
-    for corner in vertices(found.edges):
-        k, m = (next(n for n, e in enumerate(found.edges) if e is edge)
-                for edge in (corner.first, corner.second))  # fmt: skip
-        rows = [2 * k, 2 * k + 1, 2 * m, 2 * m + 1]
-        joint = corner_between(corner.first, corner.second, found.covariance[np.ix_(rows, rows)])
-        corners.append(joint or corner)
-    return tuple(corners)
-
-
 def _fit_with_blur(
     at: Array, readings: Array, table: Array, lines: Array, reflex: bool
 ) -> tuple[float, Array, Array] | None:
     """Return the mean cost, lines and information (2 k, 2 k) with one blur."""
     information = np.zeros((lines.size, lines.size))
-    most = np.array(MOST_CHANGE)
     cost = math.inf
     for _ in range(ROUNDS):
         pressure = _pressure(at, readings, lines, reflex)
@@ -309,10 +237,10 @@ def _fit_with_blur(
             information = slopes.T @ (slopes * trust[:, None])
             damped = information + np.diag(np.tile(DAMPING, len(lines)))
             step = np.linalg.solve(damped, slopes.T @ (trust * rest)).reshape(lines.shape)
-            lines = lines + np.clip(step, -most, most)
+            lines = lines + np.clip(step, np.negative(MOST_CHANGE), MOST_CHANGE)
         rest = np.abs((over - _response(near, table, lines, reflex)) / sigma)
-        far = FARTHEST
-        cost = float(np.where(rest <= far, rest**2, far * (2 * rest - far)).mean())
+        linear = FARTHEST * (2 * rest - FARTHEST)
+        cost = float(np.where(rest <= FARTHEST, rest**2, linear).mean())
     return cost, lines, information
 
 
@@ -366,13 +294,8 @@ def _slopes(at: Array, table: Array, lines: Array, reflex: bool) -> Array:
 
 def _edge_on_line(edge: Edge, line: Array, covariance: Array) -> Edge:
     """Return an edge on a line near it, its ends the places nearest to those it had."""
-    moved = replace(
-        edge,
-        angle_rad=math.remainder(float(line[0]), math.tau),
-        offset_mm=float(line[1]),
-        covariance=covariance,
-    )
-    ends = [
-        end - float(moved.inside_mm(end)) * moved.normal for end in (edge.start_mm, edge.end_mm)
-    ]
-    return replace(moved, start_mm=ends[0], end_mm=ends[1])
+    angle, offset = math.remainder(float(line[0]), math.tau), float(line[1])
+    moved = replace(edge, angle_rad=angle, offset_mm=offset, covariance=covariance)
+    ends = (edge.start_mm, edge.end_mm)
+    start, end = (at - float(moved.inside_mm(at)) * moved.normal for at in ends)
+    return replace(moved, start_mm=start, end_mm=end)

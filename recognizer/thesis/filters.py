@@ -11,54 +11,27 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from recognizer.touch.tactile_image import ImageError, TactileImage
+from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-WIDEST_ERASED = 1  #: samples; lines no wider are erased by a 3 x 3 median, two wide survive
 
 
-def subtract_bias(image: TactileImage, bias: ArrayLike | None = None) -> TactileImage:
-    """Return readings over their bias, 0 or more.
-
-    Parameters
-    ----------
-    bias
-        (h, w) or a number: what is read without force; by default what the lowest twentieth
-        of the samples read.
-    """
+def subtract_bias(image: TactileImage) -> TactileImage:
+    """Return readings, 0 or more, over that of the lowest twentieth of the samples."""
     if not image.defined.any():
         return image
-    level = np.quantile(image.values[image.defined], 0.05) if bias is None else np.asarray(bias)
+    level = np.quantile(image.values[image.defined], 0.05)
     values = np.where(image.defined, np.maximum(image.values - level, 0.0), 0.0)
     return _replace_values(image, values)
 
 
-def median(image: TactileImage, thinnest_mm: float | None = None) -> TactileImage:
+def median(image: TactileImage) -> TactileImage:
     """Return the median of the 3 x 3 neighbourhood of every sample; edges are repeated.
 
-    It takes spikes away and keeps edges, but erases lines that are one sample wide: a stroke
-    must be at least two samples wide to survive.
-
-    Parameters
-    ----------
-    thinnest_mm
-        Width of the thinnest line that must survive; None where there is none.
-
-    Raises
-    ------
-    ImageError
-        If that line is not at least two samples wide.
+    It takes spikes away and keeps edges, but erases lines of one sample's width.
     """
-    if thinnest_mm is not None and thinnest_mm < (WIDEST_ERASED + 1) * image.step_mm:
-        raise ImageError(
-            f"a 3 x 3 median erases lines of one sample: {thinnest_mm:g} mm are "
-            f"{thinnest_mm / image.step_mm:.2g} samples of {image.step_mm:g} mm",
-            fix="leave the median out, or take it of a finer mosaic",
-        )
     known = np.where(image.defined, image.values, np.nan)
     padded = np.pad(known, 1, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).reshape(*known.shape, 9)
@@ -83,9 +56,8 @@ def magnify_image(image: TactileImage, doublings: int = 2) -> TactileImage:
         1/2  1  1/2
         1/4 1/2 1/4
 
-    which joins neighbours by straight lines. The thesis's 64 x 64 images hold three more rows
-    and columns beyond the last tactel, which fall off to zero; there is nothing to be seen
-    there, and they are left out. Samples whose neighbours are undefined take what is left.
+    which joins neighbours by straight lines. The three rows and columns that the thesis's 64 x 64
+    images hold beyond the last tactel are left out. Undefined neighbours do not count.
     """
     values, weights = image.values, image.defined.astype(np.float64)
     values = values * weights
@@ -99,8 +71,7 @@ def magnify_image(image: TactileImage, doublings: int = 2) -> TactileImage:
 def sobel(image: TactileImage) -> tuple[Array, Array]:
     """Return the slopes (h, w) along x and y by Sobel's operators, per mm; edges are repeated.
 
-    Undefined samples count as 0, like places without force; the caller leaves out slopes next to
-    them.
+    Undefined samples count as 0; the caller leaves out slopes next to them.
     """
     f = np.pad(image.values, 1, mode="edge")
     across = f[:, 2:] - f[:, :-2]

@@ -47,19 +47,11 @@ class Grid:
     y_mm: float
     theta_rad: float
     off_mm: float  #: rms distance of the members from their cells' centres
-    covariance: Array  #: (3, 3) of x, y and theta
+    covariance: Array  #: (3, 3) of x, y and theta at the image's origin
 
 
 def grid(found: Sequence[Symbol], pitch_mm: float) -> Grid | None:
-    """Return the largest grid among symbols; None if there is no symbol.
-
-    Parameters
-    ----------
-    found
-        Symbols of an image; rejected ones are passed over.
-    pitch_mm
-        Distance of neighbours.
-    """
+    """Return the largest grid among symbols that are not rejected; None if there is none."""
     named = [k for k, symbol in enumerate(found) if symbol.label >= 0]
     best: dict[Cell, int] = {}
     left = set(named)
@@ -150,8 +142,8 @@ def _accept_symbol(
 def _lattice(found: Sequence[Symbol], members: dict[Cell, int], pitch_mm: float) -> _Lattice:
     """Return the lattice through members by least squares, from their places and their axes.
 
-    A symbol is found by the middle of its ink. Its centre follows from its axes, and the common
-    axes of all symbols are more precise than its own.
+    A symbol's centre follows from the middle of its ink by the common axes of all symbols, which
+    are more precise than its own.
     """
     cells = np.array([_centre(cell, pitch_mm) for cell in members])
     axes = np.array([cmath.exp(-1j * found[k].theta_rad) for k in members.values()])
@@ -179,7 +171,11 @@ def _grid_of(found: Sequence[Symbol], members: dict[Cell, int], pitch_mm: float)
         abs(lattice.place(cell, pitch_mm) - complex(found[k].x_mm, found[k].y_mm))
         for cell, k in members.items()
     ]
-    off = math.sqrt(sum(a * a for a in away) / len(away))
+    off, number = math.sqrt(sum(a * a for a in away) / len(away)), len(away)
+    variance = max(PLACE_MM, off / math.sqrt(2)) ** 2
+    turning = 1 / (lattice.spread / variance + number / AXES_RAD**2)
+    lever = -lattice.turn * lattice.middle  # the image's origin from the middle, lattice frame
+    by_turn = np.array([-lever.imag, lever.real, 1.0])
     return Grid(
         window=window,
         first=(int(low[0]), int(high[1])),
@@ -189,17 +185,9 @@ def _grid_of(found: Sequence[Symbol], members: dict[Cell, int], pitch_mm: float)
         y_mm=lattice.shift.imag,
         theta_rad=cmath.phase(lattice.turn),
         off_mm=off,
-        covariance=_covariance(lattice, len(members), off),
+        covariance=np.diag([variance / number, variance / number, 0.0])
+        + turning * np.outer(by_turn, by_turn),
     )
-
-
-def _covariance(lattice: _Lattice, number: int, off_mm: float) -> Array:
-    """Return the covariance (3, 3) of x, y and theta at the image's origin."""
-    variance = max(PLACE_MM, off_mm / math.sqrt(2)) ** 2
-    turning = 1 / (lattice.spread / variance + number / AXES_RAD**2)
-    away = -lattice.turn * lattice.middle  # the origin from the middle, lattice frame
-    by_turn = np.array([-away.imag, away.real, 1.0])
-    return np.diag([variance / number] * 2 + [0.0]) + turning * np.outer(by_turn, by_turn)
 
 
 def _centre(cell: Cell, pitch_mm: float) -> complex:

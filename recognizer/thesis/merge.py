@@ -50,11 +50,10 @@ ROUNDING = 1e-6  #: samples beyond an image's rim; share of two touches' overlap
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MergedImage:
-    """The thesis's GTI with the poses of its touches."""
+    """The thesis's global tactile image (GTI) with the poses of its touches."""
 
     image: TactileImage  #: four samples to a tactel; frame: the sensor frame of the first touch
     poses: Array  #: (n, 3) T_image_probe of each touch: x, y (mm), theta (rad)
-    corrected: NDArray[np.bool_]  #: (n,) by a correlation
 
 
 def merge_touches(
@@ -66,14 +65,12 @@ def merge_touches(
     *,
     trust: ArrayLike | None = None,
 ) -> MergedImage:
-    """Merge the touches of a scan.
+    """Merge the touches of a scan, which are pressed with about equal forces.
 
     Parameters
     ----------
-    sensor
-        Of all touches.
     readings
-        (rows, columns) of each touch, over its bias; pressed with about equal forces.
+        (rows, columns) of each touch, over its bias.
     poses
         As believed; see `relative_poses`.
     placing, window_tactels
@@ -93,19 +90,15 @@ def merge_touches(
             f"{len(images)} touches with {len(believed)} poses", fix="give one pose to each"
         )
     placed = np.array(believed)
-    corrected = np.zeros(len(images), np.bool_)
     origin = placed if placing == "bounded" else believed
     for k in range(1, len(images) if placing != "believed" else 0):
         near = _nearest_touch(sensor, believed, k)
-        step = relative_pose(origin[k - 1 if near is None else near], believed[k])
-        shift = None
+        before = k - 1 if near is None else near
+        step = relative_pose(origin[before], believed[k])
         if near is not None:
-            shift = _shift(sensor, images[near], images[k], step, window_tactels)
-        if shift is not None:
-            step = np.array([*shift, step[2]])
-        placed[k] = compose_poses(placed[k - 1 if near is None else near], step)
-        corrected[k] = shift is not None
-    return MergedImage(average_touches(sensor, images, placed), placed, corrected)
+            step = _corrected_step(sensor, images[near], images[k], step, window_tactels)
+        placed[k] = compose_poses(placed[before], step)
+    return MergedImage(average_touches(sensor, images, placed), placed)
 
 
 def relative_poses(poses: ArrayLike) -> Array:
@@ -122,14 +115,15 @@ def relative_poses(poses: ArrayLike) -> Array:
     ImageError
         If they are neither.
     MosaicError
-        If a touch is tilted out of the plane of the first one by more than 60 degrees.
+        If a touch is tilted by more than 60 degrees out of the plane of the first one.
     """
     given = np.asarray(poses, np.float64)
-    if given.ndim == 2 and given.shape[1:] == (3,) and len(given) and np.isfinite(given).all():
-        return relative_pose(given[0], given)
-    if given.ndim == 3 and given.shape[1:] == (4, 4) and len(given) and np.isfinite(given).all():
-        first = np.linalg.inv(given[0])
-        return np.array([planar_pose(first @ T) for T in given])
+    if len(given) and np.isfinite(given).all():
+        if given.ndim == 2 and given.shape[1:] == (3,):
+            return relative_pose(given[0], given)
+        if given.ndim == 3 and given.shape[1:] == (4, 4):
+            first = np.linalg.inv(given[0])
+            return np.array([planar_pose(first @ T) for T in given])
     raise ImageError(
         f"poses of shape {given.shape}",
         fix="give T_base_probe (n, 4, 4) of n touches, or x, y and theta (n, 3)",
@@ -167,20 +161,14 @@ def average_touches(
 
 
 def product_shift(a: Array, b: Array, believed: tuple[float, float], window: float) -> Array:
-    """Return the shift of the second image, as the thesis finds it.
+    """Return the shift (2,) along x and y of image b from a, in steps of a quarter tactel.
 
     Parameters
     ----------
     a, b
         (rows, columns) readings of two touches.
-    believed
-        Shift of b from a along x and y, tactels.
-    window
-        Half width of the search, tactels.
-
-    Returns
-    -------
-    (2,) shift along x and y, tactels, in steps of a quarter.
+    believed, window
+        Shift of b from a along x and y, and half width of the search, tactels.
     """
     first, second = magnify_samples(a), magnify_samples(b)
     rows, columns = first.shape
@@ -189,14 +177,13 @@ def product_shift(a: Array, b: Array, believed: tuple[float, float], window: flo
     j0, j1 = max(0, right), min(columns, columns + right)
     zone = first[i0:i1, j0:j1]
     reach = math.floor(window * MAGNIFIED + 1e-9)
-    wide = np.pad(second, max(rows, columns) + reach)  # no reading beyond the matrix
+    margin = max(rows, columns) + reach
+    wide = np.pad(second, margin)  # no reading beyond the matrix
     best, shift = -math.inf, (right, down)
     for k in range(-reach, reach + 1):
         for n in range(-reach, reach + 1):
-            i, j = i0 - (down + k), j0 - (right + n)
-            at = max(rows, columns) + reach
-            under = wide[at + i : at + i + i1 - i0, at + j : at + j + j1 - j0]
-            total = float((zone * under).sum())
+            i, j = margin + i0 - (down + k), margin + j0 - (right + n)
+            total = float((zone * wide[i : i + i1 - i0, j : j + j1 - j0]).sum())
             if total > best:
                 best, shift = total, (right + n, down + k)
     return np.array([shift[0], -shift[1]]) / MAGNIFIED
@@ -225,39 +212,33 @@ def _nearest_touch(sensor: SensorType, believed: Array, k: int) -> int | None:
     return int(np.flatnonzero(common >= common.max() - ROUNDING)[-1])
 
 
-def _shift(
+def _corrected_step(
     sensor: SensorType, a: TactileImage, b: TactileImage, step: Array, window_tactels: float
-) -> Array | None:
-    """Return the shift (2,) of b on a, mm; None where their common part shows nothing."""
+) -> Array:
+    """Return the step (3,) from a to b, corrected by products if the common part shows anything."""
     faint = FAINT * max(a.values.max(), b.values.max())
     for image, way in ((a, step), (b, inverse(step))):
         centres = sensor.centres_mm() - way[:2]
         common = (np.abs(centres) <= np.array(sensor.half_mm)).all(axis=-1)
         if not (image.values[common] > faint).any():
-            return None
+            return step
     believed = (float(step[0]) / sensor.pitch_mm, float(step[1]) / sensor.pitch_mm)
-    found = product_shift(a.values, b.values, believed, window_tactels)
-    return np.asarray(found * sensor.pitch_mm)
+    shift = product_shift(a.values, b.values, believed, window_tactels)
+    return np.append(shift * sensor.pitch_mm, step[2])
 
 
 def _interpolate(image: TactileImage, at_mm: Array) -> tuple[Array, Array]:
     """Return values, 0 where not defined, and defined shares, from the four samples around."""
-    rows, columns = image.values.shape
+    from scipy.ndimage import map_coordinates
+
     column = (at_mm[..., 0] - image.corner_mm[0]) / image.step_mm
     row = (image.corner_mm[1] - at_mm[..., 1]) / image.step_mm
+    rows, columns = image.values.shape
     inside = (column >= -ROUNDING) & (column <= columns - 1 + ROUNDING)
     inside &= (row >= -ROUNDING) & (row <= rows - 1 + ROUNDING)
-    j = np.clip(np.floor(column).astype(np.intp), 0, columns - 2)
-    i = np.clip(np.floor(row).astype(np.intp), 0, rows - 2)
-    right, down = np.clip(column - j, 0, 1), np.clip(row - i, 0, 1)
-    value, known = np.zeros(row.shape), np.zeros(row.shape)
-    for di, dj, share in (
-        (0, 0, (1 - right) * (1 - down)),
-        (0, 1, right * (1 - down)),
-        (1, 0, (1 - right) * down),
-        (1, 1, right * down),
-    ):
-        known_here = np.where(inside & image.defined[i + di, j + dj], share, 0.0)
-        value += known_here * image.values[i + di, j + dj]
-        known += known_here
-    return value, known
+    known = image.defined.astype(np.float64)
+    value, share = (
+        np.where(inside, map_coordinates(samples, [row, column], order=1, mode="nearest"), 0.0)
+        for samples in (image.values * known, known)
+    )
+    return value, share

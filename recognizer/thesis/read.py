@@ -15,21 +15,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from decoder import (
-    Decoded,
-    Decodings,
-    Likelihood,
-    MethodError,
-    WindowError,
-    decode_exact,
-    decode_good_tuple,
-)
-from generator.array import ProductArray
+from decoder import Decoded, Likelihood, WindowError
 from recognizer.thesis.filters import median, subtract_bias
 from recognizer.thesis.grid import Grid, grid
 from recognizer.thesis.symbols import Symbol, symbols
@@ -51,7 +41,6 @@ from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Conversion = Literal["likelihood", "good tuple", "exact"]
 
 ERROR = 0.02  #: probability that a symbol is read wrong (likelihood)
 STRANGERS = 0.1  #: most symbols that the face does not hold, share
@@ -63,91 +52,54 @@ class ClassicalReading:
     """The answer with its intermediate results."""
 
     recognition: Recognition
-    embossed: EmbossedArray | None  #: the array that was read
-    symbols: tuple[Symbol, ...]  #: of that array, rejected ones included
+    symbols: tuple[Symbol, ...]  #: of the array that was read, rejected ones included
     grid: Grid | None
 
 
 def read_classically(
-    lab: Lab,
-    image: TactileImage,
-    conversion: Conversion = "likelihood",
-    *,
-    T_image_probe: Array | None = None,
-    seq: int = 0,
+    lab: Lab, image: TactileImage, *, T_image_probe: Array | None = None, seq: int = 0
 ) -> ClassicalReading:
-    """Read an image the thesis's way.
+    """Read an image the thesis's way; the answer's margin is the decoder's, in nats.
 
     Parameters
     ----------
     image
         Readings of one touch (`touch_image`) or of a mosaic, with its bias.
-    conversion
-        From window to index.
     T_image_probe
-        (4, 4) pose of the probe in the image frame; by default at its origin, as for an
-        image of one touch.
-    seq
-        Number of the answer.
-
-    Returns
-    -------
-    ClassicalReading
-        Its margin is the decoder's, in nats; None with conversions that weigh nothing.
+        (4, 4) pose of the probe in the image frame; by default the origin.
     """
     over = subtract_bias(image)
     if not over.values.any():
-        return ClassicalReading(refusal(seq, NO_CONTACT), None, (), None)
+        return ClassicalReading(refusal(seq, NO_CONTACT), (), None)
     T = np.eye(4) if T_image_probe is None else T_image_probe
-    readings = [_read_array(embossed, over, conversion, T, seq) for embossed in lab.arrays]
+    readings = [_read_array(embossed, over, T, seq) for embossed in lab.arrays]
     answers = [reading for reading in readings if reading.recognition]
     if len(answers) > 1:  # two ways of embossing explain the image
-        first, other = answers[0].recognition, answers[1].recognition
+        first, other = (answer.recognition for answer in answers[:2])
         if other.object is not None and other.face is not None and other.index is not None:
             runner_up = RunnerUp(other.object, other.face, other.index)
             value = refusal(seq, AMBIGUOUS, margin=first.margin, runner_up=runner_up)
-            return ClassicalReading(value, answers[0].embossed, answers[0].symbols, answers[0].grid)
-
-    def symbol_count(reading: ClassicalReading) -> int:
-        return 0 if reading.grid is None else len(reading.grid.members)
-
-    return answers[0] if answers else max(readings, key=symbol_count)
+            return ClassicalReading(value, answers[0].symbols, answers[0].grid)
+    if answers:
+        return answers[0]
+    return max(readings, key=lambda each: 0 if each.grid is None else len(each.grid.members))
 
 
 def _read_array(
-    embossed: EmbossedArray,
-    image: TactileImage,
-    conversion: Conversion,
-    T_image_probe: Array,
-    seq: int,
+    embossed: EmbossedArray, image: TactileImage, T_image_probe: Array, seq: int
 ) -> ClassicalReading:
     style = embossed.style
-    filtered = image
-    if style.stroke_mm >= 2 * image.step_mm:
-        filtered = median(image, style.stroke_mm)
-    found = tuple(symbols(filtered, embossed.alphabet, style))
+    if style.stroke_mm >= 2 * image.step_mm:  # a median erases lines of one sample
+        image = median(image)
+    found = tuple(symbols(image, embossed.alphabet, style))
     window = grid(found, style.pitch_mm)
     if window is None:
-        return ClassicalReading(refusal(seq, TOO_FEW), embossed, found, None)
-    decoded = _convert_window(embossed, window, conversion)
-    answer = _answer_of(embossed, window, decoded, T_image_probe, seq)
-    return ClassicalReading(answer, embossed, found, window)
+        return ClassicalReading(refusal(seq, TOO_FEW), found, None)
+    answer = _answer_of(embossed, window, _decode(embossed, window), T_image_probe, seq)
+    return ClassicalReading(answer, found, window)
 
 
-def _convert_window(embossed: EmbossedArray, found: Grid, conversion: Conversion) -> Decoded:
-    """Return the place of a window by a conversion."""
-    array = embossed.array
-    if conversion == "exact":
-        return decode_exact(array, found.window)[0]
-    if conversion == "good tuple" and not isinstance(array, ProductArray):
-        try:
-            return decode_good_tuple(array, found.window)[0]
-        except MethodError:  # a window smaller than the tuple
-            return decode_exact(array, found.window)[0]
-    return _decode_likeliest(embossed, found)[0]
-
-
-def _decode_likeliest(embossed: EmbossedArray, found: Grid) -> Decodings:
+def _decode(embossed: EmbossedArray, found: Grid) -> Decoded:
     """Decode with the prior that the first member lies on a registered cell, if it can be held."""
     array = embossed.array
     i, j = found.cells[0].tolist()
@@ -157,17 +109,13 @@ def _decode_likeliest(embossed: EmbossedArray, found: Grid) -> Decodings:
         [_step_back(rows, down, array.rows), _step_back(columns, along, array.columns)], axis=1
     )
     try:
-        return Likelihood(array, prior=prior, error=ERROR).decode(found.window)
+        return Likelihood(array, prior=prior, error=ERROR).decode(found.window)[0]
     except WindowError:  # more places than it holds at a time
-        return Likelihood(array, error=ERROR).decode(found.window)
+        return Likelihood(array, error=ERROR).decode(found.window)[0]
 
 
 def _answer_of(
-    embossed: EmbossedArray,
-    found: Grid,
-    decoded: Decoded,
-    T_image_probe: Array,
-    seq: int,
+    embossed: EmbossedArray, found: Grid, decoded: Decoded, T_image_probe: Array, seq: int
 ) -> Recognition:
     pitch, array = embossed.style.pitch_mm, embossed.array
     fit = _as_fit(found)
@@ -199,17 +147,10 @@ def _answer_of(
     if face.printed is not None:
         pose, covariance = face.printed.pose(pose, covariance)
     return Recognition(
-        seq=seq,
-        object=face.object,
-        face=face.face,
-        index=index(place),
-        T_face_probe=pose,
-        T_object_probe=pose_on_object(face, pose),
-        covariance=covariance,
-        margin=decoded.margin,
-        runner_up=runner_up,
-        reason="",
-    )
+        seq=seq, object=face.object, face=face.face, index=index(place), T_face_probe=pose,
+        T_object_probe=pose_on_object(face, pose), covariance=covariance,
+        margin=decoded.margin, runner_up=runner_up, reason="",
+    )  # fmt: skip
 
 
 def _place_of_window(
@@ -233,19 +174,12 @@ def _place_of_window(
 
 def _as_fit(found: Grid) -> Fit:
     """Return a grid as a joint fit that is certain of each symbol."""
+    number = len(found.cells)
     return Fit(
-        x_mm=found.x_mm,
-        y_mm=found.y_mm,
-        theta_rad=found.theta_rad,
-        nuisance=np.zeros(3),
-        gain=np.zeros(4),
-        cells=found.cells,
-        scores=np.zeros((len(found.cells), 0)),
-        seen=np.ones(len(found.cells)),
-        noise=math.nan,
-        value=0.0,
-        covariance=found.covariance,
-    )
+        x_mm=found.x_mm, y_mm=found.y_mm, theta_rad=found.theta_rad, nuisance=np.zeros(3),
+        gain=np.zeros(4), cells=found.cells, scores=np.zeros((number, 0)), seen=np.ones(number),
+        noise=math.nan, value=0.0, covariance=found.covariance,
+    )  # fmt: skip
 
 
 def _probe_on_lattice(fit: Fit, T_image_probe: Array) -> tuple[float, float]:

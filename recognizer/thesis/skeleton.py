@@ -78,10 +78,7 @@ class Graph:
 def points_of_skeleton(skeleton: NDArray[np.bool_], unit: float) -> KeyPoints:
     """Return the end-points and vertices, (row, column), of a connected skeleton.
 
-    Parameters
-    ----------
-    unit
-        The alphabet's lattice unit, pixels.
+    `unit` is the alphabet's lattice unit, pixels.
     """
     found = graph(skeleton, SPUR * unit)
     ends = [at for node, at in found.nodes.items() if found.degree(node) == 1]
@@ -121,20 +118,23 @@ def points_of_glyph(glyph: Glyph) -> KeyPoints:
 
 
 def graph(skeleton: NDArray[np.bool_], shortest: float = 0.0) -> Graph:
-    """Return the graph of a connected skeleton.
+    """Return the graph of a connected skeleton (h, w).
 
-    Parameters
-    ----------
-    skeleton
-        (h, w) one pixel wide.
-    shortest
-        Length, pixels, that a branch with a free end must have; shorter ones are pruned.
+    Branches with a free end that are shorter than `shortest`, pixels, are pruned.
     """
-    pixels = [(int(r), int(c)) for r, c in np.argwhere(skeleton)]
+    pixels = [(r, c) for r, c in np.argwhere(skeleton).tolist()]
     near = _neighbours(set(pixels))
     node_of, places = _nodes(pixels, near)
-    branches = _branches(near, node_of, places)
-    return _prune_spurs(places, branches, shortest)
+    found = Graph(places, tuple(_branches(near, node_of, places)))
+    while True:
+        spurs = [
+            (length(branch.path), k)
+            for k, branch in enumerate(found.branches)
+            if sorted(min(found.degree(n), 3) for n in (branch.start, branch.end)) == [1, 3]
+        ]
+        if not spurs or min(spurs)[0] >= shortest:
+            return found
+        found = _remove_branch(found, min(spurs)[1])
 
 
 def length(path: Path) -> float:
@@ -197,21 +197,6 @@ def _branches(
             walked |= {(pixel, first), (at, before)}
             branches.append(Branch(node, node_of[at], [*path, places[node_of[at]]]))
     return branches
-
-
-def _prune_spurs(
-    places: dict[int, tuple[float, float]], branches: list[Branch], shortest: float
-) -> Graph:
-    found = Graph(places, tuple(branches))
-    while True:
-        spurs = [
-            (length(branch.path), k)
-            for k, branch in enumerate(found.branches)
-            if sorted(min(found.degree(n), 3) for n in (branch.start, branch.end)) == [1, 3]
-        ]
-        if not spurs or min(spurs)[0] >= shortest:
-            return found
-        found = _remove_branch(found, min(spurs)[1])
 
 
 def _remove_branch(graph: Graph, number: int) -> Graph:

@@ -47,25 +47,13 @@ class Symbol:
     theta_rad: float  #: of the symbol's x axis; NaN where it is rejected
     middle_mm: tuple[float, float]  #: of its ink
     off_mm: float  #: rms residual of the points; NaN if not named
-    points: KeyPoints  #: image frame, mm
     rejected: str  #: "", "cut", "counts" or "shape"
 
 
-def symbols(
-    image: TactileImage,
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    *,
-    most_residual: float = MOST_RESIDUAL,
-) -> list[Symbol]:
-    """Return the components of ink in an image, named or rejected.
+def symbols(image: TactileImage, alphabet: Alphabet, style: SymbolStyle) -> list[Symbol]:
+    """Return the components of ink in an image over its bias, named or rejected.
 
-    Parameters
-    ----------
-    image
-        Over its bias; of any resolution, it is magnified until strokes are `THICK` samples wide.
-    most_residual
-        Rms distance of the points, lattice units; inf: counts alone name a symbol.
+    The image is magnified until strokes are `THICK` samples wide.
     """
     require("skimage", extra="thesis", purpose="the thesis's reading")
     from scipy.ndimage import find_objects, label
@@ -84,23 +72,15 @@ def symbols(
         part = np.pad(numbers[rows, columns] == number, RIM)
         if part.sum() < least:
             continue
-        box = (
-            slice(rows.start, rows.stop + 2 * RIM),
-            slice(columns.start, columns.stop + 2 * RIM),
-        )
+        box = np.s_[rows.start : rows.stop + 2 * RIM, columns.start : columns.stop + 2 * RIM]
         whole = _dilate(part, RIM)
         cut = bool((_dilate(part, 1) & beyond[box]).any())
         points = points_of_skeleton(skeletonize(part), unit_mm / image.step_mm)
         weights = np.where(whole, values[box], 0.0)
-        middle = (
-            np.array(
-                [
-                    weights.sum(axis=1) @ np.arange(len(weights)),
-                    weights.sum(axis=0) @ np.arange(weights.shape[1]),
-                ]
-            )
-            / weights.sum()
-        )
+        middle = [
+            weights.sum(axis=1) @ np.arange(len(weights)),
+            weights.sum(axis=0) @ np.arange(weights.shape[1]),
+        ] / weights.sum()
         corner = (rows.start - RIM, columns.start - RIM)
         placed = KeyPoints(
             image.xy_mm(*(points.ends + corner).T),
@@ -108,20 +88,12 @@ def symbols(
             points.loops,
         )
         at = image.xy_mm(*(middle + corner))
-        found.append(_identify_symbol(placed, at, cut, alphabet, style, most_residual))
+        found.append(_identify_symbol(placed, at, cut, alphabet, style))
     return found
 
 
 def ink(image: TactileImage, reach_mm: float) -> NDArray[np.bool_]:
-    """Return where (h, w) an image shows strokes.
-
-    Parameters
-    ----------
-    image
-        0 without pressure.
-    reach_mm
-        How far away the highest reading nearby may be: about a symbol's pitch.
-    """
+    """Return where (h, w) readings are high among those within `reach_mm`: strokes."""
     from scipy.ndimage import maximum_filter, uniform_filter
 
     if not image.defined.any():
@@ -133,20 +105,15 @@ def ink(image: TactileImage, reach_mm: float) -> NDArray[np.bool_]:
 
 
 def fit_glyph(glyph: KeyPoints, found: KeyPoints, unit_mm: float) -> tuple[float, float]:
-    """Fit a glyph's points to found ones of equal counts, by least squares.
+    """Return residual (rms, mm) and turn (rad) of a glyph fitted to points of equal counts.
 
-    Returns
-    -------
-    The rms residual (mm) and the turn (rad); the best over all ways to pair ends
-    with ends and vertices with vertices.
+    Ends are paired with ends and vertices with vertices in the way that fits best.
     """
-    ways = list(
-        itertools.product(
-            itertools.permutations(range(len(glyph.ends))),
-            itertools.permutations(range(len(glyph.vertices))),
-        )
+    first, total = len(glyph.ends), len(glyph.ends) + len(glyph.vertices)
+    ways = itertools.product(
+        itertools.permutations(range(first)), itertools.permutations(range(first, total))
     )
-    order = np.array([[*ends, *(len(glyph.ends) + np.array(v, int))] for ends, v in ways], int)
+    order = np.array([[*ends, *vertices] for ends, vertices in ways], int)
     model = np.concatenate([glyph.ends, glyph.vertices]) @ np.array([1, 1j]) * unit_mm
     seen = np.concatenate([found.ends, found.vertices]) @ np.array([1, 1j])
     paired = model[order]
@@ -161,30 +128,25 @@ def fit_glyph(glyph: KeyPoints, found: KeyPoints, unit_mm: float) -> tuple[float
 
 
 def _identify_symbol(
-    points: KeyPoints,
-    middle: Array,
-    cut: bool,
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    most_residual: float,
+    points: KeyPoints, middle: Array, cut: bool, alphabet: Alphabet, style: SymbolStyle
 ) -> Symbol:
     unit_mm = alphabet.reach * style.pitch_mm
     x, y = middle.tolist()
     if cut:
-        return Symbol(-1, x, y, math.nan, (x, y), math.nan, points, CUT)
+        return Symbol(-1, x, y, math.nan, (x, y), math.nan, CUT)
     fits = [
         (*fit_glyph(points_of_glyph(glyph), points, unit_mm), label)
         for label, glyph in enumerate(alphabet.glyphs)
         if points_of_glyph(glyph).counts == points.counts
     ]
     if not fits:
-        return Symbol(-1, x, y, math.nan, (x, y), math.nan, points, COUNTS)
+        return Symbol(-1, x, y, math.nan, (x, y), math.nan, COUNTS)
     off, theta, label = min(fits)
-    if off > most_residual * unit_mm:
-        return Symbol(-1, x, y, math.nan, (x, y), off, points, SHAPE)
+    if off > MOST_RESIDUAL * unit_mm:
+        return Symbol(-1, x, y, math.nan, (x, y), off, SHAPE)
     own = _middle(alphabet.glyphs[label], unit_mm, style.stroke_mm)
     at = complex(x, y) - own * complex(math.cos(theta), math.sin(theta))
-    return Symbol(label, at.real, at.imag, theta, (x, y), off, points, "")
+    return Symbol(label, at.real, at.imag, theta, (x, y), off, "")
 
 
 @lru_cache(maxsize=256)

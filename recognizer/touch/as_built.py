@@ -1,13 +1,11 @@
 """Where a probe stands on a part as it was printed: some per mille smaller, a little askew.
 
-Pose read from the symbols, as if they stood where they were designed + AsBuilt -> pose beside the
-printed part, with its covariance. Of a part that nobody has measured it is known how prints come
-out as a rule (`usual_print`); each touch feels the scale besides, and both together say where the
-symbols stand. Part frame: that of the part's file, z up from the bed, x and y along the printer's
-axes, its origin in the middle of the part. A point p of the design is printed at S p, S of
-`print_matrix`: x and y are scaled from that origin, z is as designed. No touch tells which of the
-two axes a skewed printer has turned: here x keeps its direction and y leans, as the skew correction
-of printer firmware has it (Marlin, M852). mm, rad.
+Pose read from the symbols as designed + AsBuilt -> pose on the printed part, with its covariance.
+A part that nobody has measured is taken to be a usual print (`usual_print`); each touch measures
+the scale as well. Part frame: that of the part's file, z up from the bed, x and y along the
+printer's axes, origin in the middle of the part. A point p of the design is printed at S p, S of
+`print_matrix`. No touch shows which axis a skewed printer has turned: x keeps its direction and y
+leans, as in the skew correction of printer firmware (Marlin, M852). mm, rad.
 """
 
 from __future__ import annotations
@@ -34,20 +32,15 @@ DIFFERENCE = 1e-6  #: of scales and skew, of the differences that stand for deri
 
 
 def print_matrix(as_built: AsBuilt) -> Array:
-    """Return S (3, 3): a point p of the part's design is printed at S p; z is as designed."""
+    """Return S (3, 3) of a print; z is as designed."""
     return _print_matrix(np.array([getattr(as_built, name) for name in _PRINT]))
 
 
 def print_of(prints: Sequence[AsBuilt], part: str, printer: str) -> AsBuilt | None:
-    """Return what is known of a part: as it was touched, else as its printer prints.
+    """Return the print of a part as it was touched, else of its printer; None if neither is known.
 
-    None where nothing is, or where the printer is known with several materials: which of them
-    the part is made of no database says.
-
-    Parameters
-    ----------
-    prints
-        Of the part's object, and of printers (`object_id` None).
+    A printer that is known with several materials says nothing of the part. `prints` are those of
+    the part's object, and of printers (`object_id` None).
     """
     for one in prints:
         if one.object_id is not None and one.part == part:
@@ -57,7 +50,7 @@ def print_of(prints: Sequence[AsBuilt], part: str, printer: str) -> AsBuilt | No
 
 
 def usual_print() -> AsBuilt:
-    """Return what is known of a part that nobody has measured: as designed, more or less."""
+    """Return the print of a part that nobody has measured: as designed, within the usual spread."""
     common, apart = SCALE_SD**2, APART_SD**2 / 2
     covariance = np.zeros((4, 4))
     covariance[:2, :2] = common
@@ -70,7 +63,7 @@ def usual_print() -> AsBuilt:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FeltScale:
-    """The scale of a print as one touch felt it, together with the pose that it goes with."""
+    """The scale of a print by one touch, with its covariance with the pose."""
 
     excess: float  #: lattice over print, less 1
     covariance: Array  #: (4,) with x, y (mm) and the turn (rad) on the face, and its variance
@@ -89,19 +82,11 @@ class PrintedFace:
     def pose(
         self, T_face_probe: Array, covariance: Array, felt: FeltScale | None = None
     ) -> tuple[Array, Array]:
-        """Return pose and covariance on the printed part, in the face frame of the design.
+        """Return pose (4, 4) and covariance (3, 3) on the printed part, face frame of the design.
 
-        Parameters
-        ----------
-        T_face_probe
-            (4, 4) as it was read.
-        covariance
-            (3, 3) of x, y (mm) and the turn about z (rad).
-        felt
-            What the touch says of the scale; None where it is not told.
+        `covariance` (3, 3) is of x, y (mm) and the turn about z (rad); `felt` is the scale by the
+        touch.
 
-        Notes
-        -----
         B, the face's x and y axes in the part frame, is printed as S B = Q U, Q orthonormal and U
         symmetric. The reader fits a turned and scaled lattice to what is turned and stretched,
         which finds the turn against Q, whatever U, and the mean of U's eigenvalues as the scale.
@@ -131,7 +116,7 @@ class PrintedFace:
         return printed, along @ alone @ along.T + by_print @ spread @ by_print.T + floor
 
     def _with_scale(self, print_: Array, spread: Array, felt: FeltScale) -> tuple[Array, Array]:
-        """Return scales and skew with what a touch says of them, and their covariance (3, 3)."""
+        """Return scales and skew updated by the scale of a touch, and their covariance (3, 3)."""
         variance = felt.covariance[3]
         precision = 1.0 / variance - 1.0 / felt.expected**2  # by the image alone
         if not precision > 0:
@@ -143,7 +128,7 @@ class PrintedFace:
         return print_ + gain * away, spread - np.outer(gain, by @ spread)
 
     def _excess(self, print_: Array) -> Array:
-        """Return lattice over print, less 1, as a touch of the face feels it: (1,)."""
+        """Return (1,) lattice over print, less 1, by a touch of the face."""
         return np.array([1.0 / _polar(_print_matrix(print_) @ self.T_part_face[:3, :2])[1] - 1.0])
 
     def _printed(self, S: Array, axes: Array, T_face_probe: Array) -> Array:
@@ -169,7 +154,7 @@ def _print_matrix(print_: Array) -> Array:
 def _polar(B: Array) -> tuple[Array, float]:
     """Return the orthonormal Q of B = Q U (3, 2), and the mean of the eigenvalues of U.
 
-    By the Cayley-Hamilton theorem U is (B'B + s 1) / t, s^2 the determinant of B'B, t^2 its trace
+    U is (B'B + s 1) / t by the Cayley-Hamilton theorem, s^2 the determinant of B'B, t^2 its trace
     and 2 s: L. P. Franca, Comput. Math. Appl. 18 (1989) 459.
     """
     (a, c), (_, b) = (B.T @ B).tolist()
@@ -179,12 +164,11 @@ def _polar(B: Array) -> tuple[Array, float]:
 
 
 def _slopes(of: Callable[[Array], Array], at: Array, here: Array) -> Array:
-    """Return the derivatives (m, 3) of a function of a print, which is `here` (m,) at it."""
+    """Return the derivatives (m, 3) of a function of a print, whose value there is `here` (m,)."""
     return np.array([(of(at + DIFFERENCE * one) - here) / DIFFERENCE for one in np.eye(3)]).T
 
 
 def _moved(T_face_probe: Array, by: Array) -> Array:
-    """Return a pose moved by x, y (mm) and a turn about z (rad) on the face."""
     x, y, turn = by.tolist()
     moved = T_face_probe.copy()
     cos, sin = math.cos(turn), math.sin(turn)
@@ -194,5 +178,4 @@ def _moved(T_face_probe: Array, by: Array) -> Array:
 
 
 def _planar(T: Array) -> Array:
-    """Return x, y and the turn about z of a pose (4, 4)."""
     return np.array([T[0, 3], T[1, 3], math.atan2(T[1, 0], T[0, 0])])

@@ -1,43 +1,32 @@
 """How many registered places a foreign surface would match as well by chance.
 
-Fit + hypothesis + what is registered -> doubt, the E-value of sequence databases: number of places
-times the probability that symbols drawn at random (each alike likely, one independent of the
-other) reach at least the score that the hypothesis reached. A cell that shows its symbol clearly
-contributes 1 / q; a soft one, the share of symbols that score as well, together with what the
-others leave; a bare one, 1. Of bare cells only the places are counted whose own border agrees with
-them: a place that holds symbols where the face is bare falls behind farther than the hypothesis.
+Fit + hypothesis + lab -> doubt, the E-value of sequence databases: the number of places times the
+probability that random symbols (equally likely, independent) reach at least the hypothesis's score.
+A clear cell contributes 1 / q, a soft one the share of symbols that score as well, a bare one 1. Of
+bare cells only the places count whose own border agrees: a place with symbols where the face is
+bare falls behind farther than the hypothesis. The probability is summed over all symbols of all
+cells on a grid of nats, scores rounded up: it is too small only by what fitting pose and gain to
+the registered symbols adds.
 
-Where that leaves too large a doubt, the border of the face counts as what it is, a part of what
-has to match (`expected_by_border`). A foreign face that bears symbols of this pitch ends somewhere:
-it shows an outline in whole cells, and a distance from its end to the last symbols. Given the
-outline, symbols are random as before; a place matches only if its own outline does, so places are
-counted one by one: one that bears a symbol where none is felt falls behind, and so does one that
-bears none where one is felt, which then has fewer symbols to match. Edges match edges, and in a
-corner corners. Given outline and symbols, the end of the face still lies anywhere within half a
-pitch, each way that it runs: `border.share_of_borders` says how many of these ends fit as well.
-With places p, their outlines o(p), and the ways w that the border runs,
+Where that leaves too large a doubt, the border of the face has to match as well
+(`expected_by_border`). A foreign face that bears symbols of this pitch ends somewhere: it shows an
+outline in whole cells and a distance from its end to the last symbols. With places p, their
+outlines o(p), and the ways w that the border runs,
 
-    doubt = sum over p of P(symbols of o(p) score as well) x product over w of share(w).
+    doubt = sum over p of P(symbols of o(p) score as well) x product over w of share(w),
 
-Two labs whose parts have the same sizes end alike, and the shares are then no evidence; doubt is
-too small by them there, at most by the 16 that two ways of a quarter each give. What the plate
-does not surely press is no border: a bare cell costs others only as far as a symbol would be felt.
+share(w) the share of ends within half a pitch that fit as well (`share_of_borders`). Between two
+labs whose parts have the same sizes the shares are no evidence: doubt is then too small, at most by
+the 16 that two ways of a quarter each give. A bare cell costs others only as far as a symbol there
+would surely be pressed.
 
-The probability is summed over all symbols of all cells at once, on a grid of nats, every score
-rounded up: it is never too small but for what the fit of pose and gain to the symbols that are
-registered there adds to them.
-
-The border of a face. A plate that lies over the edge of a face tips and comes down on the bare face
-up to its very end: tactels read that face there, and nothing a tip's width farther. Each line of
-the registered outline under the sensor is shifted to and fro, and the readings of the tactels about
-it are compared with those that the bare face would give them that far; the share of shifts that fit
-as well as none at all is how often a border that has nothing to do with the lattice would. Only
-tactels count which the plate surely presses if there is a face: one that a tipped plate does not
-load says nothing of a border. Where no such tactel lies near a line, every shift fits as well and
-the share is 1. Lattices stand in the middle of their faces (`generator.layout`), so that a face of
-unknown size ends anywhere within half a pitch, and opposite borders end as far from the lattice: of
-parallel lines one counts. Sizes are round numbers more often than not, which move a border by half
-a millimetre, and no line says more than `LEAST_SHARE`. Sensor frame and face frame, mm. Thesis 6.3.
+A plate over the edge of a face tips and comes down on the bare face up to its very end; tactels
+beyond read nothing. Each line of the registered outline under the sensor is shifted to and fro, and
+the readings near it are compared with those that the bare face would give. Only tactels count that
+the plate surely presses; without any the share is 1. Lattices stand in the middle of their faces
+(`generator.layout`), so opposite borders end equally far from the lattice: of parallel lines one
+counts. Sizes are round numbers more often than not, so no line counts less than `LEAST_SHARE`.
+Sensor frame and face frame, mm. Thesis 6.3.
 """
 
 from __future__ import annotations
@@ -101,14 +90,8 @@ def expected_matches(
 ) -> float:
     """Return how many registered places random symbols would match as well as a hypothesis.
 
-    Parameters
-    ----------
-    arrays
-        Of the lab. Those count that are embossed alike: the same symbols, as large.
-    embossed
-        The one of the hypothesis.
-    borders
-        Whether those only count whose own borders agree with the bare cells; else all.
+    Only arrays of the same alphabet and style count; with `borders` only places whose own borders
+    agree with the bare cells.
     """
     scores = bounded_scores(fit)
     held = labels_of(embossed, hypothesis, fit.cells)
@@ -127,16 +110,10 @@ def expected_by_border(
     found: VerifiedHypothesis,
     tip_mm: float,
 ) -> float:
-    """Return how many registered places a foreign face matches as well, border and all.
+    """Return how many registered places a foreign face matches as well, border included.
 
-    Infinite in a lab that is too large for places to be counted one by one.
-
-    Parameters
-    ----------
-    arrays
-        Of the lab. Those count that are embossed alike.
-    tip_mm
-        Diameter of a tactel's tip.
+    Infinite in a lab that is too large for places to be counted one by one. `tip_mm` is the
+    diameter of a tactel's tip.
     """
     embossed, fit = found.embossed, found.fit
     alike = [
@@ -158,7 +135,7 @@ def expected_by_border(
 
 
 def _pressed_share(found: VerifiedHypothesis) -> Array:
-    """Return of each cell (m,) the share of its tactels that a symbol there would surely press."""
+    """Return (m,) the share of each cell's tactels that a symbol there would surely press."""
     image, fit = found.image, found.fit
     pressed = surely_pressed(image, fit.gain, SYMBOL)
     at = np.floor(points_on_lattice(image, fit) / image.template.pitch_mm).astype(np.int64)
@@ -167,23 +144,16 @@ def _pressed_share(found: VerifiedHypothesis) -> Array:
 
 
 def chance_of_match(scores: Array, held: Ints, grain: float = GRAIN) -> float:
-    """Return the probability that random symbols score as well as those that are held.
+    """Return the probability that random symbols score as well as those held (m,).
 
-    Parameters
-    ----------
-    scores
-        (m, q) log-likelihoods of the symbols of each cell, nats.
-    held
-        (m,) symbols.
-    grain
-        Nats to which scores are rounded, towards a larger probability.
+    `scores` (m, q) are nats, rounded by `GRAIN` towards a larger probability.
     """
     behind = np.floor((scores[np.arange(len(held)), held][:, None] - scores) / grain)
     return _share_within(behind.astype(np.int64), 0)
 
 
 def _share_within(behind: Ints, most: int) -> float:
-    """Return how likely random symbols of cells (m, q) fall behind by no more than `most`."""
+    """Return the probability that random symbols of cells (m, q) fall behind by `most` or less."""
     if len(behind) == 0:
         return float(most >= 0)
     ahead = behind.min(axis=1)
@@ -202,14 +172,10 @@ def _share_within(behind: Ints, most: int) -> float:
 
 
 def _expect_matches(embossed: EmbossedArray, cells: Ints, behind: Ints) -> float:
-    """Return how many places random symbols match, outlines and all.
+    """Return how many places random symbols match, outlines included.
 
-    Parameters
-    ----------
-    cells
-        (m, 2) column and upward row, from a cell that the place holds.
-    behind
-        (m, q + 1) by how much each symbol, and none, falls behind the hypothesis there.
+    `cells` (m, 2) are counted from a cell that the place holds; `behind` (m, q + 1) says by how
+    much each symbol, and none, falls behind the hypothesis there.
     """
     symbol, none = behind[:, :-1], behind[:, -1]
     least = symbol.min(axis=1)
@@ -252,7 +218,7 @@ def _bears(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Border:
-    """The bare cells of a hypothesis, which other places may hold symbols in."""
+    """The bare cells of a hypothesis, where other places may hold symbols."""
 
     cells: Ints  #: (n, 2) column and upward row, from a cell that the place holds
     price: Array  #: (n,) nats by which a symbol there falls behind, falling
@@ -270,20 +236,13 @@ def _border_of(fit: Fit, scores: Array, held: Ints) -> _Border:
 
 
 def _count_places(embossed: EmbossedArray, border: _Border) -> int:
-    """Return how many registered cells can be the held one; all, in a large lab."""
     if len(embossed.keys) > LARGE_LAB:
         return len(embossed.keys)
     return count_places(embossed, border.cells, border.price, border.slack)
 
 
 def share_of_borders(found: VerifiedHypothesis, tip_mm: float) -> float:
-    """Return the share of foreign borders that the image fits as well as the registered one.
-
-    Parameters
-    ----------
-    tip_mm
-        Diameter of a tactel's tip.
-    """
+    """Return the share of foreign borders that the image fits as well as the registered one."""
     face = found.embossed.face(found.hypothesis.face)
     if face.round is not None or tip_mm <= 0.0:
         return 1.0
@@ -303,14 +262,9 @@ def share_of_borders(found: VerifiedHypothesis, tip_mm: float) -> float:
 
 
 def surely_pressed(image: Image, gain: Array, share: float) -> Flags:
-    """Return which tactels (n,) would plainly read a symbol, if there were one under them.
+    """Return which tactels (n,) would read a symbol by at least a share of the strongest readings.
 
-    Parameters
-    ----------
-    gain
-        (4,) of the plate.
-    share
-        Of the strongest readings, that they would read at least.
+    `gain` (4,) is that of the plate.
     """
     depth = image.plane @ gain[1:]
     force = math.exp(float(gain[0])) * image.pressing.force(depth)
@@ -331,7 +285,7 @@ def points_on_lattice(image: Image, fit: Fit) -> Array:
 
 
 def _free_tactels(found: VerifiedHypothesis) -> tuple[Flags, Array, Array]:
-    """Return which tactels would feel the bare face alone; forces (n,) on symbols and on it."""
+    """Return which tactels touch the bare face alone; forces (n,) on symbols and on the face."""
     image, fit = found.image, found.fit
     template = image.template
     depth, scale = image.plane @ fit.gain[1:], math.exp(float(fit.gain[0]))
@@ -347,7 +301,7 @@ def _free_tactels(found: VerifiedHypothesis) -> tuple[Flags, Array, Array]:
 
 
 def points_on_face(found: VerifiedHypothesis, face: EncodedFace) -> Array:
-    """Return the tactels (n, 2) in the face frame, in lengths as they were designed."""
+    """Return the tactels (n, 2) in the face frame, lengths as designed."""
     T = face_pose(found.embossed, face, found.hypothesis, found.fit)
     points = found.image.points_mm * (1.0 + float(found.fit.nuisance[3]))
     return np.asarray(points @ T[:2, :2].T + T[:2, 3])
@@ -379,10 +333,8 @@ def fitting_share(
 ) -> float:
     """Return the share of half a pitch by which a border may be shifted and fit as well.
 
-    Parameters
-    ----------
-    inside, readings, bare
-        (n,) mm from the line, psi of what is read, and what the bare face gives, of a symbol's.
+    `inside` (n,) is mm from the line, `readings` psi of what is read, `bare` the bare face's force
+    over a symbol's.
     """
     step = SHIFT_MM
     count = max(1, round(pitch / 2 / step))
@@ -409,7 +361,7 @@ def tip_share(inside: Array) -> Array:
 
 
 def joint_share(shares: list[tuple[float, float]]) -> float:
-    """Return the product of shares, of parallel lines the least one."""
+    """Return the product of shares (direction, share); of parallel lines the least one."""
     total, known = 1.0, list[float]()
     for direction, share in sorted(shares, key=lambda one: one[1]):
         if all(abs(math.remainder(direction - other, math.pi)) > PARALLEL_RAD for other in known):

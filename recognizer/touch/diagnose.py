@@ -1,8 +1,8 @@
 """Image and best hypothesis of a touch that is not answered -> its cause.
 
-What the image shows by itself comes first (smeared, even, soft, falling off to one side, loaded in
-part), then what the best hypothesis leaves: tactels that read nothing where symbols press, symbols
-that are read but contradict every place, a pattern that no symbols explain.
+The image by itself comes first (smeared, even, soft, falling off to one side, loaded in part), then
+the residual of the best hypothesis: tactels that read nothing where symbols press, symbols that
+contradict every place, a pattern that no symbols explain.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def _percentile(values: Array, percent: float) -> float:
 
 
 def _is_plain(image: ImageFeatures, signal: Signal) -> bool:
-    """Whether what is pressed is one area without gaps, pressed evenly, up to an edge or not."""
+    """Whether one area without gaps is pressed evenly, up to an edge or not."""
     good, top = signal.trust > 0, image.plateau
     pressed = good & (signal.forces > PART * top)
     rows, columns = np.flatnonzero(pressed.any(axis=1)), np.flatnonzero(pressed.any(axis=0))
@@ -126,10 +126,7 @@ def _is_there(evidence: Evidence | None) -> bool:
 def diagnose(touch: TouchImages, found: list[VerifiedHypothesis]) -> Cause:
     """Return why a touch is not answered.
 
-    Parameters
-    ----------
-    found
-        The hypotheses that were judged, best first; none where nothing could be fitted.
+    `found` are the hypotheses that were judged, best first; none where nothing could be fitted.
     """
     reader, signal = touch.reader, touch.signal
     if not signal.contact:
@@ -188,9 +185,9 @@ def _by_image(image: ImageFeatures, signal: Signal) -> Cause | None:
 
 
 def _read_anywhere(touch: TouchImages) -> tuple[float, int]:
-    """Return the share of the image that symbols explain wherever they stand, and how many do.
+    """Return the share of the image that symbols explain wherever they stand, and their number.
 
-    Each cell shows what fits it best, whether such a window is registered or not.
+    Each cell shows its best symbol, whether such a window is registered or not.
     """
     best, read = -math.inf, 0
     for one in touch.arrays:
@@ -213,10 +210,7 @@ def _read_anywhere(touch: TouchImages) -> tuple[float, int]:
 
 
 def _disagreement(best: VerifiedHypothesis) -> tuple[float, float]:
-    """Return the share of pressed tactels that read nothing, and of free ones that read a symbol.
-
-    Pressed and free by the symbols that are registered at the place.
-    """
+    """Return the share of pressed tactels that read nothing, and of free ones that read much."""
     image, fit = best.image, best.fit
     under, labels, shows = project_symbols(image, fit.pose[None], fit.gain[None], best.labels_at)
     value, felt = shows[0, :, 0], under.psi[0]

@@ -48,20 +48,20 @@ class VerifiedHypothesis:
         return under_centre(self.embossed, self.fit, self.hypothesis)
 
     def same_place(self, other: VerifiedHypothesis) -> bool:
-        """Whether both say the same place, up to a cell's rounding."""
+        """Whether both are one place, up to a cell's rounding."""
         if self.embossed is not other.embossed or self.hypothesis.face != other.hypothesis.face:
             return False
         return neighbours(self.embossed, self.index, other.index)
 
     def coincides(self, other: VerifiedHypothesis) -> bool:
-        """Whether both say the same place, and neither one a pitch off it."""
+        """Whether both are one place, and neither one a pitch off it."""
         return self.embossed is other.embossed and coincide(
             self.embossed, self.fit, self.hypothesis, other.fit, other.hypothesis
         )
 
     @cached_property
     def cells(self) -> CellEvidence:
-        """What the cells in view say of the place."""
+        """Evidence of the cells in view."""
         return weigh_cells(self.embossed, self.fit, self.hypothesis)
 
     @cached_property
@@ -71,7 +71,7 @@ class VerifiedHypothesis:
 
     @cached_property
     def evidence(self) -> Evidence:
-        """What speaks for the place, and against it."""
+        """Evidence for the place, and against it."""
         fit, cells = self.fit, self.cells
         against = cells.seen & (cells.against > CONTRADICTION)
         return Evidence(
@@ -85,13 +85,13 @@ class VerifiedHypothesis:
         )
 
     def last_fit(self) -> Fit:
-        """Return its fit with pose and covariance by its symbols, worn ones left out."""
+        """Return the fit with pose and covariance by its unworn symbols."""
         return refit_pose(self.image, self.fit, self.labels_at)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellEvidence:
-    """What the cells in view (m,) say of a place."""
+    """Evidence of the cells in view (m,) for a place."""
 
     worn: Flags  #: hold a symbol that is not felt at all
     seen: Flags  #: have enough tactels on them
@@ -100,7 +100,7 @@ class CellEvidence:
 
 
 def weigh_cells(embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis) -> CellEvidence:
-    """Return what the cells of a fit say of a place."""
+    """Return the evidence of a fit's cells for a place."""
     order = embossed.array.order
     held = labels_of(embossed, hypothesis, fit.cells)
     own = fit.scores[np.arange(len(held)), held]
@@ -133,8 +133,8 @@ def symbols_to_name(embossed: EmbossedArray) -> int:
 def null_log_likelihood(embossed: EmbossedArray, fit: Fit) -> float:
     """Return the log-likelihood of an image that shows symbols of no registered place.
 
-    Every cell shows any symbol, or none, with the same probability; the prior of a place is
-    one over their number.
+    Every cell shows any symbol, or none, with one probability; a place's prior is one over their
+    number.
     """
     options = embossed.array.order + 1
     each = _marginal(fit) - math.log(options)
@@ -142,5 +142,5 @@ def null_log_likelihood(embossed: EmbossedArray, fit: Fit) -> float:
 
 
 def _marginal(fit: Fit) -> NDArray[np.float64]:
-    """Return the log of each cell's likelihoods (m,), summed over all that it may show."""
+    """Return the log of each cell's likelihoods (m,), summed over all symbols and none."""
     return np.asarray(np.log(np.exp(fit.scores).sum(axis=1)))

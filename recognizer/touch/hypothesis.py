@@ -2,11 +2,10 @@
 
 A `Fit` names cells (i, j) of a lattice; a hypothesis says which array cell (row, column) the cell
 (0, 0) is, and which face holds the symbols: cell (i, j) is then (row - j, column + i) where that
-face holds it, and shows no symbol where it does not. Its score is the sum of the cells'
-log-likelihoods, none of them lower than a limit, so that a worn or wrong symbol costs what it
-should and no more. Places come from the surest windows of cells, by the array's own code; where no
-window is whole, from cells that any registered cell may be. All are scored, and the likeliest kept.
-Sums over many places are compiled (`places.c`).
+face holds it, and bare elsewhere. Its score is the sum of the cells' log-likelihoods, each bounded
+below, so that a worn or wrong symbol costs a limited amount. Places come from the surest windows of
+cells, by the array's own code; where no window is whole, from cells that any registered cell may
+be. All are scored, and the likeliest kept. Sums over many places are compiled (`places.c`).
 """
 
 from __future__ import annotations
@@ -79,15 +78,9 @@ def find_rivals(
 ) -> list[Hypothesis]:
     """Return the likeliest other places of the whole database under a fit, best first.
 
-    `find_hypotheses` looks where a few windows point to; a place that differs from the best one
-    in a cell of such a window is found here, under scores that the best place has made sharp.
-
-    Parameters
-    ----------
-    best
-        Whose rivals are sought.
-    number
-        Number of the fit that the places get.
+    `find_hypotheses` looks where a few windows point to; a place that differs from the best one in
+    a cell of such a window is found here, under scores that the best place has made sharp. `number`
+    is that of the fit that the places get.
     """
     scores = bounded_scores(fit)
     held = labels_of(embossed, best, fit.cells)
@@ -117,7 +110,6 @@ def _rank_candidates(
     found: Places,
     kept: int,
 ) -> list[Hypothesis]:
-    """Return the likeliest candidates, best first."""
     rows, columns, owners = found
     if len(rows) == 0:
         return []
@@ -130,7 +122,7 @@ def _rank_candidates(
 
 
 def _window_candidates(embossed: EmbossedArray, fit: Fit) -> Places | None:
-    """Return where (0, 0) can lie, from the surest whole windows; None if there is none."""
+    """Return where (0, 0) can lie, by the surest whole windows; None if there is none."""
     order = embossed.array.order
     symbols = np.sort(fit.scores[:, :order], axis=1)
     sure = np.minimum(symbols[:, -1] - symbols[:, -2], symbols[:, -1] - fit.scores[:, order])
@@ -179,14 +171,9 @@ def _anchor_candidates(
     symbol: Array,
     anchors: int,
 ) -> Places:
-    """Return where (0, 0) can lie if one of a few cells is a registered one.
+    """Return where (0, 0) can lie if one of a few cells is a registered one; none in a large lab.
 
-    None in a lab that is too large for that.
-
-    Parameters
-    ----------
-    symbol
-        (m,) nats by which cells hold a symbol; the first `anchors` of them are tried.
+    `symbol` (m,) are nats by which cells hold a symbol; the first `anchors` of them are tried.
     """
     order = embossed.array.order
     small = len(embossed.keys) <= LARGE_LAB
@@ -205,11 +192,7 @@ def _origins(
 ) -> Places:
     """Return where (0, 0) lies, each place once.
 
-    Parameters
-    ----------
-    found, numbers
-        Registered cells (n,), and the number of the fit's cell that may be any of them; several
-        such.
+    `found` are registered cells, several (n,); `numbers` the fit's cell that each of them may be.
     """
     at = np.concatenate([*found, np.zeros(0, np.int64)])
     cells = np.repeat(fit.cells[numbers], np.array([len(one) for one in found], int), axis=0)
@@ -231,7 +214,7 @@ def _origins(
 def _log_likelihoods(
     embossed: EmbossedArray, fit: Fit, scores: Array, found: Places
 ) -> tuple[Ints, Array]:
-    """Return numbers (k,) of candidates, and their log-likelihoods, 0 if every cell is at its best.
+    """Return numbers (k,) of candidates and their log-likelihoods, 0 with every cell at its best.
 
     The surest cells come first; of many candidates only the best are followed to the end.
     """
@@ -265,9 +248,9 @@ def log_likelihoods_at(
 
 
 def bounded_scores(fit: Fit) -> Array:
-    """Return scores (m, q + 1) in which a registered symbol may be worn away, or read wrong.
+    """Return scores (m, q + 1) with bounded losses: a registered symbol may be worn, or read wrong.
 
-    Of a cell of which the sensor sees only a corner, less is believed.
+    Less is lost in a cell of which the sensor sees only a corner.
     """
     least = CAP * np.minimum(1.0, fit.seen / CORNER)[:, None]
     bounded = np.array(fit.scores)
@@ -321,7 +304,7 @@ def coincide(
     """Whether two hypotheses put the sensor's centre in one place: half a pitch, an eighth turn.
 
     The cells under the centre do not decide: at the border of two cells they differ by one where
-    fits differ by nothing, and so they do of two places one pitch apart.
+    fits differ by nothing, and so do those of two places one pitch apart.
     """
     array, pitch = embossed.array, embossed.style.pitch_mm
     down = a.row - b.row - (fit.y_mm - other_fit.y_mm) / pitch
@@ -338,14 +321,10 @@ def coincide(
 def add_scores(
     embossed: EmbossedArray, places: Places, cells: Ints, scores: Array, before: Array
 ) -> Array:
-    """Return sums (n,) of the scores of cells at each place.
+    """Return sums (n,) of the scores (m, order + 1) of cells (m, 2) at each place.
 
-    Parameters
-    ----------
-    cells, scores
-        (m, 2) and (m, order + 1), the last one where the face of the place holds no symbol.
-    before
-        (n,) to which they are added, one after the other.
+    The last score counts where the place's face holds no symbol; sums are added to `before` (n,),
+    cell by cell.
     """
     total = before.copy()
     rows, columns, owners = (np.ascontiguousarray(one) for one in places)
@@ -360,8 +339,8 @@ def add_scores(
 def name_places(embossed: EmbossedArray, at: Ints, cells: Ints) -> Ints:
     """Return key of the place times (faces + 1), and its face, as one number (n,) for each.
 
-    Cell (0, 0) lies at that place if cells (n, 2) are the registered ones `at` (n,). Arrays so
-    large that one number cannot name both are named by `place_keys`.
+    Cell (0, 0) lies at that place if cells (n, 2) are the registered ones `at` (n,). Arrays too
+    large for one number are named by `place_keys`.
     """
     names = np.empty(len(at), np.int64)
     at, cells = np.ascontiguousarray(at), np.ascontiguousarray(cells)
@@ -382,7 +361,7 @@ def place_keys(embossed: EmbossedArray, at: Ints, cells: Ints) -> NDArray[np.uin
 
 
 def count_names(names: Ints) -> tuple[Ints, Ints]:
-    """Return numbers (n,), none negative, each once and rising, and how often each was there."""
+    """Return non-negative numbers (n,), each once and rising, and how often each occurs."""
     known, spare, votes = names.copy(), np.empty_like(names), np.empty_like(names)
     count = kernels().count_names(len(names), *addresses(known, spare, votes))
     return known[:count], votes[:count]
@@ -391,12 +370,8 @@ def count_names(names: Ints) -> tuple[Ints, Ints]:
 def count_places(embossed: EmbossedArray, cells: Ints, prices: Array, slack: float) -> int:
     """Return how many registered cells can be the one that cells are counted from.
 
-    Parameters
-    ----------
-    cells, prices
-        (m, 2) that show no symbol, and (m,) nats that each costs where the place holds one.
-    slack
-        Nats that these may come to.
+    `cells` (m, 2) show no symbol; `prices` (m,) are the nats of each where the place holds one,
+    which may sum to `slack`.
     """
     cells, prices = np.ascontiguousarray(cells), np.ascontiguousarray(prices)
     at = ctypes.addressof(embossed.held)

@@ -1,8 +1,8 @@
-"""What the lab has registered, as the reader needs it. Thesis 6.3.
+"""The registered cells of a lab, as the reader needs them. Thesis 6.3.
 
 Database -> Lab: for every array and way of embossing (an `EmbossedArray`) the cells that objects
-hold, each with the face that holds it. Cells are looked up by their number row x columns +
-column; faces are read from the database when a touch first meets them.
+hold, each with its face. Cells are looked up by row x columns + column; faces are read from the
+database when a touch first meets them.
 """
 
 from __future__ import annotations
@@ -76,9 +76,8 @@ class EncodedFace:
 class Windows:
     """Registered cells, ordered by the labels of the windows of which they are the top left.
 
-    A touch that reads six neighbouring symbols looks them up here, or four; its work does not grow
-    with the number of registered faces, but with how often the same labels occur (array order to
-    the sixth divides them). Works for every kind of array, since only registered cells are listed.
+    A touch looks up six neighbouring symbols here, or four; the work grows with how often the same
+    labels occur, not with the number of faces.
     """
 
     shape: tuple[int, int]
@@ -143,7 +142,7 @@ class EmbossedArray:
 
     @cached_property
     def held(self) -> Held:
-        """What the compiled loops over places are given."""
+        """The array as the compiled loops over places take it."""
         array = self.array
         return Held(
             len(self.keys), array.rows, array.columns, array.order,
@@ -171,7 +170,7 @@ def cell_keys(columns: int, rows: Ints, columns_at: Ints) -> NDArray[np.uint64]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lab:
-    """Everything that a touch can be told apart from; prints as what it holds."""
+    """Everything that a touch may show; prints as its contents."""
 
     url: str
     arrays: tuple[EmbossedArray, ...]
@@ -189,12 +188,7 @@ class Lab:
 
 
 def open_lab(database: str | Path) -> Lab:
-    """Return what a database holds.
-
-    Parameters
-    ----------
-    database
-        A file (`lab.db`), `sqlite:///lab.db`, or `postgresql://user@host/name`.
+    """Return the lab of a database: a file, `sqlite:///lab.db`, or `postgresql://user@host/name`.
 
     Raises
     ------
@@ -261,7 +255,7 @@ def _embossed_arrays(connection: Connection, engine: Engine) -> Iterable[Embosse
 
 
 def radii_of(surfaces: Iterable[Developable]) -> tuple[float, ...]:
-    """Return radii of which one is near to each at which a plate can touch round faces.
+    """Return a ladder of radii that covers those at which a plate can touch round faces.
 
     A cone has all radii from its largest down.
     """
@@ -317,7 +311,7 @@ def _about_symbols(
     """Return T_part_face (4, 4) with the origin in the middle of the face's symbols (n, 2).
 
     Places on a printed face are counted from there (`docs/printed.md`). A face of no registered
-    part is taken to be one of its own, printed as it lies.
+    part is taken to be a part of its own, printed as it lies.
     """
     about = np.eye(4)
     if T_part_face is not None:

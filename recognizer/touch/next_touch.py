@@ -1,16 +1,15 @@
 """Where to touch next: the step, the turn and the force that promise most.
 
-Signal + hypotheses of a touch that is not answered, or not surely -> NextTouch. Steps on a grid of
-lengths, directions and turns are weighed by the symbols that the sensor would see there, those
-that it has not seen counted once more, after two views of what lies beyond it:
+Signal + hypotheses of a touch without a sure answer -> NextTouch. Steps on a grid of lengths,
+directions and turns are weighed by the symbols that the sensor would see, unseen ones more, after
+two views of the surroundings:
 
-- the image: where the sensor is loaded the face is, and a face loaded up to the sensor's rim goes
-  on beyond it, the less surely the farther. A tilted plate hangs over parts of the face: a part
-  that an earlier touch has felt counts as well;
-- the hypotheses: each says which face is under the sensor, with all its symbols and its border.
+- the image: a face loaded up to the sensor's rim goes on beyond it, the less surely the farther. A
+  tilted plate hangs over parts of the face: the loaded area of earlier touches counts as well;
+- the hypotheses: each knows the face under the sensor, with all its symbols and its border.
 
-The sensor's centre stays where something was felt, or where every likely face is: no step leads
-off the face. The force is the one at which touches are read best. Sensor frame, mm. Thesis 6.3.
+The sensor's centre stays on the loaded area, or where every likely face is: no step leads off the
+face. The force is the one at which touches are read best. Sensor frame, mm. Thesis 6.3.
 """
 
 from __future__ import annotations
@@ -86,10 +85,10 @@ class NextLimits:
 def next_limits(sensor: SensorType) -> NextLimits:
     """Return the limits for a type: steps as long for its size, as hard as it is pressed.
 
-    Steps of larger sensors are no longer than those of `fsr-16`: 16 of 16 touches of `mat-32x32`
-    at edges were answered by the third, 13 with steps as long for its size. Least and soft counts
-    go with the full scale, or with the noise where that is more; gaps between strokes are no wider
-    in mm where tactels are coarse.
+    Steps of larger sensors are no longer than those of `fsr-16`: 16 of 16 touches of `mat-32x32` at
+    edges were answered by the third, 13 with steps as long for its size. Counts go with the full
+    scale, or with the noise where that is more; gaps between strokes are no wider in mm where
+    tactels are coarse.
     """
     usual = SensorType()
     size = min(1.0, math.sqrt(math.prod(sensor.half_mm) / math.prod(usual.half_mm)))
@@ -107,7 +106,7 @@ def next_limits(sensor: SensorType) -> NextLimits:
 
 
 class PlaceHypothesis(Protocol):
-    """A place that a touch may be: `VerifiedHypothesis`, or a composite of a scan."""
+    """A possible place of a touch: `VerifiedHypothesis`, or one of a scan."""
 
     @property
     def embossed(self) -> EmbossedArray:
@@ -135,18 +134,8 @@ def propose_next(
 ) -> NextTouch | None:
     """Return where to touch next; None where the answer is sure.
 
-    Parameters
-    ----------
-    reader
-        Of the lab and the sensor.
-    signal
-        Of the touch.
-    answer
-        What the touch says by itself or with others.
-    hypotheses
-        Places that the touch may be, best first.
-    earlier
-        Touches before: what they have seen is not new, and says where the face is.
+    `hypotheses` are the places of the touch, best first; what `earlier` touches have seen is not
+    new, and shows where the face is.
     """
     if answer and not _is_unsure(answer):
         return None
@@ -209,7 +198,7 @@ def _views(sensor: SensorType, limits: NextLimits) -> tuple[PlanePoints, PlanePo
 def _symbols_by_image(
     area: FeltArea, pitch_mm: float, novelty: float, limits: NextLimits
 ) -> tuple[Array, Flags]:
-    """Return (n,) symbols worth at each step, and whether the centre then lies on what was felt."""
+    """Return (n,) symbols worth at each step, and whether the centre stays on the loaded area."""
     points, around = _views(area.sensor, limits)
     half_x, half_y = area.sensor.half_mm
     cells = 4 * half_x * half_y / pitch_mm**2
@@ -272,7 +261,7 @@ def _why(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EarlierTouch:
-    """A touch before, and where."""
+    """An earlier touch of the face."""
 
     pose: Array  #: (3,) x, y (mm) and turn (rad), in the sensor frame of the last touch
     signal: Signal
@@ -280,7 +269,7 @@ class EarlierTouch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanePoints:
-    """Points of the sensor's plane, as the last touch has them."""
+    """Points of the sensor's plane, frame of the last touch."""
 
     mm: Array  #: (..., 2)
     under: Flags  #: (...) whether they lie under the sensor
@@ -300,7 +289,7 @@ def plane_points(sensor: SensorType, points_mm: Array) -> PlanePoints:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FeltArea:
-    """Where touches have felt a face."""
+    """Where touches have loaded a face."""
 
     sensor: SensorType
     loaded: Flags  #: (rows, columns) of the last touch
@@ -318,7 +307,7 @@ class FeltArea:
         return np.where(seen, felt, expected), seen
 
     def felt(self, points: PlanePoints) -> Flags:
-        """Return where among points (...) a face was felt."""
+        """Return where among points (...) the face was loaded."""
         return self._felt(points)[1]
 
     def seen(self, points: PlanePoints) -> Flags:
@@ -338,7 +327,7 @@ class FeltArea:
 
 
 def felt_area(sensor: SensorType, signal: Signal, earlier: Sequence[EarlierTouch] = ()) -> FeltArea:
-    """Return where something lies, by the last touch and those before."""
+    """Return the loaded area of the last touch and those before."""
     limits = next_limits(sensor)
     before = tuple((one.pose, loaded_tactels(one.signal, limits)) for one in earlier)
     return FeltArea(sensor, loaded_tactels(signal, limits), before)

@@ -1,9 +1,9 @@
-"""What a user of the reader may turn: one flat value.
+"""The knobs of the reader: one flat value.
 
-Lengths in mm, forces in N, log-likelihoods in nats (natural units of evidence: 10 nats are odds of
-22,000). Every other number that decides is a constant beside the code that uses it. Where nothing
-else is said a number was chosen on simulated touches of the 40 objects of
-`docs/validation/forty.yaml` (typical noise and strong mismatch).
+Lengths in mm, forces in N, log-likelihoods in nats (10 nats are odds of 22,000). Every other number
+that decides is a constant in the module that uses it, chosen, unless it says otherwise, on
+simulated touches of the 40 objects of `docs/validation/forty.yaml` (typical noise, strong
+mismatch).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ TIE_NATS = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much work a search for lattices spends."""
+    """The work of a search for lattices."""
 
     candidates: int = 2  #: lattices taken from the coarse search under each gain
     steps: int = 2  #: of damped least squares, of all of them
@@ -29,15 +29,7 @@ class Effort:
 
 @dataclass(frozen=True, slots=True)
 class ReaderOptions:
-    """How a touch is read, and what an answer takes.
-
-    Examples
-    --------
-    >>> ReaderOptions().least_inliers
-    4
-    >>> ReaderOptions(margin=20.0).doubt
-    0.0001
-    """
+    """How a touch is read, and when an answer is given."""
 
     margin: float = 10.0 - TIE_NATS  #: nats over the best other place
     margin_by_few: float = 14.0 - TIE_NATS  #: where fewer than 11 cells agree with the place

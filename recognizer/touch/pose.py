@@ -1,7 +1,7 @@
 """Place on the lattice -> pose on the face and on the object, with its covariance.
 
-A symbol that the face holds stands in the lattice frame at the centre of its cell and in the
-face frame where the layout put it; the two frames differ by the placement's turn. Thesis 6.3.
+A symbol of the face stands in the lattice frame at the centre of its cell, and in the face frame
+where the layout put it; the frames differ by the placement's turn. Thesis 6.3.
 """
 
 from __future__ import annotations
@@ -58,12 +58,9 @@ def face_covariance(face: EncodedFace, covariance: Array) -> Array:
 
 
 def felt_scale(face: EncodedFace, fit: Fit, expected: float) -> FeltScale | None:
-    """Return what a fit says of the scale of a print, in the face frame; None if nothing.
+    """Return the scale of a print by a fit, in the face frame; None if it fits none.
 
-    Parameters
-    ----------
-    expected
-        Standard deviation within which the fit took it to be 1.
+    `expected` is the standard deviation within which the fit took it to be 1.
     """
     if fit.with_scale is None:
         return None

@@ -1,7 +1,7 @@
 """What is prepared once for a lab and a sensor: templates, and banks of lattices to search by.
 
-Both depend on alphabet, style and sensor alone, and take longer to compute than a touch to read:
-.1 s for tabs, seconds for a pad. They are kept between runs (`encoded_objects.base.cache`).
+Both depend on alphabet, style and sensor alone, and take longer to compute than a touch to read: .1
+s for tabs, seconds for a pad. They are kept between runs (`encoded_objects.base.cache`).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _NUMBERS = np.dtype("<i8")
 
 
 class Prepared(NamedTuple):
-    """One array of a lab as a sensor feels it."""
+    """One array of a lab with its responses on a sensor."""
 
     embossed: EmbossedArray
     template: ResponseTemplate
@@ -48,7 +48,7 @@ class Prepared(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PreparedLab:
-    """A lab as a sensor feels it; `Reader` is one."""
+    """A lab, a sensor and options; `Reader` is one."""
 
     lab: Lab
     sensor: SensorType = field(default_factory=SensorType)
@@ -66,7 +66,7 @@ class PreparedLab:
         return f"{type(self).__name__}({self.lab}; {self.sensor.name}, {self.sensor.overlay.kind})"
 
     def image(self, signal: Signal, prepared: Prepared) -> Image:
-        """Return what is fitted of a touch of one array."""
+        """Return a touch as it is fitted to one array."""
         height_mm, share = prepared.embossed.style.height_mm, cell_share(self.lab, self.sensor)
         return image_of_signal(
             self.sensor, signal, prepared.template, height_mm, self.options, share
@@ -76,8 +76,7 @@ class PreparedLab:
 def cell_share(lab: Lab, sensor: SensorType) -> float:
     """Return by how much numbers of tactels on a cell shrink, on a sensor with few on a symbol.
 
-    1 where the smallest symbols of the lab lie under `COARSE` tactels or more, as all do on
-    `fsr-16`.
+    1 where the smallest symbols of the lab lie under `COARSE` tactels or more, as on `fsr-16`.
     """
     few = min((each.style.pitch_mm for each in lab.arrays), default=math.inf) / sensor.pitch_mm
     return min(1.0, few**2 / COARSE) ** 2
@@ -87,7 +86,7 @@ def cell_share(lab: Lab, sensor: SensorType) -> float:
 def template_and_bank(
     alphabet: Alphabet, style: SymbolStyle, sensor: SensorType
 ) -> tuple[ResponseTemplate, Bank]:
-    """Return the template of an alphabet as a sensor feels it, and the bank to search by."""
+    """Return the template of an alphabet on a sensor, and the bank to search by."""
     key = content_key((alphabet, style, sensor, np.__version__), _sources())
 
     def made() -> bytes:

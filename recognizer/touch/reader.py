@@ -35,7 +35,7 @@ class Reader(PreparedLab):
     sensor
         By default `fsr-16` with tabs.
     options
-        How touches are read, and what an answer takes.
+        How touches are read, and when an answer is given.
     state
         Of that very sensor, as `recognizer.sensor` learns it; None: nothing is known.
 
@@ -75,7 +75,7 @@ class Reader(PreparedLab):
         trust: ArrayLike | None = None,
         seq: int = 0,
     ) -> Recognition:
-        """Return the answer of one touch.
+        """Return the answer of one touch, which gets the number `seq`.
 
         Parameters
         ----------
@@ -85,8 +85,6 @@ class Reader(PreparedLab):
             Of the sensor: turns counts into newtons.
         trust
             (rows, columns) 0 for bad tactels, 1 for good ones.
-        seq
-            Number that the answer gets.
 
         Raises
         ------
@@ -146,23 +144,16 @@ class Reader(PreparedLab):
         every: bool = False,
         calibration: str | Path | None = None,
     ) -> Iterator[Recognition]:
-        """Yield the answers of the touches of a recording, as `recognize-object` does.
+        """Yield the answers of the touches of a recording or its file, as `recognize-object` does.
 
-        A recording that names sensor type and overlay is read by those.
-
-        Parameters
-        ----------
-        recording
-            As it is opened, or its file.
-        every
-            Every frame is a touch; otherwise force tells where one begins and ends.
-        calibration
-            File of the sensor's calibration; the one that the recording names is found beside it.
+        A recording that names sensor type and overlay is read by those. With `every` each frame is
+        a touch; otherwise force separates them. Without `calibration`, a file, the one that the
+        recording names is looked for in its folder.
 
         Raises
         ------
         RecordingError, CalibrationError
-            What is read cannot be read.
+            A file cannot be read.
         TouchError
             It is of another sensor.
         """

@@ -3,13 +3,13 @@
     signal     forces and trust
     symbols    a few lattices with the scores of all cells
     hypothesis the places of the database that they can be
-    verify     the best of them again, with the symbols that the database says are there
+    verify     the best of them again, with the registered symbols
     pose       where the sensor stands on the face and on the object
 
-The answer is given only if no other place explains the image nearly as well, if it explains
-the image better than a surface with symbols of no registered place, if the sensor's centre
-lies on the face, and if symbols drawn at random would hardly match any place as well: `verdict`
-says so. A first search is followed by a wide one where that may change the answer (`search_gate`).
+An answer is given only if no other place explains the image nearly as well, if it explains the
+image better than symbols of no registered place, if the sensor's centre lies on the face, and if
+random symbols would hardly match any place as well (`verdict`). A first search is followed by a
+wide one where that may change the answer (`search_gate`).
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ SOFT = 30.0  #: times the noise up to which the strongest are weak, and that is 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TouchReading:
-    """What one touch shows."""
+    """Answer and possible places of one touch."""
 
     answer: Recognition
     found: list[VerifiedHypothesis]  #: places that it may be, first of them the one that was judged
@@ -96,7 +96,7 @@ def recognise(reader: PreparedLab, signal: Signal, seq: int = 0) -> Recognition:
 
 
 def read_touch(reader: PreparedLab, signal: Signal, seq: int = 0) -> TouchReading:
-    """Return the answer of one touch, and the places that it may be."""
+    """Return the answer of one touch, and its possible places."""
     touch = TouchImages(reader, signal)
     answer, found = _search_twice(touch, seq)
     swapped = _swapped_halves(touch, found[0]) if answer else None
@@ -128,7 +128,7 @@ def _search_twice(touch: TouchImages, seq: int) -> tuple[Recognition, list[Verif
 def _confirm(
     touch: TouchImages, answer: Recognition, first: list[VerifiedHypothesis]
 ) -> tuple[Recognition, list[VerifiedHypothesis]]:
-    """Return an answer that chance nearly allows, or a refusal where a wide search says so.
+    """Return an answer that chance nearly allows, or a refusal where a wide search contradicts it.
 
     A soft touch may hold the true place too weakly for a first search, and another one whose pose
     and gain happen to fit.
@@ -145,11 +145,11 @@ def _confirm(
 
 
 def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: int) -> Recognition:
-    """Return the answer of hypotheses, best first, before chance is asked.
+    """Return the answer of hypotheses, best first, before chance is considered.
 
-    A place one pitch off is the same place up to a cell's rounding and says nothing of the margin,
-    but for one case: it explains the image nearly as well. So it does where fewer cells are seen
-    than the array's window takes (large pitches, product arrays), or next to an edge.
+    A place one pitch off is one place up to a cell's rounding and leaves the margin, unless it
+    explains the image nearly as well: where fewer cells are seen than the array's window takes
+    (large pitches, product arrays), or next to an edge.
     """
     if not found:
         return refusal(seq, TOO_FEW)
@@ -176,7 +176,7 @@ def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: i
 def _judge(
     reader: PreparedLab, found: list[VerifiedHypothesis], answer: Recognition
 ) -> Recognition:
-    """Return an answer with its doubt, or as refused: for few symbols, or for chance."""
+    """Return an answer with its doubt, or its refusal for few symbols or for chance."""
     if not answer:
         return answer
     options, best, doubt, margin = reader.options, found[0], None, _margin_of(answer)
@@ -211,10 +211,9 @@ def _doubt_of(reader: PreparedLab, best: VerifiedHypothesis, margin: float) -> f
 
 
 def _swapped_halves(touch: TouchImages, best: VerifiedHypothesis) -> Cause | None:
-    """Return which halves of the sensor seem swapped, as the touch is read better so; or None.
+    """Return which halves of the sensor seem swapped, as the touch then reads better; or None.
 
-    Asked where the answer leaves a large residual; not of a sensor that was learned, whose wiring
-    is known.
+    Tried where the answer leaves a large residual; not for a learned sensor, whose wiring is known.
     """
     reader, signal = touch.reader, touch.signal
     if reader.sensor.overlay.kind != "tab" or signal.state is not None:
@@ -237,9 +236,9 @@ def _swapped_halves(touch: TouchImages, best: VerifiedHypothesis) -> Cause | Non
 def has_residual(found: VerifiedHypothesis) -> bool:
     """Return whether a place leaves much of a touch unexplained, and not because it is soft.
 
-    Tactels are pressed where the face has ended, or its symbols explain the image poorly. Another
-    part may stand there, or symbols may be worn; or one half of the sensor shows the readings of
-    the other (`recognizer.sensor.wiring`), and with the halves swapped all of it lies on one face.
+    Tactels are pressed beyond the face, or its symbols explain the image poorly. Another part may
+    stand there, symbols may be worn, or the halves of the sensor are swapped
+    (`recognizer.sensor.wiring`).
     """
     evidence, image = found.evidence, found.image
     forces = image.forces * image.trust

@@ -1,9 +1,9 @@
 """The answer: which object, which face, where, and how sure; or why not. Thesis 6.3.
 
-Frames: `T_face_probe` takes the sensor frame to the face frame (origin at the face's first
-vertex, x along its first edge, z outward), `T_object_probe` to the object frame; mm.
-Both frames are those of the design. Where it is known how the part was printed (`touch.as_built`)
-they say where the probe stands beside the printed part, whose place is that of its file's middle.
+Frames: `T_face_probe` takes the sensor frame to the face frame (origin at the face's first vertex,
+x along its first edge, z outward), `T_object_probe` to the object frame; mm. Both frames are those
+of the design; on a part whose print is known (`touch.as_built`) poses are those on the printed
+part, whose place is that of its file's middle.
 """
 
 from __future__ import annotations
@@ -63,8 +63,6 @@ class Cause:
     --------
     >>> print(Cause(EDGE, {"loaded": 0.531, "symbols": 4.0}))
     at an edge: 53 % of the sensor is loaded, 4 symbols are read
-    >>> Cause(EDGE, {"loaded": 0.531, "symbols": 4.0}).way_out
-    'move towards the loaded part'
     """
 
     code: str  #: one of this module's
@@ -90,13 +88,7 @@ class RunnerUp:
 
 @dataclass(frozen=True, slots=True)
 class NextTouch:
-    """Where a touch promises most, in the sensor's frame of this one.
-
-    Examples
-    --------
-    >>> print(NextTouch(7.1, -7.1, 0.0, 80.0, "towards the loaded part"))
-    7.1 mm along x, -7.1 mm along y, 80 N (towards the loaded part)
-    """
+    """Where the next touch promises most, in the sensor's frame of this one."""
 
     dx_mm: float  #: step of the sensor's centre
     dy_mm: float
@@ -113,7 +105,7 @@ class NextTouch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recognition:
-    """What one touch, or several, say: true if it is an answer; prints as a line.
+    """The answer of one touch, or several: true if it is one; prints as a line.
 
     Examples
     --------
@@ -201,7 +193,7 @@ class Recognition:
 
     @property
     def reason_code(self) -> str:
-        """What made it fail, for programs: a code of `cause`, else the reason in small letters."""
+        """Why it failed, for programs: a code of `cause`, else the reason in small letters."""
         return self.reason.replace(" ", "_") if self.cause is None else self.cause.code
 
     def as_json(self) -> dict[str, Any]:
@@ -247,19 +239,13 @@ def refusal(
 
 
 def _said(reason: str, cause: Cause) -> str:
-    """Return what people read of a reason and its cause: the cause, and what it led to."""
+    """Return reason and cause in words."""
     told = str(cause)
     return told if reason in (NO_CONTACT, TOO_FEW, NOT_ENCODED) else f"{reason}: {told}"
 
 
 def places_by_chance(doubt: float) -> str:
-    """Return a doubt in words, to one digit.
-
-    Examples
-    --------
-    >>> places_by_chance(0.0312), places_by_chance(4e-06)
-    ('0.03 places', '4e-06 places')
-    """
+    """Return a doubt in words, to one digit."""
     return f"{doubt:.1g} places"
 
 

@@ -1,12 +1,11 @@
-"""What a touch says and where arm and wrist hold the sensor -> the object in the robot's base.
+"""Answer of a touch, and where arm and wrist hold the sensor -> the object in the robot's base.
 
     T_robot_object = T_robot_probe T_object_probe^-1                         Thesis 4.1, 6.3
 
-The recognizer tells three of the six freedoms, x, y and the turn on the face. The other three are
-told by contact: the tips are pressed into the symbols and the sensor lies flat, as well as
-`Seating` says. Covariances are (6, 6) of (x, y, z, rx, ry, rz), displacement of the origin (mm) and
-small turn about it (rad), both in base axes: T_true = [exp(r) R | p + (x, y, z)]. `fuse_poses`
-makes one of several, and says whether the object was moved between touches.
+The recognizer gives three of the six freedoms, x, y and the turn on the face; contact gives the
+others: the tips are pressed into the symbols and the sensor lies flat, within `Seating`.
+Covariances are (6, 6) of (x, y, z, rx, ry, rz), displacement of the origin (mm) and small turn
+about it (rad), in base axes: T_true = [exp(r) R | p + (x, y, z)].
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ class Seating:
         return self.pressed_mm + self.pressed_border_mm * self.beyond(inside_mm)
 
     def spread_rad(self, inside_mm: float | None) -> float:
-        """Return by how much it tilts, each way."""
+        """Return the standard deviation of its tilt, each way."""
         return self.tilt_rad + (self.tilt_border_rad - self.tilt_rad) * self.beyond(inside_mm)
 
 
@@ -84,16 +83,8 @@ def carried_pose(
 ) -> SensorPose:
     """Return where arm and wrist hold the sensor.
 
-    Parameters
-    ----------
-    arm, wrist
-        Their geometry.
-    joints_rad
-        (5,) joint angles, rad.
-    joint_covariance
-        (5,) standard deviations, rad; or (5, 5), rad^2.
-    counts
-        (4,) readings of the wrist's transducers.
+    `joints_rad` (5,); `joint_covariance` (5,) standard deviations, rad, or (5, 5), rad^2; `counts`
+    (4,) readings of the wrist's transducers.
 
     Raises
     ------
@@ -109,20 +100,11 @@ def object_pose(
 ) -> ObjectPose | None:
     """Return the recognised object in the robot's base; None where nothing was recognised.
 
-    Parameters
-    ----------
-    recognition
-        Of a touch.
-    sensor
-        Where the sensor was during it.
-    seating
-        How well it lay on the face.
+    `sensor` is where the sensor was during the touch.
 
-    Notes
-    -----
-    With a = p_object - p_sensor and R from the face to the base, errors d and r of the sensor and
-    e and s of the touch (face axes) move the object by d - R e + (r - R s) x a and turn it by
-    r - R s.
+    With a = p_object - p_sensor and R from the face to the base, errors d and r of the sensor and e
+    and s of the touch (face axes) move the object by d - R e + (r - R s) x a and turn it by r - R
+    s.
     """
     T_face_probe, T_object_probe = recognition.T_face_probe, recognition.T_object_probe
     if T_face_probe is None or T_object_probe is None or recognition.covariance is None:
@@ -157,7 +139,7 @@ def _inverse(T: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FusedPose:
-    """Where the object is by several touches, and whether they agree."""
+    """The object's pose by several touches, and whether they agree."""
 
     pose: ObjectPose
     chi2: float  #: squared disagreement over the covariances
@@ -167,16 +149,12 @@ class FusedPose:
 
 
 def fuse_poses(poses: Sequence[ObjectPose]) -> FusedPose:
-    """Return one pose of an object from those that single touches of a face told.
+    """Return one pose of an object from those by single touches of a face.
 
-    Errors of joints, wrist and symbols are drawn anew at every touch and average out. How deep the
-    sensor sinks in (`ObjectPose.shared`) is the same each time, and stays.
-
-    Parameters
-    ----------
-    poses
-        One or more of one object, in one base frame, as `object_pose` gives them, in the order of
-        their time. All are fused, whether or not it was moved in between.
+    Errors of joints, wrist and symbols are independent from touch to touch and average out; how
+    deep the sensor sinks in (`ObjectPose.shared`) does not. `poses` are one or more, in one base
+    frame, in the order of their time; all are fused, whether or not the object was moved in
+    between.
     """
     told = np.stack([pose.T_robot_object for pose in poses])
     own = [pose.covariance - pose.shared for pose in poses]
@@ -197,8 +175,8 @@ def fuse_poses(poses: Sequence[ObjectPose]) -> FusedPose:
 def _last_move(offs: Array, weights: Array) -> tuple[int, bool]:
     """Return where to part poses (n, 6) so that both parts differ most; and whether they do.
 
-    Both parts are means of their own; their difference has six freedoms, and one of n - 1 places
-    to part was chosen.
+    Both parts are means of their own; their difference has six freedoms, and one of n - 1 places to
+    part was chosen.
     """
     from scipy.special import gammaincinv
 
@@ -217,7 +195,7 @@ def _last_move(offs: Array, weights: Array) -> tuple[int, bool]:
 
 
 def _differences(T_to: Array, T_from: Array) -> Array:
-    """Return (n, 6) what displaces and turns one pose into each of others (n, 4, 4), base axes."""
+    """Return (n, 6) displacements and turns from one pose to others (n, 4, 4), base axes."""
     from scipy.spatial.transform import Rotation
 
     turns = Rotation.from_matrix(T_to[:, :3, :3] @ T_from[:3, :3].T).as_rotvec()

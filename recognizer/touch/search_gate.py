@@ -1,19 +1,18 @@
 """Which touches are searched for widely, after a first search. Thesis 6.3.
 
-A wide search costs seven times the first. It can hardly change the answer where the first one is
-sure; where symbols explain the image and are so few that they stand elsewhere as well; where fewer
-tactels are pressed than the symbols would press that it takes to name a place; where hardly a
-symbol agrees with the best place, or no strokes show; where the image speaks for symbols of no
-registered place; and where symbols of a place are there beyond doubt and most of the image is
-something else.
+A wide search costs seven times the first. It hardly changes the answer where the first one is sure;
+where symbols explain the image and are so few that they stand elsewhere as well; where fewer
+tactels are pressed than symbols that name a place would press; where hardly a symbol agrees with
+the best place, or no strokes show; where the image shows symbols of no registered place; and where
+symbols of a place are beyond doubt and most of the image is something else.
 
 Strokes show where weak readings lie within a pitch of the strongest ones: next to a stroke the
-sensor hangs over the bare face. A blank plate presses evenly; so may symbols that stand along the
-tactels' rows and are pressed hard, so nothing is refused for it before a search.
+sensor hangs over the bare face. A blank plate presses evenly; but so may symbols along the tactels'
+rows that are pressed hard, so this alone refuses nothing.
 
 Chosen on 2,326 touches of forty and of forty small objects, most of them at edges and corners, worn
 or soft (own engine, seeds 1001 and 1002, MuJoCo, 1003). Of 274 answers by few symbols that chance
-allows none was wrong, and a wide search would refuse 15 of them. It is asked 303 times of 921 where
+allows none was wrong, and a wide search would refuse 15 of them. It is made 303 times of 921 where
 no such answer is, and makes 42 touches right of the 50 that it can.
 """
 
@@ -61,12 +60,8 @@ def may_find_more(
 ) -> bool:
     """Return whether a wide search may change the answer of a first one.
 
-    Parameters
-    ----------
-    answer, judged
-        Of the first search, before and after few symbols and chance were judged.
-    best
-        The place of the answer; None: there was none.
+    `answer` and `judged` are those of the first search, before and after few symbols and chance
+    were judged; `best` is the place of the answer.
     """
     if best is None:
         return True
@@ -122,7 +117,7 @@ def pressed_tactels(signal: Signal) -> int:
 
 
 def _is_nearly_sure(judged: Recognition) -> bool:
-    """Return whether little is missing to the answer that few symbols give."""
+    """Return whether the answer of few symbols misses its limit by little."""
     if judged.reason == BY_CHANCE:
         return judged.doubt is not None and judged.doubt <= DOUBT
     if judged.reason == AMBIGUOUS:
@@ -131,7 +126,7 @@ def _is_nearly_sure(judged: Recognition) -> bool:
 
 
 def _is_unexplained(reader: PreparedLab, signal: Signal, evidence: Evidence) -> bool:
-    """Return whether symbols are pressed that are those of a place, or may be under another fit."""
+    """Return whether the image shows symbols of a place, perhaps under another fit."""
     if evidence.inliers < AGREED or evidence.log_likelihood_ratio < RATIO:
         return False
     if not shows_strokes(reader, signal):

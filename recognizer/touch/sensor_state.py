@@ -1,9 +1,9 @@
 """What is known of one sensor beyond its type: a value that the reader takes.
 
-A sensor type says what all its copies share; no copy is like it. Which tactels never answer, which
-read high with nothing on them, how strongly each answers, where its tip stands, and whether the
-rows float while another one is read: touches tell all of it (`recognizer.sensor`), and it stays the
-same from touch to touch. Arrays are (rows, columns), sensor frame, mm. Thesis 4.2.
+No copy is like its type: some tactels never answer, some read high with nothing on them, gains and
+the places of tips differ, rows may float while another one is read. Touches show all of it
+(`recognizer.sensor`), and it stays from touch to touch. Arrays are (rows, columns), sensor frame,
+mm. Thesis 4.2.
 """
 
 from __future__ import annotations
@@ -45,14 +45,7 @@ FLOATING = InversionSettings()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorState:
-    """What touches told of one sensor. Arrays are copied in, and read-only.
-
-    Examples
-    --------
-    >>> state = unknown_state(SensorType())
-    >>> state.dead.any(), state.gain[0, 0], state.touches
-    (np.False_, np.float64(1.0), 0)
-    """
+    """What was learned of one sensor. Arrays are copied in, and read-only."""
 
     sensor: str  #: name of the sensor, or of its type
     touches: int  #: that it rests on
@@ -92,14 +85,14 @@ class SensorState:
 
     @property
     def masked(self) -> Flags:
-        """(rows, columns) tactels that tell nothing of a touch."""
+        """(rows, columns) tactels without information about a touch."""
         return self.dead | self.hot
 
     def correct(self, readings: Array, *, newtons: bool) -> Array:
         """Return readings (rows, columns) with the network inverted and offsets taken off.
 
-        Gains and offsets were learned in one unit and hold in that one alone; a calibration in
-        newtons has undone the network itself.
+        Gains and offsets hold only in the unit in which they were learned; a calibration in newtons
+        has undone the network itself.
         """
         if newtons != self.newtons:
             return readings
@@ -107,12 +100,12 @@ class SensorState:
         return np.asarray(inverted - self.offset)
 
     def level(self, forces: Array, *, newtons: bool) -> Array:
-        """Return forces (rows, columns) over the background as tactels of equal gain feel them."""
+        """Return forces (rows, columns) as tactels of equal gain would read them."""
         return np.asarray(forces / self.gain) if newtons == self.newtons else forces
 
 
 def unknown_state(sensor: SensorType, *, newtons: bool = False, name: str = "") -> SensorState:
-    """Return what is known of a sensor that nobody has touched anything with."""
+    """Return the state of a sensor without any touch."""
     shape = (sensor.rows, sensor.columns)
     none, one = np.zeros(shape), np.ones(shape)
     aside = np.zeros((*shape, 2))
@@ -124,12 +117,12 @@ def unknown_state(sensor: SensorType, *, newtons: bool = False, name: str = "") 
 
 
 def invert_floating(readings: Array) -> Array:
-    """Return what tactels would read if all other rows were held, (rows, columns), 0 or more.
+    """Return (rows, columns) readings if all other rows were held, 0 or more.
 
     Figure 4.5 of the thesis, uncalibrated: a reading is taken as one over the resistance between
-    its row and column, as it is while the load of the column is small beside that. Neither the
-    supply nor the background matters (`docs/recognizer.md`). Readings that no network can give
-    are returned as they are.
+    its row and column, as it is while the load of the column is small. Neither the supply nor the
+    background matters (`docs/recognizer.md`). Readings that no network can give come back as they
+    are.
     """
     from probe.circuit.network import solve_floating
 

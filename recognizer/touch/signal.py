@@ -1,8 +1,7 @@
-"""Frame -> forces that can be fitted, and how far each tactel is trusted. Thesis 4.3.
+"""Frame -> forces that can be fitted, and the trust of each tactel. Thesis 4.3.
 
-With a calibration: newtons, and bad tactels are masked. Without: counts over the lowest
-reading, as any roughly proportional response. Tactels that stand alone above all their
-neighbours (spikes) and dead rows or columns are told from the image itself.
+With a calibration: newtons, and bad tactels are masked. Without: counts over the lowest reading, as
+any roughly proportional response. Dead rows and columns are found in the image itself.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ STRONGEST = 12  #: tactels whose mean says how hard is pressed
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signal:
-    """What of a frame is worth fitting."""
+    """The part of a frame that is worth fitting."""
 
     forces: Array  #: (rows, columns) newtons, or counts over the background
     trust: Array  #: (rows, columns) 0 ... 1
@@ -60,25 +59,14 @@ def signal_of(
     sensor: SensorType | None = None,
     options: ReaderOptions = DEFAULTS,
 ) -> Signal:
-    """Return the signal of one image.
+    """Return the signal of one image, `readings` (rows, columns) in newtons or counts.
 
-    Parameters
-    ----------
-    readings
-        (rows, columns) newtons or counts.
-    trust
-        (rows, columns) of a calibration: 0 for bad tactels; 1 everywhere if not given.
-    floor
-        Reading without force; by default that of the lowest tactels.
-    newtons
-        Whether the readings are newtons.
-    sensor
-        Type of the sensor: where it has tactels, its bits, noise and law; as of `fsr-16` if not
-        given.
-    options
-        How far the strongest tactels must rise for a contact. Readings that are no whole numbers
-        are counts averaged, or on a scale of their own (0 ... 1): a rise out of their own noise is
-        a contact too.
+    `trust` (rows, columns) is 0 for bad tactels of a calibration; `sensor` is `fsr-16` if not
+    given.
+
+    `options` say how far the strongest tactels must rise for a contact. Readings that are no whole
+    numbers are counts averaged, or on a scale of their own (0 ... 1): a rise out of their own noise
+    is a contact too.
     """
     known = np.ones(readings.shape) if trust is None else trust.astype(np.float64)
     if sensor is not None and sensor.missing:
@@ -105,13 +93,10 @@ def signal_of(
 def noise_of(readings: Array) -> float:
     """Return the standard deviation of readings (n,) of tactels that nothing presses.
 
-    Those are the ones about the densest readings (the mode of half samples, begun with a quarter:
-    symbols may press most of the tactels); what lies below it is noise alone. At least what
-    rounding leaves: to whole numbers, or to the smallest step between two readings.
-
-    References
-    ----------
-    T. Robertson and J. D. Cryer, an iterative procedure for estimating the mode.
+    Those lie about the densest readings (the mode of half samples, begun with a quarter, as symbols
+    may press most tactels: T. Robertson and J. D. Cryer, an iterative procedure for estimating the
+    mode); below it is noise alone. At least the deviation of rounding, to whole numbers or to the
+    smallest step between two readings.
     """
     whole = found = np.sort(readings)
     share = 4
@@ -130,13 +115,7 @@ def noise_of(readings: Array) -> float:
 
 
 def contact_counts(sensor: SensorType | None, options: ReaderOptions = DEFAULTS) -> float:
-    """Return the rise of a contact on a type: as much of its full scale, or of its noise.
-
-    Examples
-    --------
-    >>> contact_counts(SensorType()) == ReaderOptions().contact_counts
-    True
-    """
+    """Return the rise of a contact on a type: as much of its full scale, or of its noise."""
     if sensor is None:
         return options.contact_counts
     share = sensor.full / SensorType().full
@@ -145,16 +124,10 @@ def contact_counts(sensor: SensorType | None, options: ReaderOptions = DEFAULTS)
 
 
 def _background(readings: Array, low: float) -> float:
-    """Return the mean of most of the lowest readings: of tactels that feel nothing, if some do.
+    """Return the mean of most of the lowest readings (n,): of unloaded tactels, if there are some.
 
-    Where most tactels are pressed alike, readings that are low and rare are believed.
-
-    Parameters
-    ----------
-    readings
-        (n,) rising.
-    low
-        A few readings lie below it.
+    Where most tactels are pressed alike, readings that are low and rare are believed: a few lie
+    below `low`.
     """
     lowest = readings[: max(math.ceil(LOWEST * readings.size), 2)]
     count = math.ceil(DENSEST * (lowest.size - 1))
@@ -186,22 +159,11 @@ def _live_mask(forces: Array, known: Array) -> Array:
 
 
 def combine_around(image: NDArray[Kind], reach: int, combine: np.ufunc) -> NDArray[Kind]:
-    """Return the maximum (`np.maximum`), any or all of the values about each tactel.
+    """Return a combination of the values about each tactel (rows, columns), as `np.maximum`.
 
     The square of 2 `reach` + 1 tactels is gone through line by line, first along columns and then
-    along rows; beyond the rim of the matrix nothing counts.
-
-    Parameters
-    ----------
-    image
-        (rows, columns).
-    combine
-        Of two values; of which it does not matter in what order they come, nor how often.
-
-    Examples
-    --------
-    >>> combine_around(np.array([[0.0, 3.0, 1.0, 1.0]]), 1, np.maximum)
-    array([[3., 3., 3., 1.]])
+    along rows; beyond the rim of the matrix nothing counts. `combine` must not depend on order or
+    repetition.
     """
     found: Any = image
     for axis in (0, 1):
@@ -215,13 +177,7 @@ def combine_around(image: NDArray[Kind], reach: int, combine: np.ufunc) -> NDArr
 
 
 def quantile(ordered: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-    """Return the quantile of values that rise along the last axis, as `numpy.quantile` has it.
-
-    Examples
-    --------
-    >>> float(quantile(np.array([0.0, 1.0, 5.0]), 0.75))
-    3.0
-    """
+    """Return the quantile of values that rise along the last axis, as `numpy.quantile` does."""
     at = (ordered.shape[-1] - 1) * share
     low = min(int(at), ordered.shape[-1] - 1)
     one, other = ordered[..., low], ordered[..., min(low + 1, ordered.shape[-1] - 1)]
@@ -231,7 +187,7 @@ def quantile(ordered: NDArray[np.float64], share: float) -> NDArray[np.float64]:
 
 
 def mean_of_strongest(forces: NDArray[np.float64], count: int = STRONGEST) -> float:
-    """Return the mean of so many of the highest readings."""
+    """Return the mean of the `STRONGEST` highest readings."""
     return float(np.sort(forces, axis=None)[-count:].mean())
 
 

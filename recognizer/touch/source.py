@@ -1,15 +1,13 @@
 """A recording or a port -> touches, each one image, with sensor and calibration. Thesis 4.2, 6.1.
 
-The sensor is the one that is asked for, else that of the recording, else the usual one; so is the
-overlay. A calibration that a recording names by its hash is looked for in its folder; without one
-counts are read as they are.
+The sensor is the one asked for, else that of the recording, else the usual one; the overlay too. A
+calibration that a recording names by its hash is looked for in its folder; without one, counts are
+read as they are.
 
-A contact lasts from the frame in which readings rise over the background to the one in which
-they are down again. Its touches are told apart by the images: while they are alike it
-is one touch, which is read once its force is steady, as the mean over the steady frames. The
-way down to a steady touch and the way up again are therefore not read. Where nothing in a
-contact is steady (a tap, or a file of images that do not follow each other in time) every
-image that is unlike the one before is a touch of its own.
+A contact lasts from the frame in which readings rise over the background to the one in which they
+are down again. Images that are alike are one touch; it is read once its force is steady, as the
+mean over the steady frames, not on the way down or up. Where nothing in a contact is steady (a tap,
+or a file of unrelated images) every image that is unlike the one before is a touch of its own.
 """
 
 from __future__ import annotations
@@ -46,7 +44,7 @@ LARGEST = 4 << 20  #: bytes of a file that may be a calibration
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TouchImage:
-    """One image to be read, and where it is from."""
+    """One image to be read, and its origin."""
 
     seq: int  #: number of the touch's first frame
     t_ns: int  #: time of the first frame that was averaged
@@ -88,26 +86,26 @@ def source_of(
     calibration: Path | None = None,
     every: bool = False,
 ) -> TouchSource:
-    """Return what a recording holds.
+    """Return the touches, sensor and calibration of a recording.
 
     Parameters
     ----------
     sensor
-        Type, its name or file, that is taken to have felt it; None: the one that it tells. The
-        overlay is the recording's where it tells another.
+        Type, its name or file; None: the recording's. The overlay is the recording's where it names
+        another.
     overlay
-        `tab` or `pad`, whatever the recording tells; empty: as it tells.
+        `tab` or `pad`, whatever the recording names; empty: the recording's.
     calibration
-        The sensor's; None: the one that the recording names, if it stands beside it.
+        Of the sensor; None: the one that the recording names, if it lies in its folder.
     every
         Every frame is a touch.
 
     Raises
     ------
     RecordingError
-        It says what makes no sense.
+        Its attributes make no sense.
     SensorTypeError
-        No such type, one of another shape, or nothing tells.
+        No such type, one of another shape, or none is named.
     CalibrationError
         The calibration is none, or another one than the recording names.
     """
@@ -126,7 +124,7 @@ def source_of(
 
 
 def _frames_per_touch(origin: RecordingOrigin, path: Path) -> int:
-    """Return how many frames follow each other at one place; 0 if the recording does not tell."""
+    """Return how many frames follow each other at one place; 0 if the recording does not say."""
     told: Any = origin.more.get("frames_per_touch", 0)
     if not isinstance(told, int) or told < 0:
         raise RecordingError(
@@ -140,7 +138,7 @@ def _frames_per_touch(origin: RecordingOrigin, path: Path) -> int:
 def _calibration_for(
     origin: RecordingOrigin, given: Path | None, folder: Path
 ) -> tuple[Calibration | None, str]:
-    """Return the calibration of a recording, the one given or the one it names, and a notice."""
+    """Return the calibration given, or the one that a recording names, and a notice."""
     named = origin.calibration
     if given is None:
         return _calibration_in(folder, named) if named else (None, "")
@@ -193,18 +191,10 @@ def cut_touches(
     trust: Array | None = None,
     sensor: SensorType | None = None,
 ) -> Iterator[TouchImage]:
-    """Yield the touches of a film, each as soon as it is told.
+    """Yield the touches of a film, each as soon as it is complete.
 
-    Parameters
-    ----------
-    frames
-        One after another as the sensor gave them.
-    options
-        When something is touched.
-    trust
-        (rows, columns) 0 for bad tactels of a calibration.
-    sensor
-        Type of the sensor; as `fsr-16` if not given.
+    `trust` (rows, columns) is 0 for bad tactels of a calibration; `sensor` is `fsr-16` if not
+    given.
     """
     contact = _Contact()
     for frame in frames:
@@ -230,7 +220,7 @@ class _ContactFrame:
 
 @dataclass(slots=True)
 class _Contact:
-    """What is known of the contact that lasts."""
+    """The contact that lasts."""
 
     steady: bool = False  # whether a steady touch was found in it
     fragments: list[TouchImage] = field(default_factory=list)
@@ -241,7 +231,7 @@ class _Contact:
     best: list[_ContactFrame] = field(default_factory=list)  # longest group of what is alike
 
     def take(self, felt: _ContactFrame) -> Iterator[TouchImage]:
-        """Add a frame; yield what is told by it."""
+        """Add a frame; yield the touches that it completes."""
         if self.last is None or _correlation(self.last, felt.image) < ALIKE:
             yield from self._closed()
             self.first = felt.frame.seq
@@ -255,14 +245,14 @@ class _Contact:
             self.group = []
 
     def end(self) -> Iterator[TouchImage]:
-        """Yield what is left when the contact ends."""
+        """Yield the rest when the contact ends."""
         yield from self._closed()
         if not self.steady:
             yield from self.fragments
         self.fragments = []
 
     def _closed(self) -> Iterator[TouchImage]:
-        """End what is alike; where it was not read, read the longest rest in it."""
+        """End a run of alike images; where it was not read, read the longest rest in it."""
         self._keep_best()
         if self.read is None and len(self.best) >= FEW:
             yield from self._steady(self.best)
@@ -282,7 +272,7 @@ class _Contact:
             self.read, self.steady, self.fragments = image, True, []
 
     def _rests(self, felt: _ContactFrame) -> bool:
-        """Tell whether a frame has force and image of the group."""
+        """Return whether a frame has force and image of the group."""
         if not self.group:
             return True
         first = self.group[0]

@@ -1,8 +1,7 @@
-"""A tactile image: samples of what is felt, of one touch or of a mosaic. Thesis 4.3.
+"""A tactile image: samples of one touch or of a mosaic, on a square grid. Thesis 4.3.
 
-Samples stand on a square grid in an image frame (x right along columns, y up against rows, mm).
-For one touch the image frame is the sensor frame; for a mosaic it is the mosaic's. Undefined
-samples (bad tactels, places that no touch has reached) stay out of every filter.
+Image frame: x right along columns, y up against rows, mm; for one touch the sensor frame, for a
+mosaic its own. Undefined samples (bad tactels, places without a touch) stay out of every filter.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ class ImageError(RecognizerError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TactileImage:
-    """Samples of what is felt, of one touch or of a mosaic (the thesis's TPI and GTI)."""
+    """Samples of one touch or of a mosaic (the thesis's TPI and GTI)."""
 
     values: Array  #: (h, w) newtons, counts, or anything proportional; 0 where undefined
     defined: Mask  #: (h, w)
@@ -46,18 +45,9 @@ def tactile_image(
     defined: ArrayLike | None = None,
     corner_mm: tuple[float, float] | None = None,
 ) -> TactileImage:
-    """Return an image, checked.
+    """Return an image, checked; without a corner its middle is the origin.
 
-    Parameters
-    ----------
-    values
-        (h, w), finite wherever it is defined.
-    step_mm
-        From sample to sample: the tactel's pitch, or a quarter of it for a mosaic.
-    defined
-        (h, w), true where something is known; everywhere if not given.
-    corner_mm
-        Place of the upper left sample; by default the image's middle is the origin.
+    `values` (h, w) must be finite where `defined`, which is everywhere if not given.
 
     Raises
     ------
@@ -97,7 +87,7 @@ def touch_image(
     Raises
     ------
     ImageError
-        Rows that stand farther apart than columns: samples of an image are as far apart both ways.
+        Rows stand farther apart than columns.
     """
     if sensor.row_pitch_mm:
         raise ImageError(

@@ -3,15 +3,14 @@
 Evidence (nats, counts of cells) and expected false matches -> a reason of `recognition`; "" accepts
 the place. One touch (`recognise`) and a scan (`recognizer.scan`) are judged alike:
 
-1. `reject_reason` where the place explains the touch no better than symbols of no registered place
-   do, where cells contradict it, where too few cells agree, or where another place comes near.
+1. `reject_reason` where symbols of no registered place explain the touch as well, where cells
+   contradict the place, where too few cells agree, or where another place comes near.
 2. `reject_few` where few cells agree: they have to name one place of the whole database, and leave
    other places farther behind. Bare cells then weigh as much as symbols, and a cell is bare beyond
    an edge, between two edges, or where its symbol is worn.
-3. `reject_chance` where a surface of another lab would match a registered place as well
-   (`chance`).
+3. `reject_chance` where a surface of another lab would match a registered place as well (`chance`).
 
-Log-likelihoods in nats; natural units of evidence: 10 nats are odds of 22,000.
+Log-likelihoods in nats; 10 nats are odds of 22,000.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ WORN_WITH_BORDER = 1  #: symbols in view and not felt, with more of which border
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What speaks for a place, and against it."""
+    """Evidence for a place, and against it."""
 
     log_likelihood_ratio: float  #: nats over symbols of no registered place
     inliers: int  #: cells in view whose registered symbol is read
@@ -68,14 +67,8 @@ def reject_reason(
 ) -> str:
     """Return why a place is no answer; "" where nothing speaks against it.
 
-    Parameters
-    ----------
-    margin
-        Nats over the best other place.
-    least_ratio
-        Nats over symbols of no registered place, where more than usual are asked for.
-    wrong_share
-        Of the agreeing cells: so many may contradict the place where that is more than usual.
+    `margin` is nats over the best other place, `least_ratio` over symbols of no registered place;
+    `wrong_share` of the agreeing cells may contradict the place where that is more than usual.
     """
     if evidence.best_ratio < least_ratio:
         return TOO_FEW
@@ -108,10 +101,7 @@ def least_explained(cells: int) -> float:
 def reject_few(evidence: Evidence, margin: float, matches: float, options: ReaderOptions) -> str:
     """Return why a place of few agreeing cells is no answer; "" where they are many or enough.
 
-    Parameters
-    ----------
-    matches
-        Registered places that random symbols match as well, whatever their borders.
+    `matches` are the registered places that random symbols match as well, whatever their borders.
     """
     if evidence.inliers >= MANY_INLIERS:
         return ""
@@ -128,8 +118,8 @@ def reject_chance(doubt: float, most: float) -> str:
 def may_count_border(evidence: Evidence, margin: float, options: ReaderOptions) -> bool:
     """Return whether a place lacks nothing but symbols, so that its border may count for it.
 
-    Where symbols of it are not felt, or read as others, the face may be another one, whose border
-    lies elsewhere, and the plate lifts off where that of the place is taken to be.
+    Where symbols of it are worn or read as others, the face may be another one, whose border lies
+    elsewhere.
     """
     return (
         evidence.worn <= WORN_WITH_BORDER

@@ -1,13 +1,13 @@
-"""Image -> the places that it can be, each with the registered symbols fitted to it. Thesis 6.3.
+"""Image -> its possible places, each with the registered symbols fitted to it. Thesis 6.3.
 
-A place that the symbols read so far allow is fitted again with all symbols that the database says
-are in view, then its rivals under that fit, wherever in the database they are.
+A place that the symbols allow is fitted again with all registered symbols in view, then its rivals
+under that fit, wherever in the database they are.
 
 A plate touches a round face along a line, and the face falls away to both sides. Three things
 differ from a flat face: the depth of the plate (`image.bend_image`), the point of the unrolled
 plane under a tactel, and that the place decides the curvature. The image shows roughly along which
 line and under which radius it lies (`symbols.curvature`); symbols are read under that, and each
-place that they can be is verified under the curvature that the face has there.
+place is verified under the curvature that the face has there.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ SAME_FACTOR = 1.1
 
 @dataclass(frozen=True, eq=False)
 class ArrayImage:
-    """One touch against one array of the lab; coarse searches and first fits serve all stages."""
+    """One touch against one array; coarse searches and first fits serve all stages."""
 
     reader: PreparedLab
     prepared: Prepared
@@ -80,7 +80,7 @@ class ArrayImage:
 
     @cached_property
     def searches(self) -> tuple[CoarseSearch, ...]:
-        """Coarse searches of it."""
+        """Its coarse searches."""
         return search_image(self.image, self.prepared.bank)
 
     @cached_property
@@ -99,7 +99,7 @@ class ArrayImage:
 
     @cached_property
     def curvatures(self) -> list[BendGuess]:
-        """Curvatures that the touch may have, likeliest first."""
+        """Possible curvatures of the touch, likeliest first."""
         embossed = self.prepared.embossed
         return guess_bends(self.image, self.reader.sensor, embossed.radii_mm, THOROUGH_BENDS)
 
@@ -122,7 +122,7 @@ class TouchImages:
 
     @cached_property
     def arrays(self) -> tuple[ArrayImage, ...]:
-        """Of each array."""
+        """One image for each array."""
         return tuple(
             ArrayImage(self.reader, prepared, self.signal) for prepared in self.reader.prepared
         )
@@ -141,7 +141,7 @@ def verify_hypotheses(touch: TouchImages, effort: Effort) -> list[VerifiedHypoth
 def _verify_on_flat_faces(
     image: Image, embossed: EmbossedArray, fits: tuple[Fit, ...]
 ) -> list[VerifiedHypothesis]:
-    """Return the likeliest places, best first, fitted to what the database holds there."""
+    """Return the likeliest places, best first, fitted to the registered symbols."""
     candidates = _on_flat_faces(embossed, find_hypotheses(embossed, fits))
     candidates = candidates[:KEPT]
     if not candidates:
@@ -301,7 +301,7 @@ def _verify_under_curvature(
 
 
 def _under_best_fit(one: VerifiedHypothesis, found: list[VerifiedHypothesis]) -> VerifiedHypothesis:
-    """Return a place under the best of the fits that began where its own did, and curve alike.
+    """Return a place under the best of the fits that began where its own did, with its curvature.
 
     A fit that misses gain and sharpness does not speak against the symbols.
     """

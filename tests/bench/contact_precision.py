@@ -12,9 +12,8 @@ the norm of the reference, root mean square over the places. References:
                              layer gives what it would carry out there, are left out
           strip, patch, tilt layer with 24 cells to a tactel and 64 points to a cell
 
-Elements are measured on washer and sphere alone: the others' reference is no judge of them.
 Times are CPU times with the surface, on one thread: the least of the repetitions of a touch, the
-median over the touches; what a level makes once (influence functions, the condensed pad) is made
+median over the touches; what a level makes once (influence functions) is made
 before. A level that was not measured on every indenter,
 or refuses one, is left out of what `press` picks from by itself.
 """
@@ -31,6 +30,7 @@ from pathlib import Path
 import numpy as np
 from reference.elements_axisymmetric import section
 from reference.elements_round import indented, washer_pad
+from reference.indenters import sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
@@ -40,7 +40,7 @@ from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
 from probe.surface.face import endless_face
-from probe.surface.indenters import RaisedStrip, Sphere, TiltedPlane, Washer
+from probe.surface.indenters import RaisedStrip, TiltedPlane, Washer
 
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "probe" / "contact" / "precision.json"
@@ -66,7 +66,7 @@ def cases(rng):
     return {
         "washer": (Washer(), 80.0, 80.0, STIFF),
         "strip": (RaisedStrip(2.0), 40.0, 40.0, STIFF),
-        "sphere": (Sphere(BALL_MM), 40.0, 40.0, STIFF),
+        "sphere": (sphere(BALL_MM), 40.0, 40.0, STIFF),
         "patch": (endless_face(labels, GLYPHS), 80.0, 80.0, STIFF),
         "tilt": (TiltedPlane(0.02, 0.01), 60.0, 60.0, WristStiffness()),
     }
@@ -114,8 +114,6 @@ def measured(kind, case, surface, sensor, touches, repeat):
     kept = np.s_[1:-1, 1:-1] if round_pad else np.s_[:, :]
     found = {}
     for level in LEVELS[kind]:
-        if level == "elements" and not round_pad:
-            continue
         try:
             found[level] = [press(surface, sensor, t, accuracy=level).forces_n for t in touches]
         except ContactError as refused:
@@ -159,13 +157,8 @@ def draw(known, path):
         lines = [p for p in known["cases"] if p["overlay"] == kind and p["error"]]
         for number, case in enumerate(dict.fromkeys(line["case"] for line in lines)):
             here = [p for p in lines if p["case"] == case]
-            for alone, style in ((False, "o-"), (True, "s")):
-                part = [p for p in here if (p["level"] == "elements") is alone]
-                panel.loglog([p["ms"] for p in part], [p["error"] for p in part], style, ms=4,
-                             lw=1, color=f"C{number}", label=None if alone else case)  # fmt: skip
-                for p in part if alone else ():
-                    panel.annotate("elements", (p["ms"], p["error"]), fontsize=8, ha="center",
-                                   xytext=(0, 6), textcoords="offset points")  # fmt: skip
+            panel.loglog([p["ms"] for p in here], [p["error"] for p in here], "o-", ms=4, lw=1,
+                         color=f"C{number}", label=case)  # fmt: skip
         worst = known["levels"][kind]
         panel.loglog([p["ms"] for p in worst], [p["error"] for p in worst], "k--", lw=1.5,
                      marker="D", ms=5, label="worst error, median time")  # fmt: skip

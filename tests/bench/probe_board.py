@@ -12,7 +12,9 @@ says `wiring: floating`, of grounded ones by the equations of the board, as a ca
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -20,13 +22,15 @@ from encoded_objects.base.sensor_type import SensorType
 from probe.circuit import QUIET, Electronics, conductances, fsr_of, invert_readings
 from probe.client.client import Client
 from probe.contact.press import press
-from probe.firmware.emulator import EmulatedProbe, emulated_probe
 from probe.port import open_port
 from probe.protocol import Command, Damage, FramePacket, Splitter, decode
 from probe.simulate.registered import registered_surface
 from probe.simulate.touch import TouchRanges, random_touches
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from reference.emulated_probe import EmulatedProbe, emulated_probe
 
 WIRINGS = ("grounded", "floating", "virtual")
 LOADS_OHM = {"grounded": 1000.0, "floating": 2200.0, "virtual": 330.0}
@@ -109,7 +113,7 @@ def print_answers(database: str, touches: int, seed: int) -> None:
                     g, _ = conductances(fsr_of(usual.rows, usual.columns), forces)
                     shown = probe.show_conductances(g)
                     for frame in client.frames(timeout_s=10):
-                        if probe.felt(frame.seq) == shown:
+                        if probe.seen(frame.seq) == shown:
                             images.append((touch, frame.counts))
                             break
         board = Electronics(

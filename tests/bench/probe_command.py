@@ -24,7 +24,8 @@ from pathlib import Path
 
 import numpy as np
 
-from probe.firmware.emulator import emulated_probe
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from reference.emulated_probe import emulated_probe
 
 COMMAND = (sys.executable, "-c", "from probe.command import main; main()")
 SHORT_S = 4.0

@@ -35,13 +35,13 @@ from probe.simulate.registered import registered_surface
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
 from recognizer.scan.mosaic.planar import relative_pose, transform_points
-from recognizer.thesis.edge_fit import outline
-from recognizer.thesis.edges import classical_edges
+from recognizer.thesis.edge_fit import face_edges
+from recognizer.thesis.edges import classical_edges, vertices
 from recognizer.thesis.filters import median, subtract_bias
 from recognizer.thesis.grid import grid
 from recognizer.thesis.merge import merge_touches
 from recognizer.thesis.read import read_classically
-from recognizer.thesis.scan import read_while_scanning, spatial_pose
+from recognizer.thesis.scan import read_scan, spatial_pose
 from recognizer.thesis.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.tactile_image import touch_image
@@ -135,13 +135,13 @@ def bench_edges(number, seed):
             begun = time.process_time()
             rough = classical_edges(image)
             between_ = time.process_time()
-            found = outline(image, SENSOR)
+            found = face_edges(image, SENSOR)
             spent["classical"].append(between_ - begun)
             spent["fitted"].append(time.process_time() - between_)
             lines = [true_line(touch, (0, 80), (0, 0)), true_line(touch, (0, 0), (80, 0))]
             for line in lines[: 1 if view == "edge" else 2]:
                 seen += 1
-                for way, edges in (("classical", rough), ("fitted", found.edges)):
+                for way, edges in (("classical", rough), ("fitted", found)):
                     edge, worst = matched(edges, *line)
                     if edge is not None:
                         error = np.array(
@@ -150,10 +150,11 @@ def bench_edges(number, seed):
                         )  # fmt: skip
                         chi = float(error @ np.linalg.pinv(edge.covariance) @ error)
                         rows[way].append((worst, math.degrees(error[0]), chi < 5.99))
-            if view == "corner" and len(found.corners) == 1:
+            points = vertices(found)
+            if view == "corner" and len(points) == 1:
                 c, s = math.cos(theta), math.sin(theta)
                 at = (-c * x - s * y, s * x - c * y)
-                corners.append(math.dist(at, found.corners[0].at_mm))
+                corners.append(math.dist(at, points[0]))
         for way, found_rows in rows.items():
             worst, degrees, inside = np.array(found_rows, float).T
             print(f"{level:9}{view:8}{way:10}{seen:6}{len(worst):7}{np.median(worst):8.3f}"
@@ -235,11 +236,12 @@ class Tally:
         )
 
 
-def first_answer(lab, readings, believed, *merging):
+def first_answer(lab, readings, believed):
     """Touches until an answer, in steps of four; None without one."""
-    while_scanning = read_while_scanning(lab, SENSOR, readings, believed, *merging, every=4)
-    early = next((reading for reading in while_scanning if reading.recognition), None)
-    return None if early is None else len(early.merged.poses)
+    return next(
+        (k for k in range(4, len(readings) + 4, 4)
+         if read_scan(lab, SENSOR, readings[:k], believed[:k], "bounded").recognition), None
+    )  # fmt: skip
 
 
 def bench_scans(url, scans, seed, sigmas):
@@ -271,7 +273,7 @@ def bench_scans(url, scans, seed, sigmas):
                 tally.touches.append(len(readings))
                 tally.add(found.recognition, (name, side), true[-1])
                 if placing == "bounded" and copy == 0:
-                    tally.first.append(first_answer(lab, readings, believed, *merging))
+                    tally.first.append(first_answer(lab, readings, believed))
         for placing, tally in tallies.items():
             shown = "arm" if sigma is None else f"{sigma:g}"
             print(f"{level:9}{shown:>6}  {placing:9}{tally.row()}", flush=True)

@@ -201,7 +201,6 @@ probe-sensor info newer-calibration.json [twice]
 probe-sensor info /dev/ttyGONE [twice]
 probe-sensor info serial:///dev/ttyGONE [twice]
 probe-sensor info sim:?speed=2 [twice]
-probe-sensor info sim:?firmware=z80
 probe-sensor info smoke:thing [twice]
 probe-sensor info sim: --sensor 8
 probe-sensor live sim:nothing

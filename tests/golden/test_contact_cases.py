@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from reference.indenters import half_plane
 
 from encoded_objects.base.sensor_type import Overlay, SensorType, choose_sensor_type
 from generator.alphabet.known import alphabet_named
@@ -24,7 +25,7 @@ from probe.contact.press import LEVELS, press
 from probe.contact.tabs import tabs
 from probe.errors import ContactError
 from probe.surface.face import endless_face
-from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip
+from probe.surface.indenters import FlatPlate, RaisedStrip
 from probe.surface.polygon import polygon
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import compose_poses
@@ -42,10 +43,7 @@ GLYPHS = (
     (((-1, -1), (0, -1)), ((0, -1), (0, 0)), ((0, 0), (1, 1)), ((0, 0), (-1, 0))),
     (((-1, 1), (-1, -1)), ((-1, -1), (1, -1)), ((1, -1), (1, 1))),
 )
-EVERY_LEVEL = [
-    (kind, level) for kind, levels in LEVELS.items() for level in levels if level != "elements"
-]
-
+EVERY_LEVEL = [(kind, level) for kind, levels in LEVELS.items() for level in levels]
 OF_FORCES = [pair for pair in EVERY_LEVEL if pair[0] != "gel"]  #: a gel's image is of depths
 
 FELT = ReaderOptions(contact_counts=0.1)  #: of newtons without a calibration
@@ -60,7 +58,7 @@ def test_case_5_no_force_is_no_image_and_a_free_plate_off_its_ground_tips(kind, 
         return
     free = Touch(2.0, 0, 0, 5.0, wrist=WristStiffness(0.0, 0.0))
     with pytest.raises(ContactError, match="tips"):
-        press(HalfPlane(), sensor, free, accuracy=level)
+        press(half_plane(), sensor, free, accuracy=level)
 
 
 @pytest.mark.parametrize(("kind", "level"), OF_FORCES)

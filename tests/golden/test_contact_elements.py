@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 from reference.elements_axisymmetric import DEGREES, apparent_modulus, section
 from reference.elements_round import indented, washer_pad
+from reference.elements_space import elements
 from reference.elements_tab import Tab, compressed, partly_covered
+from reference.indenters import paraboloid, sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.elements import elements
-from probe.surface.indenters import Sphere
+from probe.contact.layer import layer
 
+STIFF = WristStiffness(1e9, 1e9)
+MESH = {"per_tactel": 1, "layers": 2, "margin_mm": 6.0}  #: of elements in space
 NEAR_HALF = (0.499, 0.4999, 0.49999, 0.5)
 #: Stiffness of a bonded disc of S = 1 over the reference, 8 elements through its height.
 LOCKING = {
@@ -132,20 +135,20 @@ def test_partly_covered_tab_bears_less_than_all_and_more_than_its_share():
         assert part == pytest.approx(share * (1 + 0.59 * (1 - share)), abs=0.03)
 
 
-@pytest.mark.parametrize("wrist", [WristStiffness(), WristStiffness(1e9, 1e9)])
+@pytest.mark.parametrize("wrist", [WristStiffness(), STIFF])
 def test_elements_in_space_agree_with_the_section(wrist):
     sensor = SensorType(overlay=Overlay(kind="pad"))
-    ball = Sphere(20.0)
+    ball = sphere(20.0)
     at = (0.3, -0.4)
     touch = Touch(-at[0], -at[1], 0.0, 20.0, wrist=wrist)
-    found = elements(ball, sensor, touch, per_tactel=1, layers=2, margin_mm=6.0)
+    found = elements(ball, sensor, touch, **MESH)
     r = np.concatenate([np.linspace(0, 6, 61), 6 + 19 * np.linspace(0, 1, 20)[1:] ** 2])
     pad = section(r, 2 * (1 - (1 - np.linspace(0, 1, 9)) ** 1.6), 1.0, 0.4999)
     points = lambda r: ball.heights_mm(np.stack([r, 0 * r], axis=-1))  # noqa: E731
     truth = indented(pad, points, 20.0)
     # The plate gives way to the moment about the sensor's centre, and the ball rolls on it.
     turn = found.tilt_x_rad, found.tilt_y_rad
-    middle = at[0] + ball.radius_mm * turn[1], at[1] - ball.radius_mm * turn[0]
+    middle = at[0] + 20.0 * turn[1], at[1] - 20.0 * turn[0]
     tactels = truth.tactels_n(sensor, middle)
     error = np.sqrt(((found.forces_n - tactels) ** 2).mean() / (tactels**2).mean())
     assert error <= 8e-3  # 1.2e-3 with two elements on a tactel
@@ -153,3 +156,15 @@ def test_elements_in_space_agree_with_the_section(wrist):
     assert -z == pytest.approx(truth.depth_mm, rel=5e-3)
     for about, moment in zip(turn, (middle[1] * 20, -middle[0] * 20), strict=True):
         assert about * wrist.tilt_x_nmm_rad == pytest.approx(moment, rel=0.06)  # .004 with two
+
+
+def test_layer_agrees_with_elements_in_space():
+    sensor, surface = SensorType(overlay=Overlay(kind="pad")), paraboloid(60.0)
+    touch = Touch(-2.0, 1.1, 0.4, 60.0, 0.01, -0.02)
+    truth, found = elements(surface, sensor, touch, **MESH), layer(surface, sensor, touch)
+    inner = np.s_[1:-1, 1:-1]  # the outermost bear what the endless layer has beyond them, too
+    error = np.linalg.norm((found.forces_n - truth.forces_n)[inner])
+    assert error <= 5e-3 * np.linalg.norm(truth.forces_n[inner])
+    assert found.z_mm == pytest.approx(truth.z_mm, rel=2e-3)
+    tilts = truth.tilt_x_rad, truth.tilt_y_rad
+    assert (found.tilt_x_rad, found.tilt_y_rad) == pytest.approx(tilts, abs=1e-4)

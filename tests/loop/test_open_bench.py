@@ -1,4 +1,4 @@
-"""`open-bench` as an operator meets it: a server, the firmware's probe, a real browser."""
+"""`open-bench` as an operator meets it: a server, a probe on a serial line, a real browser."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from probe.recording.read import Recording
 
 @pytest.fixture(scope="module")
 def bench(served):
-    """Address of a bench whose probe runs the firmware."""
-    with served("--port", "touch:?firmware=avr&hold=1.5") as address:
+    """Address of a bench with a simulated probe."""
+    with served("--port", "touch:?hold=1.5") as address:
         yield address
 
 

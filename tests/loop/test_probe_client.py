@@ -10,10 +10,10 @@ from itertools import islice
 import numpy as np
 import pytest
 from cobs import cobs
+from reference.emulated_probe import emulated_probe
 
 from probe.client import Client
 from probe.errors import PortError
-from probe.firmware.emulator import emulated_probe
 from probe.frame import frame_from
 from probe.recording.record import Recorder
 
@@ -202,12 +202,6 @@ def test_a_silent_device_is_told_and_gets_its_commands(line):
         while not sent.endswith(b"x") and time.monotonic() < end_s:
             sent += os.read(master, 100)
         assert sent == b"3is" * 3 + b"x"
-
-
-def test_the_avr_stands_behind_a_url():
-    with Client("sim:?firmware=avr&rate=50") as client:
-        until(client, lambda f: f.counts.max() > 300)
-        assert client.ident.name == "FSR-uno"
 
 
 def test_a_recording_waits_for_its_consumer(tmp_path):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.emulated_probe import emulated_port
 
 from generator.command import run as encode_object
 from probe.command import run as probe_sensor
@@ -91,8 +92,8 @@ def test_a_port_is_followed_until_it_is_interrupted(lab):
 
 
 def test_the_probes_firmware_is_read(asked):
-    port = "sim:lab.db#Cube/F1?x=30&y=30&theta=20&firmware=avr&rate=50&period=1.5"
-    code, out = asked(recognize_object, "--port", port, "--json")
+    with emulated_port("sim:lab.db#Cube/F1?x=30&y=30&theta=20&rate=50&period=1.5") as probe:
+        code, out = asked(recognize_object, "--port", probe.url, "--json")
     (entry,) = json.loads(out)
     assert code == 0
     assert (entry["object"], entry["face"]) == ("Cube", "F1")

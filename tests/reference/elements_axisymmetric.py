@@ -23,8 +23,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 
-from probe.contact.elements_pad import Array, LineBasis, integral, line_bases
 from probe.errors import ContactError
+from reference.elements_pad import Array, LineBasis, integral, line_bases
 
 Kind = Literal["q1", "q2", "q1p0", "q2q1"]
 DEGREES: dict[Kind, tuple[int, int | None]] = {

@@ -20,8 +20,8 @@ import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 from skfem import Basis, ElementHex1, ElementQuad1, MeshHex, MeshQuad
 
-from probe.contact.elements_pad import Array
 from probe.errors import ContactError
+from reference.elements_pad import Array
 
 NEWTON = 25  #: iterations of a load step
 TOLERANCE = 1e-9  #: of a step's first change

@@ -19,9 +19,9 @@ import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.elements_pad import Array
 from probe.errors import ContactError
 from reference.elements_axisymmetric import Kind, Section, section
+from reference.elements_pad import Array
 
 STEPS = 60
 EVEN = 24  #: Gauss points along a tactel

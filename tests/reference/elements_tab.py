@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from skfem import MeshHex, MeshQuad
 
-from probe.contact.elements_pad import Array
 from probe.errors import ContactError
 from reference.elements_finite import Block, block, deformed
+from reference.elements_pad import Array
 
 STEPS = 20  #: of the set of nodes that rest beside the foot
 POLE_RAD = 0.15  #: the half-disc ends there, short of x = -R and R, where elements would be wedges

@@ -62,15 +62,10 @@ def mosaic_of(
 
 
 def add_touch(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
-    """Return the mosaic with one touch added.
+    """Return the mosaic of one face with one touch added; the first is `no_touches`.
 
-    Parameters
-    ----------
-    mosaic
-        Of one face; the first is `no_touches`.
-    touch
-        The signal with its place. The first decoded one turns the mosaic's
-        frame into that of the face; it needs a place in the old frame, too.
+    The first decoded touch turns the mosaic's frame into that of the face; it needs a place in the
+    old frame, too.
 
     Raises
     ------
@@ -210,8 +205,8 @@ def _solve(mosaic: Mosaic) -> PoseGraphSolution:
 def _vote_on_frame(mosaic: Mosaic, found: PoseGraphSolution) -> PoseGraphSolution:
     """Return a better solution, if other decoded touches give the face another pose.
 
-    The first decoded touch fixes the frame. If it is wrong, all later ones look
-    wrong: each of them proposes a frame, and the cost decides.
+    The first decoded touch fixes the frame. If it is wrong, all later ones look wrong: each of them
+    proposes a frame, and the cost decides.
     """
     for constraint in mosaic.constraints:
         if constraint.kind == "decoded":

@@ -8,7 +8,7 @@ different force look alike. mm, sensor frame.
 Motions: a ridge shifted along itself looks the same, and so does a dome turned about its middle.
 The eigenvalues of the mean squared change by x, y and the turn (Harris and Stephens' tensor
 extended by the turn) separate visible motions from invisible ones. The tensor comes from an image
-smoothed over the gaps between tabs: gaps change with every shift and would make all motions
+smoothed over the gaps between tabs, which change with every shift and would make all motions
 visible (measured: a ridge's eigenvalue is up to .16 of the largest without the smoothing, .03 with
 it; that of symbols at least .5 either way). There, lengths are in tactels, turns in tactels at the
 middle of the matrix's sides.
@@ -53,18 +53,7 @@ class TouchPatch:
 
 
 def patch_of(sensor: SensorType, signal: Signal) -> TouchPatch:
-    """Return the patch of a signal.
-
-    Examples
-    --------
-    >>> from recognizer.touch.signal import signal_of
-    >>> readings = np.zeros((16, 16))
-    >>> readings[:, 8:] = 100.0
-    >>> patch = patch_of(SensorType(), signal_of(readings))
-    >>> value, slope_x, _ = interpolate_patch(patch, np.array([[0.0, 0.0]]))
-    >>> bool(0.4 < value[0] < 0.6 and slope_x[0] > 0)
-    True
-    """
+    """Return the patch of a signal."""
     from scipy.ndimage import gaussian_filter, spline_filter
 
     good = signal.trust >= LEAST_TRUST
@@ -138,14 +127,7 @@ def scales(sensor: SensorType) -> Array:
 def seen_motions(a: TouchPatch, over: NDArray[np.bool_], pose: Array) -> Array:
     """Return the motions (3, k), orthonormal in tactels, that change an image.
 
-    Parameters
-    ----------
-    a
-        The image.
-    over
-        (rows * columns,) tactels that count.
-    pose
-        (3,) T_a_b: x, y and theta of what lies on the image, mm and rad.
+    `over` (rows * columns,) are the tactels that count, `pose` (3,) T_a_b.
     """
     by_x, by_y = a.slopes
     x, y = ((a.points_mm - pose[:2]) / min(a.sensor.half_mm)).T
@@ -162,16 +144,10 @@ def restrict_information(
 ) -> Array:
     """Return the part of an information that concerns some motions, all others being unknown.
 
-    Parameters
-    ----------
-    information
-        (3, 3) inverse covariance of x, y and theta, regular.
-    motions
-        (3, k) of `seen_motions`.
-    believed
-        (3, 3) covariance without the image. It decides how much an error of the motions'
-        direction costs: with a wrong direction of a ridge, an error along it looks like an error
-        across it.
+    `information` (3, 3) inverse covariance of x, y and theta, regular; `motions` (3, k) of
+    `seen_motions`; `believed` (3, 3) covariance without the image, which decides how much an error
+    of the motions' direction costs: with a wrong direction of a ridge, an error along it looks like
+    an error across it.
     """
     if motions.shape[1] == 3:
         return information

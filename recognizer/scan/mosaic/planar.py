@@ -1,8 +1,8 @@
-"""Poses in a plane, and what is known about the pose of each touch. Thesis 4.3.
+"""Poses in a plane, and the sources of the pose of each touch. Thesis 4.3.
 
-A pose is (..., 3): x, y (mm) and the turn theta (rad) of one frame in another. `T_a_b` takes
-points of frame b to frame a: p_a = R(theta) p_b + (x, y). Errors of a pose are differences of its
-three numbers, so covariances belong to (x, y, theta) in the axes of frame a.
+A pose is (..., 3): x, y (mm) and the turn theta (rad) of one frame in another. `T_a_b` takes points
+of frame b to frame a: p_a = R(theta) p_b + (x, y). Errors of a pose are differences of its three
+numbers, so covariances belong to (x, y, theta) in the axes of frame a.
 
 A touch has up to three sources for its pose. The arm believes a pose in a frame of its own (robot
 base or first touch), wrong by about a tactel. The reader decodes a pose in the frame of the face,
@@ -57,12 +57,8 @@ class PlacedTouch:
 def planar_belief(pose: ArrayLike, covariance: ArrayLike) -> PlanarBelief:
     """Return a checked pose with its covariance.
 
-    Parameters
-    ----------
-    pose
-        (3,) x, y (mm) and theta (rad), or T_plane_sensor (4, 4).
-    covariance
-        (3, 3) of x, y and theta; or (3,) standard deviations.
+    `pose` is (3,) x, y (mm) and theta (rad), or T_plane_sensor (4, 4); `covariance` (3, 3) of x, y
+    and theta, or (3,) standard deviations.
 
     Raises
     ------
@@ -187,12 +183,8 @@ def planar_pose(T_plane_sensor: ArrayLike) -> Array:
 def planar_covariance(covariance: ArrayLike, turn: ArrayLike | None = None) -> Array:
     """Return the covariance (3, 3) of x, y and theta of a spatial covariance.
 
-    Parameters
-    ----------
-    covariance
-        (6, 6) of (x, y, z, rx, ry, rz) in the axes of a base frame, as `probe.arm` gives it.
-    turn
-        (3, 3) rotation R_plane_base; none if the axes are those of the plane.
+    `covariance` (6, 6) is of (x, y, z, rx, ry, rz) in the axes of a base frame, as `probe.arm`
+    gives it; `turn` (3, 3) is R_plane_base, none if the axes are those of the plane.
     """
     given = np.asarray(covariance, np.float64)
     R = np.eye(3) if turn is None else np.asarray(turn, np.float64)

@@ -71,14 +71,8 @@ def solve_pose_graph(
 ) -> PoseGraphSolution:
     """Return the poses that agree best with all constraints.
 
-    Parameters
-    ----------
-    constraints
-        They must connect every touch to the plane.
-    poses, arm
-        (n, 3) and (3,) to start from.
-    arm_fixed
-        The arm's frame is the plane's: no touch was decoded.
+    Constraints connect every touch to the plane; `poses` (n, 3) and `arm` (3,) are the start. With
+    `arm_fixed` the arm's frame is the plane's: no touch was decoded.
     """
     from scipy.sparse import diags
     from scipy.sparse.linalg import splu
@@ -105,10 +99,7 @@ def solve_pose_graph(
 
 
 def covariances(normal: Any, numbers: Sequence[int]) -> Array:
-    """Return covariances (k, 3, 3) of some poses, x, y (mm) and theta (rad).
-
-    The arm's frame has the number n, after all touches.
-    """
+    """Return covariances (k, 3, 3) of some poses, x, y (mm) and theta (rad); the arm is the n-th."""
     from scipy.sparse.linalg import splu
 
     factor, size = splu(normal.tocsc()), normal.shape[0]

@@ -112,23 +112,11 @@ def register_patches(
     starts: Sequence[Array] | None = None,
     period_mm: float = math.inf,
 ) -> ImageRegistration:
-    """Register two patches.
+    """Return T_a_b of two patches of one sensor, or a reason with the belief where none is certain.
 
-    Parameters
-    ----------
-    a, b
-        Of one sensor.
-    believed, covariance
-        T_a_b (3,) in mm and rad, and (3, 3).
-    starts
-        Poses (3,) to refine; found by `search` if not given.
-    period_mm
-        Distance after which the surface looks alike: the pitch of symbols; inf for others.
-
-    Returns
-    -------
-    ImageRegistration
-        With a reason, and the belief as its pose, where there is no certain place.
+    `believed` (3,) in mm and rad has `covariance` (3, 3); `starts` are poses to refine, found by
+    `search` if not given; after `period_mm` the surface looks alike: the pitch of symbols, inf for
+    others.
     """
     reach = window_mm(covariance)
     reason = _reject_reason(a, b, believed, math.hypot(*reach))
@@ -198,14 +186,8 @@ def align_patches(
 ) -> Alignment | None:
     """Return the pose that explains both images best, or None where there is none near.
 
-    Parameters
-    ----------
-    a, b
-        Images of one sensor.
-    start
-        (3,) T_a_b, wrong by up to about half a tactel.
-    believed, prior
-        (3,) T_a_b and its inverse covariance (3, 3); zeros for no belief.
+    `start` (3,) T_a_b is wrong by up to about half a tactel; `believed` (3,) has the inverse
+    covariance `prior` (3, 3), zeros for no belief.
     """
     pitch = a.sensor.pitch_mm
     pose = np.asarray(start, np.float64)
@@ -232,7 +214,6 @@ def align_patches(
 def _refused(
     believed: Array, covariance: Array, reason: str, margin: float = 0.0
 ) -> ImageRegistration:
-    """Return a registration with a reason alone."""
     return ImageRegistration(
         pose=np.array(believed),
         covariance=np.array(covariance),

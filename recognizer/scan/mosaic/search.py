@@ -87,14 +87,9 @@ def search_reference(
     believed: Array,
     covariance: Array,
 ) -> SearchResult:
-    """Return the poses at which a patch may lie on a reference.
+    """Return the poses at which a patch may lie on a reference of quarter tactels.
 
-    Parameters
-    ----------
-    reference
-        Cells of a quarter of a tactel.
-    believed, covariance
-        T_reference_patch (3,) and (3, 3).
+    `believed` (3,) T_reference_patch has `covariance` (3, 3).
     """
     image = magnify_patch(patch)
     h = image.cell_mm
@@ -140,19 +135,9 @@ def window_mm(covariance: Array) -> tuple[float, float]:
 
 
 def cross_correlate(reference: KnownRaster, image: KnownRaster) -> Correlation:
-    """Correlate an image with a reference that reaches further on all sides.
+    """Correlate an image (rows, columns) with a reference (rows + 2 k, columns + 2 m).
 
-    Parameters
-    ----------
-    reference
-        (rows + 2 k, columns + 2 m) cells.
-    image
-        (rows, columns) cells.
-
-    Returns
-    -------
-    Correlation
-        Element (i, j) belongs to the image shifted down by i - k and right by j - m cells.
+    Element (i, j) belongs to the image shifted down by i - k and right by j - m cells.
     """
     from scipy.fft import irfft2, next_fast_len, rfft2
 
@@ -183,8 +168,7 @@ def cross_correlate(reference: KnownRaster, image: KnownRaster) -> Correlation:
 def peaks(scores: Array, most: int) -> list[tuple[float, float, float]]:
     """Return local maxima as (row, column, score), best first, between cells by parabolas.
 
-    Undefined scores are NaN or -inf and are no maxima; nor are those on the rim, where the
-    maximum lies outside.
+    Scores that are NaN or -inf are no maxima; nor are those on the rim.
     """
     known = np.where(np.isfinite(scores), scores, -np.inf)
     middle = known[1:-1, 1:-1]

@@ -1,6 +1,6 @@
 """Image -> symbols: one maximum-likelihood fit of pose, gain and every visible symbol.
 
-template    what the sensor feels of each symbol, through the overlay
+template    the response of the sensor to each symbol, through the overlay
 kernels     the compiled loops, and the numbers that they use
 image       the image that is fitted, and its gain: depth of the plate -> force
 search      coarse: all rotations and shifts of the lattice at once, one matrix product

@@ -1,10 +1,10 @@
 """Along which line, and under which radius, a round face lies under the sensor: from forces alone.
 
-Image -> a few bends with a gain each, likeliest first. A plate on a cylinder presses a strip:
-its direction is that of the cylinder's lines, its width tells depth and radius. Forces averaged
-over about a symbol are what a face with the mean response of symbols all over would give; every
-direction under every registered radius is fitted by depth and slopes, all at once. Roots of
-forces are compared, which makes their errors nearly even. Sensor frame, mm, rad.
+Image -> a few bends with a gain each, likeliest first. A plate on a cylinder presses a strip along
+the cylinder's lines; its width gives depth and radius. Forces averaged over about a symbol are
+compared with those of a face with the mean response of symbols all over; every direction under
+every registered radius is fitted by depth and slopes at once. Roots of forces have nearly even
+errors. Sensor frame, mm, rad.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ FAINT = 0.03  #: root of a response below which its slope is not trusted
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BendGuess:
-    """A bend that a touch may have."""
+    """A possible bend of a touch."""
 
     bend: Bend  #: in the axes of the sensor, of the face without its symbols
     gain: Array  #: (4,) to begin with
@@ -46,12 +46,7 @@ def guess_bends(
 ) -> list[BendGuess]:
     """Return the bends that explain an image best, at most `keep`, no two of them alike.
 
-    Parameters
-    ----------
-    image
-        As of a flat face.
-    radii_mm
-        Of the faces that may be touched.
+    `image` is as of a flat face; `radii_mm` are those of the faces that may be touched.
     """
     angles = np.arange(DIRECTIONS) * math.pi / DIRECTIONS
     bends = [Bend(radius, float(angle)) for radius in radii_mm for angle in angles]
@@ -85,7 +80,7 @@ def _same_bend(a: Bend, b: Bend, apart: float) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Average:
-    """Means over the neighbourhood of each tactel, of those that are trusted."""
+    """Means over the neighbourhood of each tactel, of trusted ones."""
 
     image: Image
 
@@ -105,7 +100,7 @@ class _Average:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Strips:
-    """What planes under b bends explain of an image."""
+    """Planes under b bends, and how well they explain an image."""
 
     plane: Array  # (b, 3) depths
     scale: Array  # (b,) root of the force scale

@@ -1,11 +1,11 @@
 """The joint fit: image -> a few lattices, each with the scores of every cell in view.
 
 Forces (newtons, or counts that rise with force) -> Fit: pose of the sensor on the lattice of
-symbols, gain, and for every cell of the lattice under the sensor the log-likelihood of each
-symbol and of none. Whole and partial symbols count alike: each with what it shows. A coarse search
-under a few gains gives candidates; damped least squares refines them, labels chosen again at every
-step. Lattice frame: mm; cell (i, j) is the i-th column and the j-th row upwards, its symbol's axes
-are the frame's. A sensor point s lies at R(theta) s + (x, y). Thesis 6.2.
+symbols, gain, and for every cell of the lattice under the sensor the log-likelihood of each symbol
+and of none, partial symbols included. A coarse search under a few gains gives candidates; damped
+least squares refines them, labels chosen again at every step. Lattice frame: mm; cell (i, j) is the
+i-th column and the j-th row upwards, its symbol's axes are the frame's. A sensor point s lies at
+R(theta) s + (x, y). Thesis 6.2.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def search_image(
 ) -> tuple[CoarseSearch, ...]:
     """Return the coarse searches of an image; none if nothing is pressed.
 
-    Gains to begin with, (4,) each, are guessed from the image if they are not given.
+    Start gains, (4,) each, are guessed from the image if they are not given.
     """
     if gains is None:
         deep = deep_gain(image)
@@ -136,10 +136,7 @@ def fit_lattices(
 ) -> tuple[Fit, ...]:
     """Return the likeliest lattices of an image, best first; none if nothing is pressed.
 
-    Parameters
-    ----------
-    searches
-        Coarse searches of the image, where they are known.
+    `searches` are the image's, where they are known.
     """
     if searches is None:
         searches = search_image(image, bank)
@@ -176,8 +173,8 @@ def _distinct_lattices(image: Image, found: Lattices) -> list[int]:
 def _cross_gains(image: Image, found: Lattices, gains: int) -> Lattices:
     """Return lattices and these turned by quarters, each under the best of several gains.
 
-    A square lattice turned by a quarter is one again, so all four see the image alike but for
-    the symbols; and a lattice may be stuck under a gain from which another one got away.
+    A square lattice turned by a quarter is itself, so all four fit the image alike but for the
+    symbols; and a lattice may be stuck under a gain that another one left.
     """
     best = np.argsort(-found.value, kind="stable")
     tried = []
@@ -224,20 +221,11 @@ def refine_lattices(
     labels_at: LabelsAt | None = None,
     with_normal: bool = True,
 ) -> Lattices:
-    """Return candidates after damped steps, with their log-likelihoods.
+    """Return candidates after at most `steps` damped steps, with their log-likelihoods.
 
-    Parameters
-    ----------
-    pose
-        (b, 7), or (b, 3) where nothing is known of the rest.
-    gain
-        (b, 4).
-    steps
-        How many, at most.
-    labels_at
-        Labels of the cells, where they are known; otherwise each cell shows what fits best.
-    with_normal
-        Whether `normal` and `right` are asked for; without, they are those of some step.
+    `pose` is (b, 7), or (b, 3) where nothing is known of the rest, `gain` (b, 4). Without
+    `labels_at` each cell shows what fits best; without `with_normal`, `normal` and `right` are
+    those of some step.
     """
     count = len(pose)
     whole = np.zeros((count, POSE))
@@ -281,7 +269,7 @@ def score_cells(
 ) -> tuple[Fit, ...]:
     """Return the fits of lattices with the scores of all their cells, in their order.
 
-    Scores are made with the noise that the likeliest lattice leaves.
+    The likeliest lattice's residuals give the noise of the scores.
     """
     count, tactels, order = len(lattices.pose), len(image.forces), image.template.order
     scene = image.scene.of_lattices(count)
@@ -322,17 +310,11 @@ def score_cells(
 def covariances(image: Image, lattices: Lattices, away: Array, noise: float) -> Array:
     """Return the covariances (b, 3, 3) of x, y (mm) and theta (rad) of lattices.
 
-    The normal matrix of the last step gives the shape. Its size is the noise that the fit leaves,
-    and what that noise cannot say: tactels of a pad err with their neighbours, and under tabs a
-    touch whose form lies far from what was known beforehand (`FORM_SD`) has more of the template
-    wrong than the fitted part of it.
-
-    Parameters
-    ----------
-    away
-        (b, n) what the likeliest labels leave of the readings, on a covered tactel's scale.
-    noise
-        Standard deviation of psi with which the lattices are scored.
+    The normal matrix of the last step gives the shape. Its size is the noise of the fit, and what
+    that noise does not show: tactels of a pad err with their neighbours, and under tabs a touch
+    whose form lies far from the prior (`FORM_SD`) has more of the template wrong than the fitted
+    part of it. `away` (b, n) are the residuals under the likeliest labels, on a covered tactel's
+    scale; `noise` is the deviation of psi with which the lattices are scored.
     """
     if image.pressing.hardens:
         prior = np.array([*FORM_SD, image.options.scale_sd])
@@ -345,10 +327,7 @@ def covariances(image: Image, lattices: Lattices, away: Array, noise: float) -> 
 
 
 def invert_normal(normal: Array) -> Array:
-    """Return the inverses of normal matrices (..., k, k).
-
-    Wide, not narrow, in what the image does not show.
-    """
+    """Return the inverses of normal matrices (..., k, k), wide in what the image does not show."""
     diagonal = np.diagonal(normal, axis1=-2, axis2=-1)
     unit = 1.0 / np.sqrt(np.maximum(diagonal, 1e-12))
     units = unit[..., :, None] * unit[..., None, :]
@@ -360,7 +339,7 @@ def invert_normal(normal: Array) -> Array:
 def _neighbours_alike(away: Array, shape: tuple[int, int], most: float) -> Array:
     """Return by how much (b,) neighbours that err alike widen a covariance, 1 or more.
 
-    The sum of the autocorrelation of what is left over the eight neighbours.
+    The sum of the autocorrelation of residuals over the eight neighbours.
     """
     left = np.clip(away, -most, most).reshape(-1, *shape)
     left = left - left.mean(axis=(1, 2), keepdims=True)

@@ -101,7 +101,7 @@ class Pressing:
         return np.where(depth > 0, _stiffness(np.clip(depth, 0.0, self.deepest)), 0.0)
 
     def depth(self, force: Array) -> Array:
-        """Return the depths at which F has given values, at most `deepest`."""
+        """Return the depths of forces F, at most `deepest`."""
         if not self.hardens:
             return np.asarray(force / 3.0)
         return np.asarray(np.interp(force, *_forces_by_depth(self)))
@@ -124,7 +124,7 @@ def pressing_of(sensor: SensorType, height_mm: float) -> Pressing:
 
 @lru_cache(maxsize=16)
 def _forces_by_depth(pressing: Pressing) -> tuple[Array, Array]:
-    """Return rising forces and the depths at which they are."""
+    """Return rising forces and their depths."""
     table = np.linspace(0.0, pressing.deepest, 257)
     return pressing.force(table), table
 
@@ -155,7 +155,7 @@ class Image:
 
     @cached_property
     def scene(self) -> Scene:
-        """What the compiled loops are given, of no lattice yet."""
+        """The image as the compiled loops take it, without lattices."""
         given = {
             "points": (self.points_mm, np.float64), "forces": (self.forces, np.float64),
             "trust": (self.trust, np.float64), "plane": (self.plane, np.float64),
@@ -234,11 +234,8 @@ def bend_image(
 ) -> Image:
     """Return an image of a flat face as one of a face with a bend, in the axes of the sensor.
 
-    Parameters
-    ----------
-    shares
-        By how much less than the bend says the face falls away, of each of the gains under
-        which the image is seen; one for all of them.
+    `shares` scale how far the face falls away, for each of the gains under which the image is seen;
+    one for all of them.
     """
     height, points = sensor.overlay.height_mm, image.points_mm
     symbol = image.pressing.symbol * height
@@ -251,10 +248,7 @@ def bend_image(
 
 
 def first_gain(image: Image) -> Array | None:
-    """Return the gain (4,) of an image with symbols all over what is loaded.
-
-    None where nothing presses.
-    """
+    """Return the gain (4,) with symbols all over the loaded area; None where nothing presses."""
     basis = image.plane
     root = np.sqrt(image.trust * image.loaded)
     plane = np.linalg.lstsq(
@@ -273,8 +267,8 @@ def first_gain(image: Image) -> Array | None:
 def tilted_gain(image: Image) -> Array | None:
     """Return the gain (4,) of an image in which a part of the bare face is pressed; None if not.
 
-    Where a plate tilts over blank ground it comes down on the face itself, far deeper than on
-    symbols. There even the lowest readings of a neighbourhood as wide as a symbol are high.
+    A plate that tilts over blank ground comes down on the face itself, far deeper than on symbols;
+    even the lowest readings of a neighbourhood as wide as a symbol are high there.
     """
     low, high = _percentiles_around(image.forces.reshape(image.shape), AROUND, (LOW, HIGH))
     known = image.trust > 0
@@ -295,10 +289,9 @@ def tilted_gain(image: Image) -> Array | None:
 
 
 def _percentiles_around(forces: Array, around: int, shares: tuple[float, ...]) -> list[Array]:
-    """Return a percentile of the forces about each tactel (n,), for every share.
+    """Return percentiles (n,) of the `around` x `around` forces about each tactel, for every share.
 
-    Of the `around` x `around` tactels about it, beyond the rim those on the rim, the one of that
-    rank; as `scipy.ndimage.percentile_filter(..., mode="nearest")`, whose import takes longer than
+    As `scipy.ndimage.percentile_filter(..., mode="nearest")`, whose import takes longer than
     reading a touch.
     """
     before = around // 2
@@ -319,14 +312,14 @@ def bounded_gain(gain: Array, steepest: float = STEEPEST) -> Array:
 def deep_gain(image: Image) -> Array | None:
     """Return the gain (4,) of an image in which symbols and the bare face are pressed.
 
-    A plate over the edge of a face lies on little and tips, so that it stands two or three times
-    deeper than one amid a face and comes down on the bare face beside most symbols. Around each
-    tactel that is loaded the highest readings are symbols then and the lowest ones the bare face,
-    deeper by the height of the symbols: one plane goes through both. `first_gain`, which takes the
-    bare face as not touched, ends in another basin.
+    A plate over the edge of a face lies on little and tips: it stands two or three times deeper
+    than one amid a face and comes down on the bare face around most symbols. About each loaded
+    tactel the highest readings are then symbols and the lowest ones the bare face, deeper by the
+    height of the symbols: one plane goes through both. `first_gain`, which takes the bare face as
+    not touched, ends in another basin.
 
-    None where all of the sensor lies on something, where nothing presses, and where the plane
-    would hang over the centre.
+    None where all of the sensor is loaded, where nothing presses, and where the plane would hang
+    over the centre.
     """
     pressing = image.pressing
     known = image.loaded & (image.trust > 0)
@@ -352,10 +345,7 @@ def deep_gain(image: Image) -> Array | None:
 def _percentiles_among(
     image: Image, known: NDArray[np.bool_], shares: tuple[float, ...]
 ) -> list[Array]:
-    """Return percentiles (n,) of the forces of those tactels about each one that are known.
-
-    Of the `around` x `around` ones about it; 0 where none of them is.
-    """
+    """Return percentiles (n,) of the known forces about each tactel; 0 where none is known."""
     around, before = AROUND, AROUND // 2
     forces = np.where(known, image.forces, np.inf).reshape(image.shape)
     wide = np.pad(forces, (before, around - 1 - before), constant_values=np.inf)
@@ -372,13 +362,12 @@ def _percentiles_among(
 def find_loaded_area(sensor: SensorType, signal: Signal) -> Flags:
     """Return (rows, columns) where a sensor lies on something, gaps between strokes closed.
 
-    Beyond the edge of a face nothing is felt, however deep the plate hangs there; at a corner it
-    tips, stands deepest at the corner itself, and a plane through its depths says most where least
-    is felt. So gain planes are judged by what is loaded; an unloaded tactel speaks against symbols
-    there and for nothing else.
+    Beyond the edge of a face nothing is pressed, however deep the plate hangs there; at a corner it
+    tips, and a plane through its depths is largest where the readings are least. Gain planes are
+    judged by the loaded area; an unloaded tactel only speaks against symbols there.
 
-    All of them where nothing rises over the noise, and under a pad or a gel, which smear what
-    lies between strokes.
+    All tactels where nothing rises over the noise, and under a pad or a gel, which smear the gaps
+    between strokes.
     """
     everywhere = np.ones(signal.forces.shape, np.bool_)
     if sensor.overlay.kind != "tab":
@@ -417,7 +406,7 @@ class NormalizedImage:
 
 
 def normalize_image(image: Image, gain: Array) -> NormalizedImage:
-    """Return the image as it is under gains (b, 4)."""
+    """Return the image under gains (b, 4)."""
     depth = gain[:, 1:] @ image.plane.T
     if image.falls is not None:
         depth = depth - image.falls

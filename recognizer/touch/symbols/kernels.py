@@ -1,11 +1,10 @@
-"""The compiled loops of reading: their library, what they are given, and the numbers they use.
+"""The compiled loops of reading: their library, their arguments, and the numbers they use.
 
-`recognize-object --version` and a run's provenance say that it is these that are in use. The forms
-in numpy are in `tests/reference/touch_loops.py`.
+The forms in numpy are in `tests/reference/touch_loops.py`.
 
-Noise: psi of a reading (`template.psi`) spreads in proportion to what is felt (gain, height and
-force law differ from tactel to tactel), to the slope of the template (tips stand aside), and little
-where nothing is felt. Losses are bounded per tactel: a dead one or a spike costs a known amount.
+Noise: psi of a reading (`template.psi`) spreads in proportion to its value (gain, height and force
+law differ from tactel to tactel), to the slope of the template (tips stand aside), and little where
+nothing presses. Losses are bounded per tactel: a dead one or a spike costs a known amount.
 """
 
 from __future__ import annotations

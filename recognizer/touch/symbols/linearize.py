@@ -2,10 +2,10 @@
 
 Poses (b, 7) and gains (b, 4) of b lattices + image (n tactels) + labels of the cells -> the
 log-likelihood of each, the forces that the symbols give, and how they change with pose and gain.
-The image is psi(f / g) = T_label(R(theta) s + (x, y) - cell), g the force on a plateau (`image`).
-A sensor point s lies at R(theta) s + (x, y) in the lattice frame. Damped least squares (Levenberg,
-Marquardt) for many starts at once: K. Levenberg, Quart. Appl. Math. 2 (1944) 164; D. W. Marquardt,
-J. SIAM 11 (1963) 431. Lattice and sensor frame in mm.
+The image is psi(f / g) = T_label(R(theta) s + (x, y) - cell), g the force on a plateau (`image`),
+s a sensor point. Damped least squares (Levenberg, Marquardt) for many starts at once: K. Levenberg,
+Quart. Appl. Math. 2 (1944) 164; D. W. Marquardt, J. SIAM 11 (1963) 431. Lattice and sensor frame
+in mm.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ MOST_DAMPING = 1e6  #: beyond which a step is nothing
 
 @dataclass(frozen=True, slots=True)
 class LinearizedImage:
-    """An image about b poses and gains, each tactel weighed by what it is worth."""
+    """An image about b poses and gains, each tactel with its weight."""
 
     value: Array  #: (b,) log-likelihood of the image, nats, up to a constant of the image
     jacobian: Array  #: (b, n, 11) forces by pose and gain
@@ -61,14 +61,9 @@ class LinearizedImage:
 def linearize_image(
     image: Image, pose: Array, gain: Array, labels_at: LabelsAt, precision: Array | None = None
 ) -> LinearizedImage:
-    """Return how well lattices of known symbols explain an image, and what a small change does.
+    """Return how well lattices of known symbols explain an image, and its derivatives.
 
-    Parameters
-    ----------
-    pose, gain
-        (b, 7) and (b, 4).
-    precision
-        (11,) how well each unknown is known beforehand; that of the image if not given.
+    `pose` (b, 7), `gain` (b, 4); `precision` (11,) of the prior, that of the image if not given.
     """
     felt, labels, values = project_symbols(image, pose, gain, labels_at)
     if precision is None:
@@ -85,7 +80,7 @@ def linearize_image(
 
 
 def prior_departure(image: Image, pose: Array, gain: Array) -> Array:
-    """Return how far (b, 11) each unknown lies from what is known of it beforehand."""
+    """Return how far (b, 11) each unknown lies from its prior."""
     away = np.zeros((len(pose), UNKNOWNS))
     away[:, 3:POSE] = pose[:, 3:]
     if image.newtons:
@@ -94,7 +89,7 @@ def prior_departure(image: Image, pose: Array, gain: Array) -> Array:
 
 
 def prior_precision(image: Image) -> Array:
-    """Return what is known of each unknown beforehand, one over its variance (11,); 0: nothing."""
+    """Return the prior of each unknown, one over its variance (11,); 0: nothing is known."""
     precision = np.zeros(UNKNOWNS)
     precision[3:POSE] = 1 / np.square([*FORM_SD, image.options.scale_sd])
     if image.newtons:
@@ -149,9 +144,9 @@ def project_symbols(
 
 
 def _with_bare_face(felt: NormalizedImage, labels: Ints, found: Array) -> Array:
-    """Return psi and slopes (b, n, 6) of the bare face where there is no symbol.
+    """Return psi and slopes (b, n, 6), of the bare face where there is no symbol.
 
-    Beyond the edge of a face nothing is felt: a tactel without a symbol shows the nearer of both.
+    Beyond the edge of a face nothing presses: a tactel without a symbol shows the nearer of both.
     """
     found[labels < 0] = 0.0
     floor = psi(felt.bare)
@@ -171,7 +166,7 @@ def response_by_psi(response: Array) -> Array:
 
 
 def _cells_under(image: Image, pose: Array) -> tuple[Ints, Array]:
-    """Return the cell (b, n, 2) under each tactel, and where in it that lies, mm."""
+    """Return the cell (b, n, 2) under each tactel, and the tactel's offset from its centre, mm."""
     c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
     pitch = image.template.pitch_mm
     x, y = image.points_mm.T
@@ -182,7 +177,7 @@ def _cells_under(image: Image, pose: Array) -> tuple[Ints, Array]:
 
 
 def _fit_form(tables: Floats, pose: Array, felt: NormalizedImage) -> Floats:
-    """Return templates (b, n, q, 6), their own to be changed, as form and gain are fitted."""
+    """Return templates (b, n, q, 6) under form and gain; they may be changed."""
     for slope, by in enumerate(pose[:, 3:6, None, None].astype(np.float32).swapaxes(0, 1), 3):
         tables[..., 0] += tables[..., slope] * by
     if (felt.contact < 1).any():
@@ -198,27 +193,21 @@ def _fit_form(tables: Floats, pose: Array, felt: NormalizedImage) -> Floats:
 
 
 def psi_deviation(felt: NormalizedImage, tables: Floats | Array, unit: Array) -> Floats:
-    """Return the spread (b, n, q) of psi around templates (b, n, q, 6), in units of the noise.
-
-    Parameters
-    ----------
-    unit
-        (b, n) that unit: deviation of psi on a covered tactel.
-    """
+    """Return the spread (b, n, q) of psi around templates (b, n, q, 6), in units (b, n)."""
     value, x, y = tables[..., 0], tables[..., 1], tables[..., 2]
     square = QUIET**2 + value * value + DISPLACED_MM**2 * (x * x + y * y)
     return np.asarray(np.sqrt(square + _readings_share(felt, value, unit)), np.float32)
 
 
 def _readings_share(felt: NormalizedImage, value: Array | Floats, unit: Array) -> Array | float:
-    """Return what the noise of readings adds to the square (b, n, q) of a spread."""
+    """Return the share of the noise of readings in the square (b, n, q) of a spread."""
     if felt.faint.max(initial=0.0) < LOUD:
         return 0.0
     return (reading_deviation(felt, value) / unit[..., None]) ** 2
 
 
 def reading_deviation(felt: NormalizedImage, value: Array | Floats) -> Array:
-    """Return the standard deviation of psi (b, n, q) that the noise of readings leaves at it."""
+    """Return the standard deviation of psi (b, n, q) by the noise of readings."""
     by_response = PSI / math.log1p(PSI) * np.exp(-math.log1p(PSI) * value)
     return np.asarray(by_response * felt.faint[..., None])
 
@@ -249,7 +238,7 @@ def log_densities(
 
 
 class Point(Protocol):
-    """Where b starts are: a dataclass whose fields are arrays (b, ...)."""
+    """b starts: a dataclass whose fields are arrays (b, ...)."""
 
     @property
     def value(self) -> Array:
@@ -275,16 +264,10 @@ def ascend(
     settled: float = 0.0,
     harder: float = HARDER,
 ) -> P:
-    """Return the best points that are reached in `steps` damped steps.
+    """Return the best points within `steps` damped steps; `settled` ends when values change less.
 
-    Parameters
-    ----------
-    moved
-        (points, damping (b,)) -> the points a step further.
-    settled
-        End when no step changes a value by as much.
-    harder
-        Factor of the damping after a step that does not help.
+    `moved` takes points and damping (b,) to the points a step further; `harder` multiplies the
+    damping after a step that does not help.
     """
     best, damping = start, np.full(len(start.value), DAMPING)
     for _ in range(steps):

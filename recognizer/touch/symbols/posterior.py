@@ -1,10 +1,10 @@
 """Where a lattice of known symbols lies, how sure that is, and how much of the image it explains.
 
-Image + a lattice near the truth + the labels of its cells -> pose, gain and their covariance. Two
-numbers decide what each tactel is worth and how wide the ellipse is, and are fitted to each touch:
-how far its readings scatter, and how far its tips stand aside (`TactelScatter`). So are an offset
-of all readings, and how much neighbouring readings hold of each other (blur), which makes slopes
-less steep than the template's. Damped least squares; lattice and sensor frame, mm.
+Image + a lattice near the truth + the labels of its cells -> pose, gain and their covariance. The
+scatter of readings and that of the tips' places (`TactelScatter`) weigh the tactels, and are fitted
+to each touch; so are an offset of all readings, and the share of neighbouring readings in each
+(blur), which makes slopes less steep than the template's. Damped least squares; lattice and sensor
+frame, mm.
 
 The compiled loop does all of it where normal matrices are well conditioned; about one touch in a
 hundred is fitted here, with an inverse that stays wide in what the image does not show.
@@ -93,7 +93,7 @@ class TactelScatter:
         return -0.5 * float((trust * loss).sum())
 
     def weights(self, left: Array, parts: Array, trust: Array) -> Array:
-        """Return one over the variance (n,), less for what lies far out."""
+        """Return one over the variance (n,), less for outliers."""
         variance = self.variances(parts)
         return np.asarray(trust * (FREEDOM + 1) / (FREEDOM * variance + left * left))
 
@@ -125,13 +125,7 @@ def refit_pose(image: Image, fit: Fit, labels_at: LabelsAt) -> Fit:
 
 
 def fit_posterior(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> PosePosterior:
-    """Return the pose of a lattice whose symbols are known.
-
-    Parameters
-    ----------
-    pose, gain
-        (7,) and (4,), to begin with.
-    """
+    """Return the pose of a lattice whose symbols are known, from `pose` (7,) and `gain` (4,)."""
     found = _fit_compiled(image, pose, gain, labels_at)
     pose, gain, more, now, normal = found or fit_steps(image, pose, gain, labels_at)
     inverse = invert_normal(normal)
@@ -147,7 +141,6 @@ _Fitted = tuple[Array, Array, Array, Array, Array]
 
 
 def _fit_compiled(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> _Fitted | None:
-    """Return the fit; None where a normal matrix is badly conditioned."""
     labels, corner = label_tables(image, pose[None], STEPS, labels_at)
     scene = image.scene.of_lattices(1, labels)
     aside = np.ascontiguousarray(np.broadcast_to(image.aside, len(image.forces)), np.float64)
@@ -182,7 +175,7 @@ class _Linearized:
 
 
 def fit_steps(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> _Fitted:
-    """Return the fit, whatever the image shows."""
+    """Return the fit, however well the image determines it."""
     precision, trust = precision_of(image), image.trust
     known = np.diag(precision)
     at = _linearize(image, pose, gain, np.zeros(3), labels_at)
@@ -247,7 +240,7 @@ def _move(
 
 
 def step_bounds(image: Image) -> tuple[Array, Array]:
-    """Return what is added to the diagonal (14,), and the largest step (14,)."""
+    """Return the least diagonal (14,), and the largest step (14,)."""
     most = np.array([*LARGEST_STEP, *LARGEST_MORE])
     most[UNKNOWNS] *= float(image.forces.max())
     return np.array([*LEAST_DIAGONAL, *LEAST_MORE]), most
@@ -258,19 +251,19 @@ def _clip(values: Array, most: Array) -> Array:
 
 
 def precision_of(image: Image) -> Array:
-    """Return what is known of each unknown beforehand, one over its variance (14,)."""
+    """Return the prior of each unknown, one over its variance (14,)."""
     offset = OFFSET_SD * max(float(image.forces.max()), 1e-12)
     more = 1.0 / np.square([offset, BLUR_SD, BLUR_SD])
     return np.concatenate([prior_precision(image), more])
 
 
 def _size(pose: Array, more: Array) -> float:
-    """Return by how much the covariance is wider than least squares say.
+    """Return by how much the covariance is wider than least squares give.
 
-    Readings that hold much of each other do so in a way that no second difference describes. And
-    where strokes have another form than was known beforehand, more of the template is wrong than
-    the fitted part of it: the rest moves all symbols alike and leaves no residual
-    (`docs/recognizer.md`, "How sure it is").
+    Readings with a large share of each other share it in a way that no second difference describes.
+    And where strokes are far from their prior form, more of the template is wrong than the fitted
+    part of it: the rest moves all symbols alike and leaves no residual (`docs/recognizer.md`, "How
+    sure it is").
     """
     cross_talk = CROSS_TALK * (1 + float(pose[4]))
     cross_talk += 2 * float(more[1:].sum())
@@ -286,25 +279,14 @@ def fit_scatter(
 ) -> TactelScatter:  # fmt: skip
     """Return the scatter under which residuals are likeliest, drawn towards the usual one.
 
-    One part goes with what is felt (gains, lengths of tips, noise), the other with the image's
-    slope (tips that stand aside): a sensor whose gains are even and whose tips are not would
-    otherwise pass for a better one than it is. Restricted maximum likelihood by expectation and
-    maximisation: K. L. Lange, R. J. A. Little, J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989) 881;
-    D. A. Harville, same journal, 72 (1977) 320.
+    One part goes with the reading (gains, lengths of tips, noise), the other with the image's slope
+    (tips that stand aside): a sensor with even gains and uneven tips would otherwise pass for a
+    better one than it is. Restricted maximum likelihood by expectation and maximisation: K. L.
+    Lange, R. J. A. Little, J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989) 881; D. A. Harville, same
+    journal, 72 (1977) 320.
 
-    Parameters
-    ----------
-    before
-        To begin with.
-    left
-        (n,) residuals.
-    parts
-        (2, n) variances of a scatter of 1 and 1.
-    jacobian, known
-        (n, k) by which what was fitted took up a share of the residuals, and the precision (k, k)
-        of what was known of it.
-    trust
-        (n,) of the tactels.
+    `left` (n,) are residuals, `parts` (2, n) variances of a scatter of 1 and 1, `jacobian` (n, k)
+    by what was fitted, `known` (k, k) the prior precision of that.
     """
     usual = np.square([USUAL_SCATTER, USUAL_ASIDE_MM])
     now = np.square([before.felt, before.aside_mm])
@@ -323,8 +305,8 @@ def fit_scatter(
 def second_differences(images: Array, shape: tuple[int, int]) -> tuple[Array, Array]:
     """Return second differences across rows (n, k), and across columns, of images (n, k).
 
-    Readings run into each other along rows and columns: a reading that holds the share b of both
-    its neighbours is the image plus b times its second difference. Beyond the rim nothing is felt.
+    A reading that holds the share b of both its neighbours is the image plus b times its second
+    difference. Beyond the rim readings are 0.
     """
     square = images.reshape(*shape, -1)
     rows, columns = -2.0 * square, -2.0 * square
@@ -336,15 +318,10 @@ def second_differences(images: Array, shape: tuple[int, int]) -> tuple[Array, Ar
 
 
 def explained_share(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> float:
-    """Return the share of the variance of psi that given symbols explain where they stand.
+    """Return the share of the variance of psi that given symbols explain; it may be below 0.
 
-    It is less than 0 where they explain nothing. The part that the noise of readings alone would
-    leave is taken off first.
-
-    Parameters
-    ----------
-    pose, gain
-        (7,) and (4,) of one lattice.
+    The part that the noise of readings alone would leave is taken off first. `pose` (7,), `gain`
+    (4,) are those of one lattice.
     """
     labels, corner = label_tables(image, pose[None], 0, labels_at)
     scene = image.scene.of_lattices(1, labels)

@@ -1,13 +1,12 @@
 """Coarse search: every rotation and shift of the lattice at once.
 
-The score of a symbol k at a place y of the sensor is sum_t w (2 f T_k - T_k^2) over tactels
-t, two correlations of the image with what the symbol looks like there. What it looks like half a
-turn further is the same, seen through the place: so tactels that lie opposite are taken together,
-and the sums and differences of such pairs, multiplied with the even and the odd part of half the
-turns, give all of them. All symbols, rotations and sub-tactel phases together are these two matrix
-products; the score of a lattice is then the sum, over its cells, of the best symbol of each (or
-none), by a table of look-ups.
-Sensor frame, mm; psi values as in `template`.
+The score of a symbol k at a place y of the sensor is sum_t w (2 f T_k - T_k^2) over tactels t, two
+correlations of the image with the symbol's response there. The response half a turn further is the
+one seen through the place: so tactels that lie opposite are taken together, and the sums and
+differences of such pairs, multiplied with the even and the odd part of half the turns, give all of
+them. All symbols, rotations and sub-tactel phases together are these two matrix products; the score
+of a lattice is then the sum, over its cells, of the best symbol of each (or none), by a table of
+look-ups. Sensor frame, mm; psi values as in `template`.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ NOTHING = 1e-9  #: response below which it is the rounding error of none
 
 @dataclass(frozen=True, eq=False)
 class Bank:
-    """Everything about the search that does not depend on the image."""
+    """The part of the search that does not depend on the image."""
 
     shape: tuple[int, int]  #: rows and columns of the image
     reach: int  #: kernels are (2 reach + 1) tactels wide
@@ -66,7 +65,7 @@ def bank_of(
     shifts: int = SHIFTS,
     reach: float = REACH,
 ) -> Bank:
-    """Return the tables of a search; `reach` of a template's half width is covered by kernels."""
+    """Return the tables of a search."""
     phases, rim = PHASES, RIM
     across, down = sensor.step_mm
     turns = np.arange(rotations) * 2 * np.pi / rotations  # an even number
@@ -116,7 +115,7 @@ def _lookups(
     phases: int,
     shifts: int,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Return which place each cell of each lattice falls on."""
+    """Return the place of each cell of each lattice."""
     p, (across, down) = template.pitch_mm, sensor.step_mm
     step = (np.arange(shifts) + 0.5) / shifts * p
     shifts_mm = np.stack(np.meshgrid(step, step), axis=-1).reshape(-1, 2)
@@ -147,10 +146,7 @@ class LatticeScores:
     around: Floats  #: the best of each score and its neighbours; rotations and shifts are cyclic
 
     def best(self, bank: Bank, keep: int) -> NDArray[np.float64]:
-        """Return the best lattices (n, 3), at most `keep`, no two of them neighbours.
-
-        x, y (mm), theta: sensor point s lies at R(theta) s + (x, y) in the lattice frame.
-        """
+        """Return the `keep` best lattices (n, 3) in x, y (mm), theta, no two of them neighbours."""
         shifts, flat = self.scores.shape[1], self.scores.ravel()
         peaks = np.flatnonzero(flat >= self.around.ravel())
         order = peaks[np.argsort(-flat[peaks], kind="stable")][:keep]
@@ -161,14 +157,8 @@ class LatticeScores:
 def score_lattices(bank: Bank, values: Floats, weights: Floats, order: int) -> LatticeScores:
     """Return the scores of all lattices.
 
-    Parameters
-    ----------
-    values
-        (rows, columns) psi of the normalised forces.
-    weights
-        (rows, columns) 0 ... 1; 0 where a tactel says nothing.
-    order
-        Number of symbols.
+    `values` (rows, columns) are psi of the normalised forces, `weights` 0 ... 1, 0 where a tactel
+    is not used; `order` is the number of symbols.
     """
     pad = bank.reach + bank.rim
     rows, columns = bank.shape

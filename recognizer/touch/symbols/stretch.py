@@ -1,11 +1,10 @@
 """How the lattice of one touch is stretched: its scale both ways, its skew, its stroke width.
 
-A fit whose symbols are known + image -> Stretch. The reader fits one scale of the lattice; a
-print may be longer one way than the other, and its axes need not stand at right angles. A sensor
-point s then lies at A s + (x, y) in the lattice frame, A = (1 + e) R(theta) G with G = [[1 + a,
-c], [c, 1 - a]]: two unknowns more than `refine` has, found with all the others by damped least
-squares on the image. Of scale and stroke width nothing is taken as known beforehand, so that
-many touches average to what was printed. mm, sensor and lattice frame.
+A fit whose symbols are known + image -> Stretch. The reader fits one scale; a print may be longer
+one way than the other, and its axes need not be square. A sensor point s then lies at A s + (x, y)
+in the lattice frame, A = (1 + e) R(theta) G with G = [[1 + a, c], [c, 1 - a]]: two unknowns more
+than `refine` has, found with all others by damped least squares. Scale and stroke width have no
+prior, so that many touches average to what was printed. mm, sensor and lattice frame.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ SHEAR_LEAST = (10.0, 10.0)  #: is added to the diagonal of its normal matrix
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stretch:
-    """How one touch felt the print."""
+    """The print by one touch."""
 
     strain: Array  #: (3,) xx, yy and xy of (F'F - 1) / 2, F from the lattice to the print
     wider_mm: float  #: strokes, than asked
@@ -55,7 +54,7 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True)
 class _StretchedLattice:
-    """One lattice, as a stack of one: what `damped.ascend` moves."""
+    """One lattice, as a stack of one, for `ascend`."""
 
     pose: Array  # (1, 7)
     gain: Array  # (1, 4)
@@ -66,15 +65,7 @@ class _StretchedLattice:
 
 
 def fit_stretch(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> Stretch:
-    """Return how the lattice under a touch is stretched.
-
-    Parameters
-    ----------
-    pose, gain
-        (7,) and (4,) of the fit, to begin with.
-    labels_at
-        Labels of the cells.
-    """
+    """Return how the lattice is stretched, from `pose` (7,) and `gain` (4,) of the fit."""
     precision = prior_precision(image)
     precision[[3, POSE - 1]] = 0.0
     least = np.array([*LEAST_DIAGONAL, *SHEAR_LEAST])

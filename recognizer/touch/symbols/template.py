@@ -1,18 +1,15 @@
-"""What the sensor feels of each symbol, through the overlay that is fitted.
+"""Responses of the sensor to each symbol, through the overlay that is fitted.
 
-Alphabet + style + sensor -> Template: the response of a tactel whose centre lies at an
-offset from the centre of a symbol, 0 over the bare face, 1 over a wide plateau. Offsets in
-the symbol's axes (x along the array's columns, y against its rows), mm.
+Alphabet + style + sensor -> Template: the response of a tactel whose centre lies at an offset from
+the centre of a symbol, 0 over the bare face, 1 over a wide plateau. Offsets in the symbol's axes (x
+along the array's columns, y against its rows), mm.
 
-A tab feels the share of its tip that the plateau covers, and a little more than that share
-because a partly covered tip bulges into the open side; what a pad feels is pressed once by
-the layer model; a pixel of a gel sees the mean of the imprint, which membrane and optics
-blur. Responses are kept as
-psi(y) = log(1 + 3 y) / log 4, in which gain errors and noise have about one size. Three
-things are fitted with the rest, to first order: how much wider than asked the strokes are
-printed, how far tactels hear their neighbours, and an exponent, for a force law that is not
-quite the one that was taken off.
-Thesis 4.2, 6.2.
+A tab responds to the share of its tip that the plateau covers, and a little more, because a partly
+covered tip bulges into the open side; a pad's responses are pressed once by the layer model; a
+pixel of a gel sees the mean of the imprint, which membrane and optics blur. Responses are kept as
+psi(y) = log(1 + 3 y) / log 4, in which gain errors and noise have about one size. Three things are
+fitted with the rest, to first order: the excess of the strokes' width, cross-talk, and an exponent
+for a force law that is not quite the assumed one. Thesis 4.2, 6.2.
 """
 
 from __future__ import annotations
@@ -98,7 +95,7 @@ def template_of(
     style: SymbolStyle,
     sensor: SensorType,
 ) -> ResponseTemplate:
-    """Return the template of an alphabet, as embossed and as felt by a sensor."""
+    """Return the template of an alphabet, as embossed and on a sensor."""
     step, (low, high) = STEP_MM, EXPONENTS
     pad = sensor.overlay.kind == "pad"
     felt = _RESPONSES[sensor.overlay.kind]
@@ -177,12 +174,8 @@ def _pressures(
 
     A pad passes a load on farther than a cell and bridges symbols that stand close together: its
     response is no blur of the symbol alone. Each symbol is pressed among others by the layer model
-    on tactels far finer than the real ones. Thesis 4.2.
-
-    Parameters
-    ----------
-    axis_mm
-        (n,) offsets from the cell's centre, both ways; rows run upwards.
+    on tactels far finer than the real ones. `axis_mm` (n,) are offsets from the cell's centre, both
+    ways; rows run upwards.
     """
     from scipy.ndimage import map_coordinates
 
@@ -253,7 +246,7 @@ _RESPONSES = {"tab": _tab_responses, "pad": _pad_responses, "gel": _gel_response
 
 
 def _with_cross_talk(felt: Array, share: float, sensor: SensorType, step: float) -> Array:
-    """Return responses of tactels that hear a share of what stands one tactel away, all around."""
+    """Return responses of tactels with a share of the readings one tactel away, all around."""
     around = _convolved(felt, _annulus(math.sqrt(math.prod(sensor.step_mm)), step))
     return np.asarray(np.maximum((1 - share) * felt + share * around, 0.0))
 
@@ -285,7 +278,7 @@ def _distance(strokes: Array, x: Array, y: Array) -> Array:
 
 
 def _presence(distance: Array, style: SymbolStyle) -> Array:
-    """Return how much of the plateau's pressure is felt at a point: 1 on it, falling on a wall."""
+    """Return the share of the plateau's pressure at a point: 1 on it, falling on a wall."""
     top = style.stroke_mm / 2 - style.chamfer_mm
     slope = math.tan(max(style.draft_rad, 0.02))
     wall = min(PENETRATION_MM, style.height_mm) * slope + style.chamfer_mm
@@ -293,7 +286,7 @@ def _presence(distance: Array, style: SymbolStyle) -> Array:
 
 
 def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> float:
-    """Return how far from its centre a symbol is felt."""
+    """Return the distance from its centre at which a symbol is not felt any more."""
     strokes = alphabet.reach * style.pitch_mm + style.stroke_mm / 2 + style.draft_mm
     overlay = sensor.overlay
     if overlay.kind == "gel":

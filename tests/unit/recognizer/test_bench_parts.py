@@ -523,7 +523,7 @@ def test_loads_that_tell_nothing_are_refused_with_what_is_missing():
 
 @pytest.mark.parametrize(
     "url",
-    ["sim:touch?firmware=z80", "touch:?rate=0", "touch:?rate=nan", "touch:?x=1", "touch:?hold=a"],
+    ["sim:touch?firmware=avr", "touch:?rate=0", "touch:?rate=nan", "touch:?x=1", "touch:?hold=a"],
 )
 def test_a_simulated_probe_that_cannot_be_had(url):
     with pytest.raises(BenchError):
@@ -531,8 +531,7 @@ def test_a_simulated_probe_that_cannot_be_had(url):
 
 
 def test_a_simulated_probe_as_asked():
-    firmware, manner = parse_simulation("touch:?firmware=avr&rate=50&hold=1&noise=quiet&seed=3")
-    assert firmware
+    manner = parse_simulation("touch:?rate=50&hold=1&noise=quiet&seed=3")
     assert (manner.rate, manner.hold_s, manner.noise, manner.seed) == (50, 1, "quiet", 3)
 
 

@@ -19,7 +19,7 @@ from probe.simulate.registered import registered_surface
 from recognizer.scan.mosaic.planar import relative_pose, transform_points
 from recognizer.thesis.merge import average_touches, merge_touches, relative_poses
 from recognizer.thesis.read import read_classically
-from recognizer.thesis.scan import read_scan, read_while_scanning
+from recognizer.thesis.scan import read_scan
 from recognizer.thesis.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW
@@ -136,7 +136,6 @@ def test_products_find_steps_to_a_quarter_of_a_tactel():
     wrong = np.array([[0, 0, 0], [2 * quarter, quarter, 0]])
     found = merge_touches(SENSOR, [blob, moved_blob], believed + wrong)
     assert found.poses[1, :2] == pytest.approx([16 * quarter, 0.0], abs=1e-9)
-    assert found.corrected.tolist() == [False, True]
 
 
 def test_where_nothing_is_felt_in_common_the_belief_stays():
@@ -145,7 +144,6 @@ def test_where_nothing_is_felt_in_common_the_belief_stays():
     poses = np.array([[0.0, 0, 0], [6.3, 0.2, 0]])
     found = merge_touches(SENSOR, [blob, np.roll(blob, 12, axis=1)], poses)
     assert found.poses == pytest.approx(relative_poses(poses))
-    assert not found.corrected.any()
 
 
 def test_bad_tactels_are_filled_by_other_touches():
@@ -194,7 +192,7 @@ def test_a_scan_names_object_face_and_place(lab, scan, placing):
     found = read_scan(lab, SENSOR, scan.readings, scan.believed, placing)
     answer = found.recognition
     assert (answer.object, answer.face) == ("Cube", "F2")
-    assert found.reading.grid.window.shape == (6, 6)
+    assert found.grid.window.shape == (6, 6)
     x, y, theta = scan.true[-1]
     assert math.dist(answer.T_face_probe[:2, 3], (x, y)) < 3.0
     turned = math.atan2(answer.T_face_probe[1, 0], answer.T_face_probe[0, 0])
@@ -205,11 +203,11 @@ def test_a_scan_names_object_face_and_place(lab, scan, placing):
         for encoded in map(lab.arrays[0].face, range(len(lab.arrays[0].faces)))
         if (encoded.object, encoded.face) == ("Cube", "F2")
     )
-    at = transform_points(scan.true[0], np.array([[s.x_mm, s.y_mm] for s in found.reading.symbols]))
+    at = transform_points(scan.true[0], np.array([[s.x_mm, s.y_mm] for s in found.symbols]))
     right = wrong = 0
     for centre, label in zip(face.centres_mm, face.labels, strict=True):
         near = np.linalg.norm(at - centre, axis=1) < 4
-        named = {found.reading.symbols[k].label for k in np.flatnonzero(near)} - {-1}
+        named = {found.symbols[k].label for k in np.flatnonzero(near)} - {-1}
         right += label in named
         wrong += bool(named) and label not in named
     assert wrong == 0
@@ -224,26 +222,17 @@ def test_a_turned_scan_of_a_triangle(url, lab):
         assert math.dist(found.recognition.T_face_probe[:2, 3], scan.true[-1, :2]) < 3
     else:
         assert found.recognition.reason in (TOO_FEW, AMBIGUOUS, NOT_ENCODED)
-    assert len(found.reading.grid.members) >= 12
-
-
-@pytest.mark.parametrize("conversion", ["likelihood", "good tuple", "exact"])
-def test_every_conversion_reads_the_window(lab, scan, conversion):
-    image = merge_touches(SENSOR, scan.readings, scan.believed, "believed").image
-    answer = read_classically(lab, image, conversion).recognition
-    assert (answer.object, answer.face) in {("Cube", "F2"), (None, None)}
-    if conversion == "likelihood":
-        assert answer.object == "Cube"
+    assert len(found.grid.members) >= 12
 
 
 def test_an_answer_comes_before_the_scan_is_over_and_never_a_wrong_one(lab, scan):
     first = None
-    for found in read_while_scanning(
-        lab, SENSOR, scan.readings, scan.believed, "bounded", every=15
-    ):
-        if found.recognition:
-            assert (found.recognition.object, found.recognition.face) == ("Cube", "F2")
-            first = first or len(found.merged.poses)
+    for number in [*range(15, len(scan.readings), 15), len(scan.readings)]:
+        some = scan.readings[:number], scan.believed[:number]
+        found = read_scan(lab, SENSOR, *some, "bounded").recognition
+        if found:
+            assert (found.object, found.face) == ("Cube", "F2")
+            first = first or number
     assert first is not None
     assert 30 <= first <= len(scan.readings)
 
@@ -267,7 +256,7 @@ def test_no_contact_and_blank_surfaces_are_told(lab):
 def test_an_object_of_another_lab_is_not_taken_for_one_of_ours(lab, tmp_path):
     scan = Scan(made(tmp_path, OTHER), "Stranger", "F1", seed=5)
     found = read_scan(lab, SENSOR, scan.readings, scan.believed, "believed")
-    assert len(found.reading.grid.members) > 24  # its symbols are read, and are none of ours
+    assert len(found.grid.members) > 24  # its symbols are read, and are none of ours
     assert not found.recognition
 
 

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from recognizer.thesis.grid import grid
-from recognizer.thesis.skeleton import KeyPoints
 from recognizer.thesis.symbols import Symbol
 
-NONE = KeyPoints(np.zeros((0, 2)), np.zeros((0, 2)), 0)
 PITCH = 12.0
 
 
 def symbol(x, y, theta, label=0, off=0.1):
     rejected = "" if label >= 0 else "counts"
-    return Symbol(label, x, y, theta, (x, y), off, NONE, rejected)
+    return Symbol(label, x, y, theta, (x, y), off, rejected)
 
 
 def laid(labels, theta=0.0, at=(0.0, 0.0), rng=None, place=0.0, turn=0.0):

@@ -128,5 +128,4 @@ def test_right_counts_in_the_wrong_shape_are_rejected():
     wide = drawn(alphabet, [(0, 0, 0, 0.0)], size_mm=40, pitch=22.0, half_mm=0.9)
     (found,) = symbols(wide, alphabet, style(alphabet))
     assert (found.label, found.rejected) == (-1, "shape")
-    (found,) = symbols(wide, alphabet, style(alphabet), most_residual=math.inf)
-    assert found.label == 0
+    assert math.isfinite(found.off_mm)  # its counts are those of a glyph

@@ -156,20 +156,7 @@ class PadLines:
     @property
     def unknowns(self) -> int:
         """Displacements of the quarter."""
-        return 6 * self.top_nodes * (self.z.size - 1)
-
-    @property
-    def top_nodes(self) -> int:
-        """Nodes on the top of the quarter."""
-        return (2 * self.x.size - 1) * (2 * self.y.size - 1)
-
-    def bytes_needed(self, tactels: int) -> int:
-        """Return the peak memory of `condense`, for a number of tactels on the quarter."""
-        right = self.top_nodes + tactels
-        block = 12 * (2 * self.y.size - 1) * (self.z.size - 1)
-        sweep = 5 * block * block + 3 * block * right + 2 * right * right
-        sparse = 1.5 * 3 * 250 * self.unknowns
-        return int(8 * (len(PARITIES) * self.top_nodes * right + sweep + sparse))
+        return 6 * (2 * self.x.size - 1) * (2 * self.y.size - 1) * (self.z.size - 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
