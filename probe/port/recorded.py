@@ -27,14 +27,14 @@ def open_recording(address: Address) -> Port:
     RecordingError
         When the file is no recording.
     """
-    from probe.recording.read import Recording, read_frames
+    from probe.recording.read import Recording
 
     refuse_unknown(address, ("speed", "loop"))
     speed = number(address, "speed", 1.0)
     again = number(address, "loop", 0.0) > 0
-    frames, (rows, columns) = read_frames(address.target), Recording(address.target).shape
+    frames, (rows, columns) = Recording(address.target).frames(), Recording(address.target).shape
     if again:
-        frames = endless_frames(lambda: read_frames(address.target))
+        frames = endless_frames(lambda: Recording(address.target).frames())
     # Recordings of other sensors may hold readings of up to 16 bits.
     ident = IdentPacket(seq=0, t_us=0, bits=16, settling_us=0.0, baud=0, name="replay",
                         rows=rows, columns=columns)  # fmt: skip
