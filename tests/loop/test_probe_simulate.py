@@ -18,10 +18,10 @@ from probe.contact.press import press
 from probe.errors import SurfaceError
 from probe.recording.read import Recording
 from probe.simulate.registered import DatabaseUnreadableError, registered_object, registered_surface
+from probe.simulate.scene import TouchRanges, pose_of, random_touches
 from probe.simulate.sensor import simulated_sensor
 from probe.simulate.source import frames_of, options_of
 from probe.simulate.target import part_surface, surface_of
-from probe.simulate.touch import TouchRanges, pose_of, random_touches
 from probe.simulate.written import part_mesh
 
 SET = """
