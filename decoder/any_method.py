@@ -103,12 +103,8 @@ def decode(
 def array_of_profile(profile: str = "", lab_key: str = "") -> FoldedArray | ProductArray:
     """Return a lab's array of a profile; without a key the published one.
 
-    Raises
-    ------
-    ArrayError, LabKeyError
-        No such profile, no such key.
-    DecoderError
-        A key, and a profile that is the same in every lab.
+    Raises `ArrayError` or `LabKeyError` for no such profile or key, `DecoderError` for a key and a
+    profile that is the same in every lab.
     """
     named = profile_named(profile or DEFAULT_PROFILE)
     if lab_key and not named.keyed:
@@ -124,23 +120,10 @@ def decode_on(
     held: Registered | None = None,
     **likelihood: Any,
 ) -> Decoded:
-    """Return the place of one window on an array, with whose it is if a lab holds it.
+    """Return the place of one window (rows, columns), with whose it is if a lab holds it.
 
-    Parameters
-    ----------
-    array, window
-        The array and (rows, columns) labels.
-    method
-        See `decode`.
-    held
-        What a lab's database holds of the array.
-    **likelihood
-        Parameters of `decode_likelihood`; the other methods have none.
-
-    Raises
-    ------
-    MethodError
-        No such method, or one that does not serve this array.
+    `likelihood` are parameters of `decode_likelihood`; the other methods have none. Raises
+    `MethodError` for no such method, or one that does not serve this array.
     """
     if method not in METHODS:
         raise MethodError(f"unknown method '{method}'", fix=f"choose one of {', '.join(METHODS)}")

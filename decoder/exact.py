@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,19 +30,7 @@ from generator.array.sequence import Sequence
 _FEW_MASKS = 4  # sets of visible cells for which a linear map each is prepared
 
 
-class Conversion(Protocol):
-    """A method: field elements -> indices."""
-
-    @property
-    def nbytes(self) -> int:
-        """Memory of its tables, bytes."""
-        ...
-
-    def convert(self, states: Element) -> NDArray[np.uint64]:
-        """Return the index of each element (none of them 0); (N,)."""
-        ...
-
-
+Conversion = Table | Milestones | Logarithm  #: a method: field elements (N,) -> indices (N,)
 METHODS: dict[str, Callable[[Sequence], Conversion]] = {
     "table": Table,
     "serial": serial,
@@ -77,19 +64,7 @@ class Terms:
 
 
 def convert_terms(sequence: Sequence, offsets: list[int], labels: Labels, method: str) -> Terms:
-    """Find the indices of symbols seen at given offsets of one sequence.
-
-    Parameters
-    ----------
-    sequence
-        The m-sequence.
-    offsets
-        (k,) relative indices.
-    labels
-        (N, k) symbols, -1 where none is seen.
-    method
-        A key of `METHODS`.
-    """
+    """Find the indices of symbols (N, k), -1 where none is seen, at offsets of one sequence."""
     number = len(labels)
     found = Terms(np.zeros(number, np.uint64), np.zeros(number, np.uint8), {})
     prepared = conversion(sequence, method)
@@ -154,9 +129,9 @@ def _list_candidates(
 def convert_product(array: ProductArray, labels: Labels, method: str) -> tuple[Terms, Terms]:
     """Return the indices along the rows and along the columns of (N, a, b) windows.
 
-    Every symbol gives the term of its row and the term of its column, so one visible symbol in
-    every row and every column that is needed serves: max(k1, k2) of them for a k1 x k2 window,
-    not p + q - 1 as the thesis says for figure 5.11. Symbols of one row must agree.
+    Every symbol gives the term of its row and the term of its column: one visible symbol in every
+    row and every column that is needed serves, max(k1, k2) of them for a k1 x k2 window, not
+    p + q - 1 as the thesis says for figure 5.11. Symbols of one row must agree.
     """
     factors = np.concatenate([array.factors, np.full((1, 2), ERASED)])[labels]
     found = []
@@ -181,32 +156,13 @@ def _agreement(factors: Labels, axis: int) -> tuple[Labels, NDArray[np.bool_]]:
 def decode_exact(
     array: FoldedArray | ProductArray, windows: ArrayLike, method: str = "logarithm"
 ) -> Decodings:
-    """Decode windows without wrong symbols.
+    """Decode windows without wrong symbols: (N, rows, columns) labels, -1 where none is seen.
 
-    Parameters
-    ----------
-    array
-        The array.
-    windows
-        (rows, columns) or (N, rows, columns) labels, -1 where a symbol is not seen.
-    method
-        "table", "serial", "milestones" or "logarithm".
+    Or one window. "too few symbols" (and up to 64 candidates) where the cells seen have not full
+    rank, "not an encoded surface" where they contradict the array. Raises `WindowError` if the
+    windows are not of this array's symbols, `MethodError` if the method is unknown or the array too
+    large for it.
 
-    Returns
-    -------
-    Decodings
-        With "too few symbols" (and up to 64 candidates) where the cells seen have not full
-        rank, "not an encoded surface" where they contradict the array.
-
-    Raises
-    ------
-    WindowError
-        If the windows are not of this array's symbols.
-    MethodError
-        If the method is unknown, or the array is too large for it.
-
-    Examples
-    --------
     >>> from generator.array import profile
     >>> window = [[0, 1], [1, 1], [0, 1], [0, 1], [0, 0], [0, 1]]  # figure 6.17
     >>> decode_exact(profile("thesis").array(), window)[0].t
@@ -215,9 +171,8 @@ def decode_exact(
     labels = checked_labels(windows, array.order)
     if isinstance(array, ProductArray):
         return _of_product(array, labels, method)
-    number, a, b = labels.shape
-    offsets = _offsets(array, a, b)
-    seen = array.terms_of(labels).reshape(number, a * b)
+    offsets = array.offsets(*np.indices(labels.shape[1:]))
+    seen = array.terms_of(labels).reshape(len(labels), len(offsets))
     terms = convert_terms(array.sequence, offsets, seen, method)
     rows, columns = np.uint64(array.rows), np.uint64(array.columns)
     listed = {
@@ -232,13 +187,6 @@ def decode_exact(
         terms.reasons,
         candidates=listed,
     )
-
-
-def _offsets(array: FoldedArray, a: int, b: int) -> list[int]:
-    period = array.sequence.period
-    return [
-        (r * array.row_step + c * array.column_step) % period for r in range(a) for c in range(b)
-    ]
 
 
 def _of_product(array: ProductArray, labels: Labels, method: str) -> Decodings:

@@ -30,20 +30,10 @@ _NEIGHBOURS = sorted(product((1, 0), repeat=4), key=sum, reverse=True)
 
 
 def decode_good_tuple(array: FoldedArray | ProductArray, windows: ArrayLike) -> Decodings:
-    """Decode views larger than the unique window by their first good tuple.
+    """Decode views (N, rows, columns) larger than the unique window by their first good tuple.
 
-    Parameters
-    ----------
-    array
-        A folded array.
-    windows
-        (rows, columns) or (N, rows, columns) labels, -1 where a symbol is not seen.
-
-    Raises
-    ------
-    MethodError
-        For product arrays, whose tuples are one-dimensional, and for views that do not hold
-        the array's unique window.
+    Raises `MethodError` for product arrays, whose tuples are one-dimensional, and for views that do
+    not hold the array's unique window.
     """
     if isinstance(array, ProductArray):
         raise MethodError(

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from decoder.decoded import Candidate, Decodings, Reason
 from decoder.errors import WindowError
-from decoder.ranking import Places, Ranked, Ranking, best_of_all, ranking_of
+from decoder.ranking import Places, Ranked, Ranking, best_of_all, concatenate, ranking_of
 from decoder.window import (
     SYMBOL_ERROR,
     Scores,
@@ -34,16 +34,16 @@ _FAR = 7.0  #: nats below the best: no candidate (odds of 1 to 1,100)
 _VALUES = 1 << 18  #: log-likelihoods held at a time
 _WINDOWS = 1 << 10  #: windows weighed at a time
 
+Weighed = tuple[Ranked, NDArray[np.uint8], NDArray[np.float64]]
+
 
 class Likelihood:
     """A prepared maximum likelihood decoder.
 
     Parameters
     ----------
-    array
-        The array.
-    prior
-        (P, 2) rows and columns of the cells at which a window may lie; all by default.
+    array, prior
+        The array, and (P, 2) rows and columns at which a window may lie; all by default.
     rotations
         Quarter turns, counter-clockwise (`numpy.rot90`), that may bring a window upright.
     error
@@ -99,20 +99,11 @@ class Likelihood:
         return self._places[shape]
 
     def decode(self, windows: ArrayLike, top: int = 0) -> Decodings:
-        """Decode windows.
+        """Decode windows (N, rows, columns), labels with -1 where no symbol is seen; or one window.
 
-        Parameters
-        ----------
-        windows
-            (rows, columns) or (N, rows, columns) labels, -1 where a symbol is not seen; or
-            (rows, columns, q) or (N, rows, columns, q) log-likelihoods, floating point.
-        top
-            Candidates to list for every window; by default 16 for those not answered.
-
-        Raises
-        ------
-        WindowError
-            If labels or scores are not of this array.
+        Or log-likelihoods (N, rows, columns, q), floating point. `top`: candidates to list for
+        every window; by default 16 for those not answered. Raises `WindowError` if they are not of
+        this array.
         """
         given = np.asarray(windows)
         if given.dtype.kind == "f":
@@ -125,9 +116,6 @@ class Likelihood:
             return Decodings(self.array.columns, none, none, None, none.astype(np.uint8))
         weighed = _weigh(self, scores, max(2, top))
         return _answers(self, scores, weighed, top)
-
-
-_Weighed = tuple[Ranked, NDArray[np.uint8], NDArray[np.float64]]
 
 
 def decode_likelihood(
@@ -148,7 +136,7 @@ def decode_likelihood(
     return decoder.decode(windows, top)
 
 
-def _weigh(decoder: Likelihood, scores: Scores, number: int) -> _Weighed:
+def _weigh(decoder: Likelihood, scores: Scores, number: int) -> Weighed:
     """Return the best places, their rotation (N, K), and the doubt (N,)."""
     parts, places = [], 0
     for turn in decoder.rotations:
@@ -158,7 +146,7 @@ def _weigh(decoder: Likelihood, scores: Scores, number: int) -> _Weighed:
         block = max(1, min(_WINDOWS, _VALUES // ranking.work))
         starts = range(0, max(1, len(scores)), block)
         chunks = [ranking.rank(flat[start : start + block], number) for start in starts]
-        parts.append(_concatenate(chunks))
+        parts.append(chunks[0] if len(chunks) == 1 else concatenate(chunks))
         places += ranking.size
     best, source = best_of_all(parts, number) if len(parts) > 1 else (parts[0], None)
     rotations = np.array(decoder.rotations, dtype=np.uint8)
@@ -170,18 +158,7 @@ def _weigh(decoder: Likelihood, scores: Scores, number: int) -> _Weighed:
     return best, turns, others / (1 + others)
 
 
-def _concatenate(chunks: list[Ranked]) -> Ranked:
-    if len(chunks) == 1:
-        return chunks[0]
-    return Ranked(
-        np.concatenate([chunk.rows for chunk in chunks]),
-        np.concatenate([chunk.columns for chunk in chunks]),
-        np.concatenate([chunk.values for chunk in chunks]),
-        np.concatenate([chunk.rest for chunk in chunks]),
-    )
-
-
-def _answers(decoder: Likelihood, scores: Scores, weighed: _Weighed, top: int) -> Decodings:
+def _answers(decoder: Likelihood, scores: Scores, weighed: Weighed, top: int) -> Decodings:
     best, turns, doubts = weighed
     array = decoder.array
     reasons = np.where(doubts > decoder.doubt, Reason.AMBIGUOUS, Reason.NONE).astype(np.uint8)
@@ -215,15 +192,15 @@ def _answers(decoder: Likelihood, scores: Scores, weighed: _Weighed, top: int) -
 
 
 def _why(
-    decoder: Likelihood, scores: Scores, weighed: _Weighed, refused: NDArray[np.intp]
+    decoder: Likelihood, scores: Scores, weighed: Weighed, refused: NDArray[np.intp]
 ) -> NDArray[np.uint8]:
     """Tell too few symbols from a tie, and a tie from a surface without code."""
     best = weighed[0]
     flat = scores.reshape(len(scores), -1, scores.shape[3])
     likely = best.values[refused, 0] + np.log1p(best.rest[refused])
-    places = sum(
-        decoder.ranking(_turned_place(scores.shape, turn)).size for turn in decoder.rotations
-    )
+    a, b = scores.shape[1:3]
+    shapes = [(b, a) if turn % 2 else (a, b) for turn in decoder.rotations]
+    places = sum(decoder.ranking(shape).size for shape in shapes)
     odds = decoder.blank / (1 - decoder.blank) * places
     without = likely < unrelated_score(flat) + np.log(max(odds, np.finfo(float).tiny))
     reasons = np.where(without, Reason.NOT_ENCODED, Reason.AMBIGUOUS)
@@ -236,10 +213,6 @@ def _why(
         if not known[key]:
             reasons[i] = Reason.TOO_FEW
     return reasons.astype(np.uint8)
-
-
-def _turned_place(shape: tuple[int, ...], turn: int) -> tuple[int, int]:
-    return (shape[2], shape[1]) if turn % 2 else (shape[1], shape[2])
 
 
 def _candidates(

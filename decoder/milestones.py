@@ -26,13 +26,7 @@ MOST_ENTRIES = 1 << 24  #: 64 MB
 
 
 class Table:
-    """The index of every window, by the key of its field element.
-
-    Raises
-    ------
-    MethodError
-        If the sequence has more than 2^24 terms.
-    """
+    """The index of every window by the key of its element; `MethodError` beyond 2^24 terms."""
 
     def __init__(self, sequence: Sequence) -> None:
         if sequence.period > MOST_ENTRIES:
@@ -51,11 +45,6 @@ class Table:
             if start + block < sequence.period:
                 run = self.elements.apply(forward.map(16), run)
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of the table, bytes."""
-        return self.index.nbytes
-
     def convert(self, states: Element) -> NDArray[np.uint64]:
         """Return the index of each element (none of them 0); (N,)."""
         places = self.elements.keys(states).astype(np.intp)
@@ -68,49 +57,18 @@ _BLOCK = 1 << 17  #: registers held at a time
 
 
 def optimal_distance(period: int, k1: float = 1.0, k4: float = 1.0) -> int:
-    """Return t_opt, the distance of milestones that costs least.
+    """Return t_opt, the distance of milestones that costs least: k1 each, k4 a back shift.
 
-    Parameters
-    ----------
-    period
-        Length of the sequence, 2^n - 1.
-    k1, k4
-        Cost of one milestone, and of one back shift.
-
-    Examples
-    --------
     >>> optimal_distance(2**16 - 1, 1, 4), optimal_distance(2**16 - 1, 4, 1)
     (128, 512)
     """
     return max(1, round(sqrt(k1 / k4 * period)))
 
 
-def conversion_cost(
-    period: int, distance: float, k1: float = 1.0, k2: float = 0.0, k3: float = 0.0, k4: float = 1.0
-) -> float:
-    """Return the total cost of figure 5.4: equipment k1 N/t + k2, and time k3 + k4 t."""
-    return k1 * period / distance + k2 + k3 + k4 * distance
-
-
-def requested_milestones(period: int, k1: float = 1.0, k4: float = 1.0) -> int:
-    """Return the number of milestones at t_opt: an entry of table 5.2."""
-    return round(period / sqrt(k1 / k4 * period))
-
-
 class Milestones:
-    """Back shifts to the nearest milestone.
+    """Back shifts to the nearest milestone, `distance` steps apart; t_opt for k1 = k4 by default.
 
-    Parameters
-    ----------
-    sequence
-        The m-sequence.
-    distance
-        t, steps between milestones; t_opt for k1 = k4 by default.
-
-    Raises
-    ------
-    MethodError
-        If it would take more than 2^22 milestones or 2^24 back shifts.
+    Raises `MethodError` if it would take more than 2^22 milestones or 2^24 back shifts.
     """
 
     def __init__(self, sequence: Sequence, distance: int | None = None) -> None:
@@ -134,18 +92,13 @@ class Milestones:
         self._keys = Keys(self.elements.keys(stride.run(self.elements.one[0], number)))
         self._back = Shifts(self.elements, sequence.ring.power_of_x(period - 1))
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of the milestones, bytes."""
-        return self._keys.nbytes
-
     def convert(self, states: Element) -> NDArray[np.uint64]:
         """Return the index of each element (none of them 0); (N,)."""
         result = np.zeros(len(states), dtype=np.uint64)
         open_ = np.arange(len(states))
         done = 0
         while open_.size:
-            block = _block(open_.size, self.distance - done)
+            block = max(1, min(self.distance - done, _BLOCK // open_.size))
             run = self._back.run(states, block)
             found = self._keys.find(self.elements.keys(run))
             hit = found >= 0
@@ -160,18 +113,8 @@ class Milestones:
         return result
 
 
-def _block(windows: int, shifts: int) -> int:
-    return max(1, min(shifts, _BLOCK // windows))
-
-
 def serial(sequence: Sequence) -> Milestones:
-    """Return the serial conversion of a sequence.
-
-    Raises
-    ------
-    MethodError
-        If the sequence has more than 2^24 terms.
-    """
+    """Return the serial conversion of a sequence; `MethodError` beyond 2^24 terms."""
     if sequence.period > MOST_SHIFTS:
         raise MethodError(
             f"serial conversion of {sequence.period} terms would take up to as many back shifts; "

@@ -24,15 +24,7 @@ LISTED = 64  #: most candidates that are listed
 
 
 class Register:
-    """Symbols seen at fixed offsets of one sequence, as linear equations.
-
-    Parameters
-    ----------
-    sequence
-        The m-sequence.
-    offsets
-        (k,) indices seen, relative to the place, one for each column of the labels.
-    """
+    """Symbols seen at offsets (k,) of one sequence, relative to the place, as linear equations."""
 
     def __init__(self, sequence: Sequence, offsets: list[int]) -> None:
         self.sequence = sequence
@@ -61,12 +53,9 @@ class Register:
         return pack_words(words), np.array(blocks) if blocks else empty
 
     def read(self, labels: Labels) -> tuple[Element, NDArray[np.bool_]]:
-        """Return the elements (N,) of windows, and which windows pass their checks.
+        """Return the elements (N,) of labels (N, k) seen, and which windows pass their checks.
 
-        Parameters
-        ----------
-        labels
-            (N, k) symbols seen. Open digits of the element are 0 if they are too few.
+        Open digits of the element are 0 where the symbols are too few.
         """
         if self.sequence.ring.prime == 2:
             words, checks = self._tables
@@ -127,20 +116,13 @@ Words = NDArray[np.uint64]
 def binary_dual(
     words: Words, order: NDArray[np.intp], degree: int
 ) -> tuple[Words, NDArray[np.intp]]:
-    """Return the dual basis (N, D) and the frequencies chosen (N, D), -1 where none is left.
+    """Return the dual basis (N, D), and the frequencies chosen (N, D), for p = 2; -1: none.
 
-    N windows at a time, each with an order of its own: elimination over GF(p) that keeps field
-    elements X_j with f_i . X_j = [i = j] for the frequencies f_i chosen so far. Elements that no
-    frequency determines stay with all of them at 0: they are what the cells seen leave open.
-
-    Parameters
-    ----------
-    words
-        (U,) frequencies.
-    order
-        (N, U) their numbers, the most reliable first.
-    degree
-        D.
+    Each window's most reliable independent frequencies are chosen: elimination over GF(p) that
+    keeps field elements X_j with f_i . X_j = [i = j] for the frequencies f_i chosen so far.
+    Elements that no frequency determines stay with all of them at 0: they are what the cells seen
+    leave open. `words` (U,) are the frequencies, `order` (N, U) their numbers, the most reliable
+    first.
     """
     windows = len(order)
     lines = np.arange(windows)
@@ -166,17 +148,7 @@ def binary_dual(
 def odd_dual(
     frequencies: Digits, order: NDArray[np.intp], prime: int
 ) -> tuple[Digits, NDArray[np.intp]]:
-    """Return the dual basis (N, D, D) and the frequencies chosen (N, D), for odd p; -1: none.
-
-    Parameters
-    ----------
-    frequencies
-        (U, D) digits.
-    order
-        (N, U) their numbers, the most reliable first.
-    prime
-        p.
-    """
+    """Return the dual basis (N, D, D) and frequencies chosen (N, D), for odd p: `binary_dual`."""
     windows, degree = len(order), frequencies.shape[1]
     lines = np.arange(windows)
     basis = np.tile(np.eye(degree), (windows, 1, 1))
@@ -206,17 +178,8 @@ def read_scattered(
 ) -> tuple[Element, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return the elements (N,), which windows are determined, and which pass their checks.
 
-    `Register` prepares one linear map, which pays when many windows show the same cells. Here
-    every window has cells of its own, so the elimination itself runs over the batch.
-
-    Parameters
-    ----------
-    sequence
-        The m-sequence.
-    offsets
-        (k,) relative indices.
-    labels
-        (N, k) symbols, -1 where none is seen.
+    `Register` prepares one linear map, which pays when many windows show the same cells. Here every
+    window (N, k) has cells of its own, -1 where none is seen: the elimination runs over the batch.
     """
     ring, field = sequence.ring, sequence.field
     functionals = sequence.functionals(sequence.element(offsets)).reshape(-1, ring.degree)

@@ -38,21 +38,9 @@ class Registered:
 def read_registered(url: str, profile: str = "", lab_key: str = "") -> Registered:
     """Return the array of a database and its registered cells.
 
-    Parameters
-    ----------
-    url
-        `lab.db`, `sqlite:///lab.db` or `postgresql://host/name`.
-    profile
-        Which array, by the profile it was asked for, where the database holds several.
-    lab_key
-        Whose, where several labs' are registered; the database's own if left out.
-
-    Raises
-    ------
-    DatabaseError
-        The database cannot be read.
-    DecoderError
-        It holds no such array, or several and none is named.
+    `profile` says which array where the database holds several, `lab_key` whose; the database's own
+    by default. Raises `DatabaseError` if it cannot be read, `DecoderError` if it holds no such
+    array, or several and none is named.
     """
     with read_transaction(open_database(url, writable=False)) as connection:
         numbers = sorted({entry.array_id for entry in list_objects(connection)})
@@ -84,13 +72,7 @@ def _no_array(
 
 
 def prior(held: Registered, window: Labels) -> NDArray[np.int64]:
-    """Return the places (n, 2) of a window's corner at which all its seen cells are registered.
-
-    Parameters
-    ----------
-    window
-        (rows, columns) labels, -1 where none is seen.
-    """
+    """Return the places (n, 2) of a window's corner at which all its seen cells are registered."""
     rows, columns = np.nonzero(window >= 0)
     if len(rows) == 0:
         return held.cells

@@ -25,15 +25,7 @@ Coefficients = NDArray[np.float32] | NDArray[np.complex64]
 
 
 class Spectrum:
-    """Frequencies of the symbols seen at given offsets of one sequence.
-
-    Parameters
-    ----------
-    sequence
-        The m-sequence.
-    offsets
-        (k,) relative indices of the cells.
-    """
+    """Frequencies of the symbols seen at offsets (k,) of one sequence."""
 
     def __init__(self, sequence: Sequence, offsets: list[int]) -> None:
         field, prime = sequence.field, sequence.ring.prime

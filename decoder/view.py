@@ -44,13 +44,9 @@ class Strength:
 def strength(array: FoldedArray | ProductArray, rows: ArrayLike, columns: ArrayLike) -> Strength:
     """Return what the cells (rows, columns), relative to the place, can do.
 
-    Raises
-    ------
-    ArrayError
-        If the minimum distance is out of reach: beyond 2^20 places and 2^16 dual words.
+    Raises `ArrayError` if the minimum distance is out of reach: beyond 2^20 places and 2^16 dual
+    words.
 
-    Examples
-    --------
     >>> from generator.array import profile
     >>> strength(profile("thesis").array(), *np.indices((6, 6))).errors
     2

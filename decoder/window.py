@@ -22,14 +22,9 @@ LARGEST_SCORE = 1e6  #: nats; beyond it single precision loses single cells
 
 
 def parse_window(text: str, order: int) -> Labels:
-    """Return the (rows, columns) labels of a window written as text.
+    """Return the (rows, columns) labels of a text; labels above 9 apart by commas: "10,3 0,?".
 
-    Labels above 9 are written apart by commas: "10,3 0,?".
-
-    Raises
-    ------
-    WindowError
-        If a symbol is unknown or the rows differ in length; the error shows the row.
+    Raises `WindowError` with the row if a symbol is unknown or the rows differ in length.
     """
     rows = []
     for number, row in enumerate(text.split(), 1):
@@ -98,19 +93,11 @@ Scores = NDArray[np.float32]
 
 
 def hard_scores(labels: Labels, order: int, error: float = SYMBOL_ERROR) -> Scores:
-    """Return the scores of labels that are wrong with probability `error`.
+    """Return the scores of labels (...), -1 where none is seen, wrong with probability `error`.
 
-    Parameters
-    ----------
-    labels
-        (...) symbols, -1 where none is seen.
-    order
-        q; every wrong symbol is equally likely.
-    error
-        Above 0 and below 1 - 1/q, where a symbol says nothing.
+    Every wrong symbol is equally likely; `error` is above 0 and below 1 - 1/q, where a symbol says
+    nothing.
 
-    Examples
-    --------
     >>> hard_scores(np.array([0, -1]), 2, 0.2).tolist()
     [[0.0, -1.3862943649291992], [0.0, 0.0]]
     """

@@ -86,8 +86,6 @@ _MACHINE = "ender-3"  #: that error messages give as an example
 def printer_named(name: str) -> Printer:
     """Return the printer called `name`; raises `GeneratorError` that lists the known ones.
 
-    Examples
-    --------
     >>> printer_named("prusa-mini-0.6").bed_mm, printer_named("prusa-mini-0.6").nozzle_mm
     ((180.0, 180.0), 0.6)
     """

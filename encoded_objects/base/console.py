@@ -150,7 +150,7 @@ def application(**settings: Any) -> Typer:
 
 
 def one_thread() -> None:
-    """Let matrix libraries use one thread; call before numpy is imported. Users may differ.
+    """Let matrix libraries use one thread, unless the user says otherwise; call before numpy loads.
 
     Matrices of a touch are small: several threads only wait for each other.
     """
@@ -176,14 +176,14 @@ def interruption() -> Iterator[threading.Event]:
 
 
 def _spare_start() -> None:
-    """Leave out what start-up pays for and no command needs; a fifth of `encode-object`'s start."""
+    """Leave out of start-up what no command needs."""
     gc.set_threshold(*GARBAGE)
     # Each installed package is asked for plug-ins of pydantic; none of ours needs one.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
 def _command_path(name: str, app: Typer | None, arguments: list[str]) -> str:
-    """Return how the command that was meant is called, with the groups it stands in."""
+    """Return how the command that was meant is called, with its groups."""
     from typer.main import get_command
 
     words, command = [name], None if app is None else get_command(app)
@@ -211,7 +211,7 @@ def _end(number: int, _frame: FrameType | None) -> NoReturn:
 def _show_help(app: Typer, name: str, arguments: list[str]) -> Any:
     """Run the command that the arguments name: its own `--help` shows its page.
 
-    To find a subcommand, typer reads the options of all groups above it, and imports pydantic for
+    To find a subcommand typer reads the options of all groups above it, and imports pydantic for
     that, a third of the time of a page.
     """
     from typer.main import get_command
@@ -227,11 +227,7 @@ def _show_help(app: Typer, name: str, arguments: list[str]) -> Any:
 
 
 def _import_help_page() -> None:
-    """Import typer's page with stand-ins for what it does not use here.
-
-    Our pages are written in rich's markup; typer imports a parser of Markdown for other ones, a
-    fifth of the time of a page.
-    """
+    """Import typer's page without its parser of Markdown, a fifth of the time of a page."""
     stand_ins = {}
     for module, names in UNUSED_BY_HELP.items():
         if module not in sys.modules:

@@ -9,8 +9,6 @@
     ├── DecoderError          decoder.errors
     ├── ProbeError            probe.errors
     └── RecognizerError       recognizer.errors
-
-Imports nothing of ours, so that every package may stand on it.
 """
 
 from __future__ import annotations

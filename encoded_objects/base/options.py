@@ -50,13 +50,7 @@ class Option:
     variable: str = ""  #: of the environment, read where the option is not given
 
     def checked(self, name: str, value: object, default: object) -> None:
-        """Refuse a value that is no choice.
-
-        Raises
-        ------
-        UsageError
-            With the choices.
-        """
+        """Refuse a value that is no choice; raises `UsageError` with the choices."""
         if self.choices and value not in self.choices and value != default:
             *others, last = self.choices
             allowed = f"{', '.join(others)} or {last}" if others else last
@@ -106,13 +100,7 @@ class Options:
         self.check()
 
     def check(self) -> None:
-        """Refuse options that exclude each other.
-
-        Raises
-        ------
-        UsageError
-            Which ones, and what to give.
-        """
+        """Refuse options that exclude each other; raises `UsageError` with what to give."""
 
 
 Json = Annotated[bool, Option("One JSON object on stdout, also for errors.", names=("--json",))]
@@ -132,8 +120,6 @@ def command(
 
     Parameters
     ----------
-    app
-        Reads the options.
     name
         Of the subcommand; that of the function by default.
     help, epilog
@@ -180,7 +166,7 @@ def command(
 
 
 def read_plain(app: Typer, arguments: Sequence[str]) -> Callable[[], int] | None:
-    """Return what a plain command line does; None: it is left to typer, with every error.
+    """Return the action of a plain command line; None: it is left to typer, with every error.
 
     To read options typer imports pydantic, a quarter of the start of `recognize-object`. Plain is
     a line of known options with sound values.
@@ -285,7 +271,7 @@ def _option_classes(work: Work) -> dict[str, type[Any]]:
 
 @cache
 def _declared(source: Any) -> Declared:
-    """Return type, option and default of each option of a function or a class, in their order."""
+    """Return type, option and default of each option of a function or a class, in order."""
     hints = typing.get_type_hints(source, include_extras=True)
     found: Declared = {}
     for name, parameter in inspect.signature(source).parameters.items():

@@ -70,8 +70,6 @@ def figures_of(text: str) -> list[int]:
 def in_figures(text: str) -> str | None:
     """Return a text in capitals without accents, or None where it holds a letter without figure.
 
-    Examples
-    --------
     >>> in_figures("Bügel 12"), in_figures("立方体")
     ('BUGEL 12', None)
     """

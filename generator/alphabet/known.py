@@ -46,13 +46,7 @@ class Alphabet:
 
 
 def alphabet_named(name: str) -> Alphabet:
-    """Return the alphabet called `name`.
-
-    Raises
-    ------
-    AlphabetError
-        Listing the known ones.
-    """
+    """Return the alphabet called `name`; raises `AlphabetError` that lists the known ones."""
     try:
         return ALPHABETS[name]
     except KeyError:
@@ -62,18 +56,10 @@ def alphabet_named(name: str) -> Alphabet:
 
 
 def alphabet_from(definition: Mapping[str, Any]) -> Alphabet:
-    """Return the alphabet that `definition` describes, checked.
+    """Return the alphabet that the plain values of `Alphabet.definition` describe, checked.
 
-    Parameters
-    ----------
-    definition
-        What `Alphabet.definition` returns: name, reach, stroke_ratio, glyphs.
-
-    Raises
-    ------
-    AlphabetError
-        If a value is missing or no number, a node is off {-1, 0, 1} squared, or two symbols
-        look alike after a turn.
+    Raises `AlphabetError` if a value is missing or no number, a node is off {-1, 0, 1} squared, or
+    two symbols look alike after a turn.
     """
     try:
         alphabet = Alphabet(

@@ -3,15 +3,11 @@
 Glyph + style -> Tiers: outlines at rising heights, mm, in the symbol's own axes. The top
 of a stroke keeps its width; draft widens the foot, a chamfer of 45 degrees narrows the
 top. From tier to tier every edge moves along its own normal and every corner with it, so
-each side of a symbol is one exactly planar quadrilateral.
-Thesis 6.1, 6.2 (the embossed symbols).
+each side of a symbol is one exactly planar quadrilateral. Thesis 6.1, 6.2.
 
-The region that an octagonal nib covers along strokes, as exact support lines.
-
-Strokes (mm) + stroke width (mm) -> rings of lines (nx, ny, c): the ring's material lies
-at n . x <= c near that edge, so moving the outline by d is c + d, and every side between
-two heights stays exactly planar. The union's own coordinates are rounded to 1e-8; its
-edges only name the lines, and vertices are their intersections.
+An outline is rings of lines (nx, ny, c): the material lies at n . x <= c near that edge, and
+moving the outline by d is c + d. The union's own coordinates are rounded to 1e-8; its edges only
+name the lines, and vertices are their intersections.
 """
 
 from __future__ import annotations
@@ -54,20 +50,10 @@ _NIB = _FLATS + np.tan(np.pi / 8) * np.stack([-_FLATS[:, 1], _FLATS[:, 0]], axis
 
 
 def nib_outline(strokes: NDArray[np.float64], width_mm: float) -> list[Lines]:
-    """Return the outline of strokes drawn by an octagonal nib.
+    """Return the outline of strokes (s, 2, 2) mm, drawn by an octagonal nib as wide between flats.
 
-    Parameters
-    ----------
-    strokes
-        (s, 2, 2) end points, mm.
-    width_mm
-        Width between two flats of the nib.
-
-    Returns
-    -------
-    list of (k, 3) arrays
-        Outer rings counter-clockwise and holes clockwise, in no order; no two
-        neighbouring edges are parallel.
+    (k, 3) each: outer rings counter-clockwise and holes clockwise, in no order; no two neighbouring
+    edges are parallel.
     """
     from manifold3d import CrossSection, OpType
 
@@ -90,10 +76,7 @@ def nib_outline(strokes: NDArray[np.float64], width_mm: float) -> list[Lines]:
 
 
 def offset_ring(ring: Lines, distance_mm: float) -> NDArray[np.float64]:
-    """Return the (k, 2) corners of a ring whose every edge moves out by `distance_mm`.
-
-    Corner i lies between edges i - 1 and i.
-    """
+    """Return the corners (k, 2) of a ring whose edges move out; corner i starts edge i."""
     n, c = ring[:, :2], ring[:, 2] + distance_mm
     m, d = np.roll(n, 1, axis=0), np.roll(c, 1)
     turn = m[:, 0] * n[:, 1] - m[:, 1] * n[:, 0]
@@ -164,13 +147,7 @@ class Tiers:
 
 @lru_cache(maxsize=64)
 def outlines(alphabet: Alphabet, style: SymbolStyle) -> tuple[Tiers, ...]:
-    """Return the tiers of all symbols of an alphabet, in the order of their labels.
-
-    Raises
-    ------
-    AlphabetError
-        See `outline`; the message names the alphabet.
-    """
+    """Return the tiers of all symbols of an alphabet by label; raises as `outline` does."""
     return tuple(
         outline(glyph, alphabet.reach * style.pitch_mm, style, place=f"alphabet {alphabet.name}")
         for glyph in alphabet.glyphs
@@ -178,29 +155,11 @@ def outlines(alphabet: Alphabet, style: SymbolStyle) -> tuple[Tiers, ...]:
 
 
 def outline(glyph: Glyph, unit_mm: float, style: SymbolStyle, *, place: str = "") -> Tiers:
-    """Return the tiers of one embossed glyph.
+    """Return the tiers of one embossed glyph: two, or three with a chamfer.
 
-    Parameters
-    ----------
-    glyph
-        Strokes on integer nodes.
-    unit_mm
-        Distance of two neighbouring nodes, mm.
-    style
-        Stroke, height, draft and chamfer; the pitch is not used.
-    place
-        Named in errors.
-
-    Returns
-    -------
-    Tiers
-        Two tiers, or three with a chamfer.
-
-    Raises
-    ------
-    AlphabetError
-        If a number is out of range, an edge collapses, or strokes meet at the foot that
-        stand apart at the top. The message gives a draft or chamfer that works.
+    `unit_mm` is the distance of neighbouring nodes; the style's pitch is not used; errors name
+    `place`. Raises `AlphabetError` if a number is out of range, an edge collapses, or strokes meet
+    at the foot that stand apart at the top, with a draft or chamfer that works.
     """
     _check_numbers(style, place)
     lines = _stroke_lines(glyph, unit_mm, style.stroke_mm, place)
@@ -215,13 +174,8 @@ def outline(glyph: Glyph, unit_mm: float, style: SymbolStyle, *, place: str = ""
 def engrave(glyph: Glyph, unit_mm: float, stroke_mm: float, depth_mm: float) -> Tiers:
     """Return the tiers of a glyph cut into a facet as a groove with 45 degree walls.
 
-    The stroke has its width at the surface and loses twice the depth at the floor, so the
-    groove prints without support also where it faces the bed.
-
-    Raises
-    ------
-    AlphabetError
-        If the floor of the groove collapses.
+    The stroke has its width at the surface and loses twice the depth at the floor: the groove
+    prints without support where it faces the bed. Raises `AlphabetError` if the floor collapses.
     """
     lines = _stroke_lines(glyph, unit_mm, stroke_mm, "edge number")
     if not _regular(lines, [0.0, -depth_mm], stroke_mm):
@@ -241,15 +195,10 @@ def foot_half_mm(tiers: Tiers) -> float:
 
 
 def footprint_half_mm(alphabet: Alphabet, style: SymbolStyle) -> float:
-    """Half side of a square about the symbol's centre that holds every foot.
+    """Half side of a square about the symbol's centre that holds every foot, mm.
 
-    Axis-parallel in the symbol's axes, mm, with a margin of 0.005 pitch; less than half
-    the pitch.
-
-    Raises
-    ------
-    AlphabetError
-        If neighbouring symbols would touch, or see `outline`.
+    In the symbol's axes, with a margin of 0.005 pitch; less than half the pitch. Raises
+    `AlphabetError` if neighbouring symbols would touch, or as `outline` does.
     """
     half = max(foot_half_mm(tiers) for tiers in outlines(alphabet, style))
     half += OUTLINE.foot_margin * style.pitch_mm

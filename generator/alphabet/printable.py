@@ -50,13 +50,9 @@ def gap_between_mm(alphabet: Alphabet, style: SymbolStyle) -> float:
 
 
 def check_printable(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> None:
-    """Refuse symbols that the printer would lose.
+    """Refuse symbols that the printer would lose, by `AlphabetError`.
 
-    Raises
-    ------
-    AlphabetError
-        With the number that is out of range, the printer's limit, and a stroke or pitch
-        that works; also if an edge collapses or neighbouring symbols touch.
+    It names the number that is out of range, the printer's limit, and a stroke or pitch that works.
     """
     place = f"alphabet {alphabet.name}"
     if style.stroke_mm < printer.stroke_min_mm:

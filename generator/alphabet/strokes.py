@@ -43,8 +43,6 @@ class Counts:
 def counts(glyph: Glyph) -> Counts:
     """Count end-points, vertices, loops and pieces of a glyph from its stroke graph.
 
-    Examples
-    --------
     >>> counts(Glyph("L", (((-1, 1), (-1, -1)), ((-1, -1), (1, -1)))))
     Counts(ends=2, vertices=1, loops=0, pieces=1)
     """
@@ -73,15 +71,10 @@ def same_shape(one: Glyph, other: Glyph) -> bool:
 
 
 def check_distinguishable(alphabet: str, glyphs: tuple[Glyph, ...]) -> None:
-    """Refuse glyphs that a turned touch would confuse.
+    """Refuse glyphs in several pieces, and those that look like one of them after a turn.
 
-    Thesis 6.1, demands (1) and (2): a symbol alone gives the orientation of the grid,
-    so no glyph may look like itself or like another one after a turn.
-
-    Raises
-    ------
-    AlphabetError
-        Naming the two glyphs and the turn, or a glyph in several pieces.
+    Thesis 6.1, demands (1) and (2): a symbol alone gives the orientation of the grid. Raises
+    `AlphabetError`.
     """
     place = f"alphabet {alphabet}"
     names = [glyph.name for glyph in glyphs]

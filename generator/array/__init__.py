@@ -1,19 +1,8 @@
-"""Pseudo-random arrays: which symbol stands in which cell, and what a window tells.
+"""Pseudo-random arrays: which symbol stands in which cell, what a window tells. Thesis chapter 5.
 
-Definition -> array -> labels. Thesis chapter 5. `profile` names ready choices, `array_from`
-takes an explicit encoding; both give a `SymbolArray` (`contract`).
-
-    factor, residue, torus        integers, GF(p)[x]/H, indices on a cycle
-    field, polynomial, notation   GF(q), polynomials over it and how they are written
-    primitive, size               polynomials on file, folds that decode
-    sequence                      PRBS, PRMVS
-    fold                          PRBA, PRMVA
-    product                       PRPA, PRMVPA
-    window                        minimum distance, unique windows
-    touches                       how many of a sensor's touches name a place
-    visible, rivals               cells that a sensor sees whole, places that look like them
-    labelling, keyed, lab_key     arrays of a lab's own
-    definition, profiles          arrays by plain values and by name
+`profile` names ready choices, `array_from` takes an explicit encoding; both give a `SymbolArray`
+(`contract`): a folded m-sequence (`fold`) or a product of two (`product`). `window` counts how
+many wrong symbols a set of cells withstands; `lab_key` makes arrays of a lab's own.
 """
 
 from generator.array.contract import Labels, SymbolArray

@@ -1,14 +1,13 @@
-"""What every array offers, whatever its family: the contract of `generator.array`.
+"""What every array offers, whatever its family, and how many touches name a place on it.
 
-Array frame: cell (row, column), zero-based, toroidal. A symbol's x axis points
-along columns, its y axis against rows: with pitch p (mm) cell (r, c) has its
-centre at ((c + 1/2) p, -(r + 1/2) p). Thesis 5.2 to 5.5.
-
-How many touches of a sensor name a place on an array. Thesis 4.3, 6.3.
+Array frame: cell (row, column), zero-based, toroidal. A symbol's x axis points along columns, its
+y axis against rows: with pitch p (mm) cell (r, c) has its centre at ((c + 1/2) p, -(r + 1/2) p).
+Thesis 5.2 to 5.5.
 
 An answer needs ln N nats to name one of N cells, and `CERTAINTY` more by which no other place
 may come near. A cell that is seen says up to ln(q + 1) nats: one of q symbols, or none. A scan
 of n touches in a line sees (w + (n - 1) s) w of the surface, w the sensor's width, s its step.
+Thesis 4.3, 6.3.
 """
 
 from __future__ import annotations
@@ -27,75 +26,36 @@ Labels = NDArray[np.int64]
 class SymbolArray(Protocol):
     """A toroidal array of symbols in which every small window occurs once."""
 
-    @property
-    def rows(self) -> int:
-        """Number of rows; a Python integer, up to 2^63."""
-        ...
-
-    @property
-    def columns(self) -> int:
-        """Number of columns."""
-        ...
-
-    @property
-    def order(self) -> int:
-        """Number of different symbols; labels are 0 ... order - 1."""
-        ...
-
-    @property
-    def window(self) -> tuple[int, int]:
-        """Rows and columns of the window that is known to be unique."""
-        ...
-
-    @property
-    def first(self) -> tuple[int, int]:
-        """Row and column at which the placing of objects begins."""
-        ...
+    rows: int  #: up to 2^64, a Python integer
+    columns: int
+    order: int  #: number of different symbols; labels are 0 ... order - 1
+    window: tuple[int, int]  #: rows and columns of a window that is known to be unique
+    first: tuple[int, int]  #: row and column at which the placing of objects begins
+    full_rank: int  #: rank at which a set of visible cells names its place
 
     def symbols(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
         """Return the labels at cells (rows, columns), broadcast together, taken on the torus.
 
-        Nothing is materialised beyond what the cells need; integers of any size
-        are accepted (object arrays beyond 2^63).
+        Integers of any size are accepted (object arrays beyond 2^63); nothing else is materialised.
         """
-        ...
 
     def rank(self, rows: ArrayLike, columns: ArrayLike) -> int:
         """Return the rank of a set of visible cells; only their differences matter."""
-        ...
-
-    @property
-    def full_rank(self) -> int:
-        """Rank at which a set of visible cells names its place."""
-        ...
 
     def identifies(self, rows: ArrayLike, columns: ArrayLike) -> bool:
         """Whether the cells together name their place: the rank test."""
-        ...
 
     def minimum_distance(self, rows: ArrayLike, columns: ArrayLike) -> int:
         """Return in how many of these cells two places differ at least; 0 if some look alike."""
-        ...
 
     def definition(self) -> dict[str, Any]:
         """Return the plain values (JSON) from which `array_from` makes this array again."""
-        ...
 
 
 def on_torus(indices: ArrayLike, steps: int) -> NDArray[np.uint64]:
-    """Return integers modulo `steps` (1 to 2^64), same shape.
+    """Return integers of any size and shape modulo `steps` (1 to 2^64).
 
-    Parameters
-    ----------
-    indices
-        Integers of any shape; Python integers of any size, negative ones included.
-    steps
-        Length of the cycle.
-
-    Raises
-    ------
-    ArrayError
-        If an index is not an integer.
+    Raises `ArrayError` if an index is not an integer.
     """
     given: NDArray[Any] = np.asarray(indices)
     if given.size == 0:
@@ -133,19 +93,6 @@ REGISTERED = 1 << 16  #: cells that a lab's objects hold at most; arrays may be 
 def touches_needed(order: int, cells: int, pitch_mm: float, *, sensor_mm: float = SENSOR_MM) -> int:
     """Return about how many overlapping touches an answer needs; 1: no scan.
 
-    Parameters
-    ----------
-    order
-        Number of symbols, q.
-    cells
-        Of the array.
-    pitch_mm
-        Of the symbols.
-    sensor_mm
-        Width of the sensor.
-
-    Examples
-    --------
     >>> touches_needed(2, 63 * 65, 12.0), touches_needed(4, 63 * 65, 7.0)
     (8, 1)
     """
@@ -155,9 +102,6 @@ def touches_needed(order: int, cells: int, pitch_mm: float, *, sensor_mm: float 
     return 1 + max(0, math.ceil((length_mm / sensor_mm - 1) / STEP_SHARE - 0.25))
 
 
-def symbols_seen(pitch_mm: float, *, sensor_mm: float = SENSOR_MM) -> float:
-    """Return how many symbols a touch inside a face tells, as a mean over its places.
-
-    Those whose centre is under the sensor: 12 at 7 mm, 29 at 4.5 mm.
-    """
-    return float(((sensor_mm - 2 * FELT_MM) / pitch_mm) ** 2)
+def symbols_seen(pitch_mm: float) -> float:
+    """Return how many symbols have their centre under the sensor, a mean over a face's places."""
+    return float(((SENSOR_MM - 2 * FELT_MM) / pitch_mm) ** 2)

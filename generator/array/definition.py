@@ -30,21 +30,11 @@ _PRODUCT_KEYS = ("family", "factors", "law", "rows", "columns", "window")
 
 
 def array_from(definition: Mapping[str, Any]) -> FoldedArray | ProductArray:
-    """Return the array that plain values describe.
+    """Return the array that plain values describe; `array.definition()` returns the complete form.
 
-    Parameters
-    ----------
-    definition
-        See the module's text; `array.definition()` returns the complete form.
+    Raises `ArrayError` if a key is unknown, missing or of the wrong kind, or the array cannot be
+    built, decoded, or its window is not unique.
 
-    Raises
-    ------
-    ArrayError
-        If a key is unknown, missing or of the wrong kind, or the array cannot be built,
-        decoded, or its window is not unique.
-
-    Examples
-    --------
     >>> array_from({"family": "prba", "degree": 12, "polynomial": "0x1099"})
     FoldedArray(Sequence(GF(2), 0x1099), 63x65)
     """

@@ -64,7 +64,7 @@ def prime_factors(number: int) -> dict[int, int]:
 
 
 def _proper_divisor(composite: int) -> int:
-    """Pollard's rho in Brent's form; `composite` is odd and not prime."""
+    """Return a divisor of an odd composite by Pollard's rho in Brent's form."""
     root = isqrt(composite)
     if root * root == composite:
         return root

@@ -1,18 +1,15 @@
-"""The key of a lab: 75 random bits as 15 characters and one that checks them, XXXX-XXXX-XXXX-XXXX.
+"""The key of a lab, 75 random bits as 15 characters and one that checks them; a lab's own array.
 
 Characters are Crockford's 32, without I, L, O and U: a key is read aloud, typed and copied by
 hand. They stand for the elements of GF(32); the check character makes sum A^k c_k = 0, which
 finds every single wrong character and every two that were exchanged.
 
-A lab's own array: published array + lab key -> polynomial, permutation of symbols, first cell.
-
-From a hash of key and published array. Taking every j-th term of an m-sequence, j coprime to
-its period N, gives an m-sequence of the same period, and all of them (M-sequences are counted
-by phi(N) / n: 288 of degree 6, 4,096 of degree 8 over GF(4)); so j is drawn until the array
-identifies every small view that the published one identifies. That is told by ranks of the
-published sequence itself: cells at offsets d of the new array have the rank that offsets j d
-have there, and no polynomial is made but the one that is taken. Two labs agree on a touch by
-chance only.
+A lab's array is the published one with another polynomial, permutation of symbols and first cell,
+drawn from a hash of key and array. Every j-th term of an m-sequence, j coprime to its period N,
+is an m-sequence of the same period, and all are found this way (phi(N) / n: 288 of degree 6, 4,096
+of degree 8 over GF(4)); j is drawn until the array identifies every small view that the published
+one identifies. That takes ranks of the published sequence alone: cells at offsets d of the new
+array have the rank that offsets j d have there. Two labs agree on a touch by chance only.
 
 MacWilliams, Sloane, The Theory of Error-Correcting Codes, chapters 4 and 14. Thesis 5.1, 5.2.
 """
@@ -50,13 +47,7 @@ def draw_lab_key() -> str:
 
 
 def lab_key_of(drawn: bytes) -> str:
-    """Return the key of 15 random bytes or more.
-
-    Examples
-    --------
-    >>> lab_key_of(bytes(range(15)))
-    '0123-4567-89AB-CDER'
-    """
+    """Return the key of 15 random bytes or more."""
     labels = [byte % len(CHARACTERS) for byte in drawn[: LENGTH - 1]]
     return _text([*labels, _check_label(labels)])
 
@@ -64,13 +55,8 @@ def lab_key_of(drawn: bytes) -> str:
 def read_lab_key(text: str) -> str:
     """Return a key as it is written, from how a person typed it.
 
-    Raises
-    ------
-    LabKeyError
-        It has another length, a character that no key has, or its check character does not fit.
+    Raises `LabKeyError` for another length, a character that no key has, or a wrong last one.
 
-    Examples
-    --------
     >>> read_lab_key("o123 4567 89ab cder")
     '0123-4567-89AB-CDER'
     """
@@ -112,15 +98,6 @@ VIEW_SIDE = 4  #: cells: views are all blocks up to this side, and those without
 def keyed_array(published: FoldedArray, lab_key: str) -> FoldedArray:
     """Return a lab's own array of the size, the field and the window of a published one.
 
-    Parameters
-    ----------
-    published
-        The array without a key, as a profile has it.
-    lab_key
-        As `generator.array.lab_key` writes it; equal keys, equal arrays.
-
-    Examples
-    --------
     >>> from generator.array.profiles import profile
     >>> one = keyed_array(profile("one-touch").array(), "0123-4567-89AB-CDER")
     >>> one.rows, one.columns, one.window, one.first

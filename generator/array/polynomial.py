@@ -1,12 +1,9 @@
-"""Polynomials over GF(q): arithmetic modulo h, order, primitivity. Thesis 5.4.1.
+"""Polynomials over GF(q): arithmetic modulo h, order, primitivity; those on file. Thesis 5.4.1.
 
-A polynomial is a sequence of labels, coefficient of x^0 first.
-
-Primitive polynomials on file, and how to find one more.
-
-`primitive_polynomials.json` holds, for each order and degree, texts with their source: the
-thesis's tables 5.1 and 5.3 and appendix 4 as printed, the recommended ones for folds, and
-for the rest the first one that `search_primitive` finds. The first entry is the default.
+A polynomial is a sequence of labels, coefficient of x^0 first. `primitive_polynomials.json` holds
+texts with their source for each order and degree, the default first: the thesis's tables 5.1 and
+5.3 and appendix 4 as printed, the recommended ones for folds, and for the rest the first one that
+`search_primitive` finds.
 """
 
 from __future__ import annotations
@@ -15,13 +12,13 @@ import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import combinations, count
+from itertools import combinations
 from itertools import product as tuples_of
 from pathlib import Path
 
 import numpy as np
 
-from generator.array.factor import LARGEST_PERIOD, period_factors, prime_factors
+from generator.array.factor import LARGEST_PERIOD, period_factors
 from generator.array.field import Field, Labels, field_of_order, parse_polynomial
 from generator.array.residue import Residues
 from generator.errors import ArrayError
@@ -38,66 +35,11 @@ def product(field: Field, a: Sequence[int], b: Sequence[int]) -> tuple[int, ...]
     return tuple(result.tolist())
 
 
-def remainder(field: Field, a: Sequence[int], h: Sequence[int]) -> tuple[int, ...]:
-    """Return a modulo the monic polynomial h of degree n, n coefficients."""
-    degree = len(h) - 1
-    modulus = np.asarray(h, dtype=np.int64)
-    result = np.zeros(max(len(a), degree), dtype=np.int64)
-    result[: len(a)] = a
-    for top in range(len(result) - 1, degree - 1, -1):
-        if result[top]:
-            part = result[top - degree : top + 1]
-            factor = field.negative[result[top]]
-            part[:] = field.addition[part, field.multiplication[factor, modulus]]
-    return tuple(result[:degree].tolist())
-
-
-def mulmod(field: Field, a: Sequence[int], b: Sequence[int], h: Sequence[int]) -> tuple[int, ...]:
-    """Return a b modulo the monic polynomial h."""
-    return remainder(field, product(field, a, b), h)
-
-
-def powmod(field: Field, a: Sequence[int], exponent: int, h: Sequence[int]) -> tuple[int, ...]:
-    """Return a^exponent modulo the monic polynomial h, exponent >= 0."""
-    result = remainder(field, (1,), h)
-    for bit in bin(exponent)[2:]:
-        result = mulmod(field, result, result, h)
-        if bit == "1":
-            result = mulmod(field, result, a, h)
-    return result
-
-
-def order(field: Field, h: Sequence[int]) -> int:
-    """Return the least t > 0 with x^t = 1 modulo h, the period of its recurrence.
-
-    h is monic with a constant term; it may be reducible. Slow for large degrees: meant for
-    looking at one polynomial, while `is_primitive` is quick.
-    """
-    checked = monic(field, h)
-    degree = len(checked) - 1
-    one = remainder(field, (1,), checked)
-    lifted = next(
-        field.characteristic**k for k in count() if field.characteristic**k >= degree
-    )  # an irreducible factor may be repeated up to `degree` times
-    primes = set(prime_factors(lifted))
-    bound: int = field.order**degree - 1
-    if powmod(field, (0, 1), bound, checked) != one:
-        bound = lifted
-        for k in range(1, degree + 1):
-            bound *= field.order**k - 1
-    for k in range(1, degree + 1):
-        primes.update(period_factors(field.order, k))
-    for prime in sorted(primes):
-        while bound % prime == 0 and powmod(field, (0, 1), bound // prime, checked) == one:
-            bound //= prime
-    return bound
-
-
 def norm(field: Field, h: Sequence[int]) -> tuple[int, ...]:
     """Return the product of h and its conjugates: the polynomial over GF(p) of h's roots.
 
-    For a primitive h of degree n it is their minimal polynomial, degree n m, so that GF(q)[x]/h
-    and GF(p)[x]/norm are the same field with the same x.
+    For a primitive h of degree n it is their minimal polynomial, degree n m: GF(q)[x]/h and
+    GF(p)[x]/norm are the same field with the same x.
     """
     result: tuple[int, ...] = (1,)
     conjugate = tuple(h)
@@ -114,10 +56,7 @@ def _frobenius(field: Field, label: int) -> int:
 
 
 def is_primitive(field: Field, h: Sequence[int]) -> bool:
-    """Whether the monic polynomial h, of degree n, has the period q^n - 1.
-
-    h is primitive over GF(q) exactly if its norm is primitive over GF(p) (same roots).
-    """
+    """Whether the monic h has the period q^n - 1: then its norm is primitive over GF(p)."""
     if len(h) < 2 or h[-1] != 1 or h[0] == 0:
         return False
     factors = period_factors(field.order, len(h) - 1)
@@ -187,58 +126,34 @@ def known_polynomials() -> tuple[PrimitivePolynomial, ...]:
     )
 
 
-def primitive_polynomial(order: int, degree: int, source: str | None = None) -> tuple[int, ...]:
-    """Return a primitive polynomial of `degree` over GF(order) that is on file.
+def primitive_polynomial(order: int, degree: int) -> tuple[int, ...]:
+    """Return the primitive polynomial of `degree` over GF(order) that is on file.
 
-    Parameters
-    ----------
-    order, degree
-        q and n.
-    source
-        The one of this source ("table 5.1", "robust"); the default one otherwise.
+    Raises `ArrayError` if none is.
 
-    Raises
-    ------
-    ArrayError
-        If none is on file.
-
-    Examples
-    --------
     >>> primitive_polynomial(4, 2)
     (2, 1, 1)
     """
     entries = [p for p in known_polynomials() if p.order == order]
     for entry in entries:
-        if entry.degree == degree and source in (None, entry.source):
+        if entry.degree == degree:
             return entry.labels
     period_factors(order, degree)  # first say if there can be none
-    degrees = sorted({p.degree for p in entries if source in (None, p.source)})
-    wanted = f" from {source}" if source else ""
+    degrees = [p.degree for p in entries]
+    known = f"on file: degrees {min(degrees)} to {max(degrees)}" if degrees else ""
     raise ArrayError(
-        f"no primitive polynomial of degree {degree} over GF({order}){wanted} is on file; "
-        + (f"on file: degrees {_ranges(degrees)}" if degrees else "none is for this field"),
+        f"no primitive polynomial of degree {degree} over GF({order}) is on file; "
+        + (known or "none is for this field"),
         fix="give one as polynomial: 'x^2+x+A', found by "
         f"generator.array.polynomial.search_primitive({order}, {degree})",
     )
 
 
-def _ranges(numbers: list[int]) -> str:
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]} to {r[-1]}" for r in runs)
-
-
 def search_primitive(order: int, degree: int) -> tuple[int, ...]:
     """Return the primitive polynomial with the fewest terms, then the lowest exponents.
 
-    Takes milliseconds to seconds; the result is the same every time.
+    Takes milliseconds to seconds.
 
-    Examples
-    --------
     >>> search_primitive(2, 7)
     (1, 1, 0, 0, 0, 0, 0, 1)
     """
@@ -248,10 +163,9 @@ def search_primitive(order: int, degree: int) -> tuple[int, ...]:
 
 
 def _candidates(field: Field, degree: int) -> Iterator[tuple[int, ...]]:
-    """Monic polynomials that may be primitive, few terms first.
+    """Yield monic polynomials that may be primitive, few terms first.
 
-    (-1)^n h(0), the product of the roots, must generate GF(q)'s group; and h(1) is not 0
-    unless n = 1.
+    (-1)^n h(0), the product of the roots, must generate GF(q)'s group; h(1) is not 0 unless n = 1.
     """
     negative = field.negative if degree % 2 else range(field.order)
     constants = sorted(int(negative[label]) for label in field.primitive_labels)

@@ -21,15 +21,7 @@ TABLE_STEPS = 4096  #: powers of one element that a `Powers` may keep
 
 
 class Residues:
-    """The ring GF(p)[x]/H.
-
-    Parameters
-    ----------
-    prime
-        p.
-    modulus
-        (D + 1,) coefficients of H from x^0 to x^D, monic.
-    """
+    """The ring GF(p)[x]/H; `modulus` (D + 1,) are the coefficients of H from x^0 to x^D, monic."""
 
     def __init__(self, prime: int, modulus: Sequence[int]) -> None:
         self.prime = prime
@@ -53,16 +45,6 @@ class Residues:
         return self.reduced(
             self.reduced(np.convolve(a, b)) @ self.powers_of_x[: 2 * self.degree - 1]
         )
-
-    def power(self, a: Digits, exponent: int) -> Digits:
-        """Return a^exponent modulo H, exponent >= 0."""
-        result: Digits | None = None
-        for bit in bin(exponent)[2:]:
-            if result is not None:
-                result = self.product(result, result)
-            if bit == "1":
-                result = a if result is None else self.product(result, a)
-        return self.powers_of_x[0] if result is None else result
 
     def power_of_x(self, exponent: int) -> Digits:
         """Return x^exponent modulo H, exponent >= 0; (D,)."""
@@ -96,17 +78,7 @@ class Residues:
 
 
 class Powers:
-    """Powers of one element, at many exponents at a time.
-
-    Parameters
-    ----------
-    ring
-        The ring.
-    base
-        (D,) the element.
-    order
-        A number with base^order = 1; exponents are taken modulo it.
-    """
+    """Powers of one element (D,), at many exponents at a time, modulo `order`: base^order = 1."""
 
     def __init__(self, ring: Residues, base: Digits, order: int) -> None:
         self.ring = ring
@@ -116,10 +88,7 @@ class Powers:
         self._table: Digits | None = None
 
     def at(self, exponents: NDArray[np.uint64]) -> Digits:
-        """Return base^exponents, (k,) below `order`, as (k, D) digits.
-
-        The first request that is worth it keeps all powers of a short cycle.
-        """
+        """Return base^exponents, (k,) below `order`, as (k, D) digits; short cycles are kept."""
         if self._table is None and self.order <= min(TABLE_STEPS, 8 * exponents.size):
             self._table = self._computed(np.arange(self.order, dtype=np.uint64))
         if self._table is not None:

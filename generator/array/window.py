@@ -1,8 +1,9 @@
-"""What a set of visible terms of an m-sequence tells: minimum distance, unique windows.
+"""The minimum distance of a set of visible terms of an m-sequence.
 
 The terms at given offsets are a linear code of dimension n over GF(q): its codewords are
 what is seen at the N = q^n - 1 places. A minimum distance d means that d - 1 erasures or
 (d - 1)/2 wrong symbols never lead to another place; 0 means that places look alike.
+F. J. MacWilliams, N. J. A. Sloane, The Theory of Error-Correcting Codes, chapter 5.
 """
 
 from __future__ import annotations
@@ -11,44 +12,22 @@ from collections.abc import Iterator
 from math import comb
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from generator.array.contract import SymbolArray
 from generator.array.field import Field, Labels
 from generator.array.sequence import Sequence
 from generator.errors import ArrayError
 
 PLACES_LIMIT = 1 << 20  #: sequences up to this length are searched term by term
 DUAL_LIMIT = 1 << 16  #: otherwise the dual code is listed, up to this many words
-WINDOWS_LIMIT = 1 << 26  #: symbols compared by `windows_are_unique`
 
 
 def minimum_distance(sequence: Sequence, offsets: list[int], weights: list[int]) -> int:
-    """Return the least number of visible cells that tell two places apart.
+    """Return the least number of visible cells that tell two places apart; 0 without full rank.
 
-    Parameters
-    ----------
-    sequence
-        The m-sequence.
-    offsets
-        Distinct indices seen, relative to the place, taken modulo the period.
-    weights
-        Number of cells that show each (1 in a folded array).
-
-    Returns
-    -------
-    int
-        Exact; 0 if the offsets have not full rank.
-
-    Raises
-    ------
-    ArrayError
-        If neither the sequence (2^20 terms) nor the dual code (2^16 words, weights 1) is
-        short enough to be listed.
-
-    References
-    ----------
-    F. J. MacWilliams, N. J. A. Sloane, The Theory of Error-Correcting Codes, chapter 5.
+    `offsets` are distinct indices relative to the place, `weights` the number of cells that show
+    each (1 in a folded array). Raises `ArrayError` if neither the sequence (2^20 terms) nor the
+    dual code (2^16 words, weights 1) is short enough to be listed.
     """
     if sequence.rank(offsets) < sequence.degree:
         return 0
@@ -146,21 +125,3 @@ def null_space(field: Field, matrix: ArrayLike) -> Labels:
         word[column] = 1
         word[pivots] = field.negative[rows[:, column]]
     return basis
-
-
-def windows_are_unique(array: SymbolArray, window: tuple[int, int]) -> bool:
-    """Compare every window of an array of up to 2^26 / (a b) cells with every other one.
-
-    Independent of the rank test, which says the same for arrays of any size.
-    """
-    a, b = window
-    if array.rows * array.columns * a * b > WINDOWS_LIMIT:
-        raise ArrayError(
-            f"{array.rows}x{array.columns} windows of {a}x{b} are too many to compare",
-            fix="use array.identifies(), the rank test",
-        )
-    grid = array.symbols(np.arange(array.rows)[:, None], np.arange(array.columns))
-    small: NDArray[np.uint16] = np.pad(grid, ((0, a - 1), (0, b - 1)), mode="wrap").astype("u2")
-    seen = np.lib.stride_tricks.sliding_window_view(small, window)
-    flat = np.ascontiguousarray(seen.reshape(-1, a * b)).view(f"V{2 * a * b}").ravel()
-    return np.unique(flat).size == flat.size

@@ -2,16 +2,15 @@
 
 ::
 
-    __init__.py        which command is meant
     encode.py          encode-object SPEC.yaml...
     tools.py           encode-object init | schema | printers
     objects.py         encode-object lab | list | show | retire | export | import
     made_report.py     what was made, as text and as JSON
     object_report.py   what is registered and how full the lab is, as text and as JSON
+    printed_report.py  what becomes of symbols on a printer
 
-Results go to stdout, progress and messages to stderr (`encoded_objects.base.output`). Exit codes:
-0 done, 1 could not be written, 2 bad input, 4 database, 130 interrupted. Nothing heavy is
-imported before it is needed: `encode-object --help` loads no array, no geometry, no database.
+Exit codes: 0 done, 1 could not be written, 2 bad input, 4 database, 130 interrupted. Nothing heavy
+is imported before it is needed: `--help` loads no array, no geometry, no database.
 """
 
 from __future__ import annotations

@@ -212,7 +212,6 @@ def _faces(held: RegisteredObject, sensor: SensorType) -> list[_Face]:
 
 
 def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
-    """Return one line of the list as plain values."""
     return {
         "name": entry.name,
         "shape": entry.object_type,
@@ -231,7 +230,6 @@ def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
 def _object_values(
     held: RegisteredObject, faces: Sequence[_Face], files: Sequence[PartState]
 ) -> dict[str, Any]:
-    """Return all about an object as plain values; `faces` are the faces, not their number."""
     entry = held.entry
     return _entry_values(entry) | {
         "faces": [_face_values(face) for face in faces],

@@ -63,20 +63,9 @@ def array_svg(
     faces: Sequence[FaceOnArray],
     outlines: Sequence[Tiers],
 ) -> str:
-    """Return the picture as SVG text; it shows one object, whatever others share the array.
+    """Return the picture of one object on an array of any size as SVG text.
 
-    Parameters
-    ----------
-    title
-        Written above the picture.
-    rows, columns
-        Size of the array; of any size.
-    pitch_mm
-        Side of a cell, mm.
-    faces
-        The faces of the object.
-    outlines
-        The symbols by label; the last tier is drawn, mm.
+    `outlines`: the symbols by label; the last tier is drawn, mm.
     """
     placed = [_unwrap(face, pitch_mm) for face in faces]
     view = _view(rows, columns, [box for _, box in placed])

@@ -1,11 +1,11 @@
-"""All files of an object, or none: write beside the outputs, rename at the end.
+"""Write all files of an object, or none.
 
 `Staging` holds a hidden folder `.encode-object-<process>` in the output folder. Files are
 written there, flushed to the disk, and moved under their final names by `commit`; leaving
-without `commit` removes everything, also the folders that were made for it. A process that
-died leaves its hidden folder; the next one removes it. Whether its owner lives is asked of
-the lock that the owner holds on the folder, not of the process number, which may be reused
-or belong to another container.
+without `commit` removes everything, also the folders that were made for it. The hidden folder of
+a process that died is removed by the next one. Whether its owner lives is read from the lock that
+the owner holds on the folder, not from the process number, which may be reused or belong to
+another container.
 """
 
 from __future__ import annotations
@@ -37,17 +37,9 @@ class StagedFile:
 
 
 class Staging:
-    """Files that appear together.
+    """Files that appear together in a folder, which is made if it is not there.
 
-    Parameters
-    ----------
-    folder
-        Where the files shall be in the end; made if it is not there.
-
-    Raises
-    ------
-    WriteError
-        The folder cannot be made or written, a file cannot be written or moved.
+    Raises `WriteError` if the folder cannot be made, or a file cannot be written or moved.
 
     Examples
     --------
@@ -94,7 +86,7 @@ class Staging:
     ) -> StagedFile:
         """Write one file into the staging folder, from bytes or from a stream of pieces.
 
-        With `digest` its sha256 is told: of a large file that takes as long as writing it.
+        With `digest` its sha256 is returned: of a large file that takes as long as writing it.
         """
         final = self.folder / name
         pieces = (content,) if isinstance(content, bytes) else content

@@ -51,25 +51,10 @@ def arrange_plates(
     gap_mm: float = 5.0,
     groups: Sequence[int] | None = None,
 ) -> tuple[Plate, ...]:
-    """Arrange rectangles on as many plates as needed.
+    """Arrange rectangles (width and depth, mm) on as many plates as needed, centred on the bed.
 
-    Parameters
-    ----------
-    sizes
-        Width and depth of each part, mm.
-    bed_mm
-        Usable width and depth of the bed, mm.
-    gap_mm
-        Least distance between two parts, mm.
-    groups
-        Group of each part. A group lies on one plate if one can hold it, and on plates of its own
-        if not; left out, all parts are one group.
-
-    Returns
-    -------
-    tuple of Plate
-        The parts of each plate, centred on the bed as a group. A part that the bed cannot
-        take in either direction has a plate of its own with an `overhang_mm`.
+    A group lies on one plate if one can hold it, else on plates of its own; without groups, all
+    parts are one. A part larger than the bed has a plate of its own with an `overhang_mm`.
 
     Examples
     --------

@@ -26,6 +26,7 @@ from generator.errors import GeneratorError, SolidError
 from generator.export.exact_crossing import cut_triangles, perhaps_folded
 from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
 from generator.solid import Part, round_volume, volume
+from generator.solid.part import transform
 
 Floats = NDArray[np.float64]
 
@@ -86,12 +87,8 @@ class FitReport:
 def verify_step(part: Part, path: Path) -> StepReport:
     """Read the STEP file of a part and compare it with the part.
 
-    Raises
-    ------
-    SolidError
-        It is not one valid solid of the part's volume; names file, part and fault.
-    MissingExtraError
-        The CAD kernel is not installed.
+    Raises `SolidError` if it is not one valid solid of the part's volume, `MissingExtraError`
+    without the CAD kernel.
     """
     read = read_step(path)
     excess = round_volume(part)
@@ -115,14 +112,8 @@ def verify_step(part: Part, path: Path) -> StepReport:
 def verify_stl(part: Part, path: Path) -> MeshReport:
     """Read the STL file of a part and compare it with the part.
 
-    Raises
-    ------
-    SolidError
-        It is not one closed mesh of the part's volume; names file, part and fault.
-    MissingExtraError
-        The mesh library is not installed.
-    GeneratorError
-        The mesh library lacks one of the system.
+    Raises `SolidError` if it is not one closed mesh of the part's volume, `MissingExtraError`
+    without the mesh library, `GeneratorError` if that lacks a library of the system.
     """
     read, volume_mm3 = read_stl(path), volume(part)
     report = replace(read, volume_error=float(read.volume_mm3 / volume_mm3 - 1.0))
@@ -149,10 +140,7 @@ def verify_stl(part: Part, path: Path) -> MeshReport:
 def verify_fit(panels: Sequence[PanelFile], gap_mm: float) -> FitReport:
     """Put written panels together and measure.
 
-    Raises
-    ------
-    SolidError
-        Two panels overlap or are nearer than `gap_mm`; names both.
+    Raises `SolidError` if two panels overlap or are nearer than `gap_mm`.
     """
     solids = [_solid(panel) for panel in panels]
     boxes = np.array([solid.bounding_box() for solid in solids]).reshape(-1, 2, 3)
@@ -184,8 +172,7 @@ def _solid(panel: PanelFile) -> Manifold:
         panel.path.read_bytes(), str(panel.path), most=MOST_PART_TRIANGLES, padded=False
     )
     points, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    T = panel.T_object_part
-    seated = points @ T[:3, :3].T + T[:3, 3]
+    seated = transform(panel.T_object_part, points)
     solid = Manifold(Mesh64(seated, numbers.reshape(-1, 3).astype(np.uint64)))
     if solid.status() != Error.NoError:
         raise _misfit(f"'{panel.name}' is no closed mesh", panel)

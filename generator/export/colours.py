@@ -1,7 +1,4 @@
-"""The two colours of every file, body and symbols, and those of faces by what they answer.
-
-Body and symbols are far apart in lightness and hue.
-"""
+"""The colours of every file: body, symbols, and faces by the share of touches they answer."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Parts, plates and steps of gluing -> SVG, to stand inside a page.
+"""Draw parts, plates and steps of gluing as SVG, to stand inside a page.
 
-A drawing's y axis runs down; mm are its units. A panel is drawn as it is seen: its front with the
-symbols up, and its back as one looks at the engraved side.
+A panel is drawn as it is seen: its front with the symbols up, and its back as one looks at the
+engraved side. mm, y down.
 """
 
 from __future__ import annotations
@@ -33,14 +33,9 @@ def is_panel(part: Part) -> bool:
 
 
 def draw_front(part: Part, edges: Sequence[tuple[str, Points]]) -> str:
-    """Return a panel from the side of its symbols, the numbers of its edges beside them.
+    """Return a panel from the side of its symbols, the numbers of its edges near them.
 
-    Parameters
-    ----------
-    part
-        A panel; part frame, mm.
-    edges
-        Number of each edge and its ends (2, 2), part frame.
+    `edges`: number of each edge and its ends (2, 2), part frame, mm.
     """
     outline = [part.vertices[list(loop), :2] for loop in part.facets[_FRONT].loops]
     shapes = [_path(outline, f'fill="{BODY}" stroke="{INK}" stroke-width=".4"')]
@@ -115,16 +110,8 @@ def draw_step(polygons: Sequence[Sequence[Points]], kinds: Sequence[int], names:
               R_eye_object: Points) -> str:  # fmt: skip
     """Return the object while it is put together.
 
-    Parameters
-    ----------
-    polygons
-        Loops (k, 3) of each face, object frame.
-    kinds
-        Of each face: 0 not there yet, 1 glued, 2 to be glued now.
-    names
-        Of the faces.
-    R_eye_object
-        (3, 3); eye frame: x right, y up, z towards the eye.
+    `polygons`: loops (k, 3) of each face, object frame; `kinds` of each face: 0 missing, 1 glued,
+    2 to be glued now; `R_eye_object` (3, 3), eye frame: x right, y up, z towards the eye.
     """
     seen = [[loop @ R_eye_object.T for loop in loops] for loops in polygons]
     order = sorted(range(len(seen)), key=lambda k: round(float(seen[k][0][:, 2].mean()), 6))

@@ -1,18 +1,14 @@
 """Whether triangles of a mesh cut each other, decided in integers.
 
 Float coordinates are whole multiples of a power of two, so scaling makes them integers and
-nothing is rounded. A triangle is the intersection of half spaces; cutting another triangle
-by them leaves what the two have in common. In a surface that does not cut itself this is
-the vertex or the edge that they share, told by equal coordinates, or nothing. Anything more
-counts: a crossing, an overlap in one plane, a neighbour folded over, and a mere touch where
-no vertex is shared (a vertex on the other's side or inside it), for there the surface
-touches itself.
+nothing is rounded. A triangle is an intersection of half spaces; cutting another triangle by them
+leaves what the two have in common. In a surface that does not cut itself this is the vertex or
+the edge that they share, or nothing. Anything more counts: a crossing, an overlap in one plane, a
+neighbour folded over, and a mere touch where no vertex is shared. By hand because mesh libraries
+decide in floats: pymeshlab reports triangles that only touch.
 
-By hand because the mesh libraries decide in floats: pymeshlab reports triangles that only touch,
-so what it reports is decided here.
-
-Reference: Sutherland and Hodgman, Reentrant polygon clipping, Communications of the ACM 17
-(1974), here in homogeneous integers.
+Sutherland and Hodgman, Reentrant polygon clipping, Communications of the ACM 17 (1974), here in
+homogeneous integers.
 """
 
 from __future__ import annotations
@@ -33,18 +29,9 @@ Triangle = tuple[Vector, Vector, Vector]
 
 
 def cut_triangles(corners: NDArray[np.float64], suspects: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which of some triangles of a mesh cut or touch another one where they may not.
+    """Return (n,) whether the triangles `suspects` (n,) cut or touch another where they may not.
 
-    Parameters
-    ----------
-    corners
-        (T, 3, 3) corners of all triangles, finite, any unit.
-    suspects
-        (n,) numbers of the triangles to decide.
-
-    Returns
-    -------
-    (n,)
+    `corners`: (T, 3, 3) of all triangles, finite, any unit.
     """
     low, high = corners.min(axis=1), corners.max(axis=1)
     found = np.zeros(len(suspects), np.bool_)
@@ -57,15 +44,7 @@ def cut_triangles(corners: NDArray[np.float64], suspects: NDArray[np.int64]) -> 
 
 
 def perhaps_folded(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the triangles that may lie folded over a neighbour, or have no area.
-
-    Parameters
-    ----------
-    points
-        (N, 3).
-    triangles
-        (T, 3) points.
-    """
+    """Return the triangles (T, 3) that may lie folded over a neighbour, or have no area."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1)

@@ -1,9 +1,8 @@
 """Text with fields of fixed width, stamped many times at the speed of an array copy.
 
-A template is written once with marked fields (entity numbers, decimals, names); every
-instance is a row of bytes in which only the fields are overwritten. All numbers of one
-kind have the same width, so that every row has the same length and a block of a thousand
-instances is one (m, length) array of bytes.
+A template is written once with marked fields (entity numbers, decimals, names); every instance is
+a row of bytes in which only the fields are overwritten. All numbers of one kind have the same
+width, so that a block of a thousand instances is one (m, length) array of bytes.
 
 By hand because neither numpy nor Python formats many numbers at once: a million coordinates
 take 0.06 s of CPU here and 0.17 s as one `%` over a tuple, before names and numbers are set in.
@@ -80,12 +79,10 @@ def stamp(
 
     Parameters
     ----------
-    template
-        The text and its fields.
     first
         (m,) added to the relative numbers of each instance.
     width
-        Digits of a number field; every number has exactly as many.
+        Digits of every number.
     decimals
         (m, d, decimal width) text of the decimal fields of each instance.
     names
@@ -159,16 +156,10 @@ def decimal_numbers(values: NDArray[np.float64], width: int, places: int) -> Byt
 def number_lines(
     words: tuple[str, ...], rows: NDArray[np.float64] | NDArray[np.int64], places: int
 ) -> bytes:
-    """Return one line for each row of numbers, without needless zeros.
+    """Return one line for each row of numbers (n, k), without needless zeros.
 
-    Parameters
-    ----------
-    words
-        (k + 1) ASCII texts before, between and behind the numbers of a row.
-    rows
-        (n, k); some thousand at once stay in the cache.
-    places
-        Decimals to round to; 0 for integers.
+    `words`: (k + 1) ASCII texts around the numbers of a row; `places`: decimals to round to, 0 for
+    integers. Some thousand rows at once stay in the cache.
     """
     scaled = np.rint(rows.T * 10.0**places).astype(np.int64) if places else rows.T
     sizes = np.abs(scaled)

@@ -29,7 +29,7 @@ Files = Iterator[tuple[str, Content]]  #: name and content of each file
 
 @dataclass(frozen=True)
 class ExportedObject:
-    """An object as writers need it; what several of them share is made once."""
+    """An object as writers need it; values that several of them share are made once."""
 
     name: str
     polyhedron: Polyhedron
@@ -49,13 +49,7 @@ class ExportedObject:
 
     @cached_property
     def robot(self) -> RobotModel:
-        """The object as one rigid body.
-
-        Raises
-        ------
-        SolidError
-            Symbols on a round face are to collide.
-        """
+        """One rigid body; raises `SolidError` if symbols on a round face are to collide."""
         from generator.export.robot.model import robot_model
 
         return robot_model(
@@ -114,16 +108,9 @@ def stage_formats(
     """Write an object in some formats; return the files of each.
 
     Files of parts come first, each part in all formats, then assemblies, then all else. Files that
-    several formats need (the meshes of a robot model) are written once.
-
-    Raises
-    ------
-    SolidError
-        A file did not pass its verification.
-    MissingExtraError
-        The library that reads a format is not installed.
-    WriteError
-        A file cannot be written.
+    several formats need (the meshes of a robot model) are written once. Raises `SolidError` if a
+    file does not pass its verification, `MissingExtraError` without the library that reads a
+    format, `WriteError` if a file cannot be written.
     """
     chosen = [exporter for name, exporter in EXPORTERS.items() if name in formats]
     staged: dict[str, list[StagedFile]] = {exporter.name: [] for exporter in chosen}

@@ -53,17 +53,7 @@ def place_labels(
 ) -> list[Label | None]:
     """Return each label where most of it lies on its own face, near the middle, and over no other.
 
-    Parameters
-    ----------
-    seen
-        (rows, columns) the face seen at ((column + 1/2) step, (row + 1/2) step), -1 for none.
-    step
-        Distance between two places of the map, px.
-    wanted
-        Labels at the middles of their faces.
-
-    Returns
-    -------
+    `seen`: (rows, columns) the face at ((column + 1/2) step, (row + 1/2) step) px, -1 for none.
     None for a face that is hidden, or seen at too few places.
     """
     rows, columns = np.nonzero(seen >= 0)
@@ -107,20 +97,9 @@ def write_lettering(
     *,
     apart: bool,
 ) -> None:
-    """Write title, captions, names of faces and the scale.
+    """Write title, captions, names of faces and the scale (px for a mm) into the picture.
 
-    Parameters
-    ----------
-    image
-        The picture, changed in place.
-    labels
-        Names of faces, where they belong.
-    scale
-        Pixels for a mm.
-    fonts
-        Of the title, of names and of all else.
-    apart
-        Whether panels are moved apart in the second view.
+    `fonts` of the title, of names and of all else; `apart`: the second view has panels apart.
     """
     draw = ImageDraw.Draw(image)
     width, height = image.size

@@ -1,8 +1,7 @@
 """Parts and their triangles -> STL and GLB.
 
 STL is binary, mm, part frame. Coordinates are 32-bit floats: near the local origin they resolve
-1e-5 mm at 100 mm. Vertices are shared by number, so that a vertex has the same bytes in all its
-triangles and the file is as closed as the mesh.
+1e-5 mm at 100 mm. Vertices are shared by number: the file is as closed as the mesh.
 
 GLB (glTF 2.0, binary container) has one node for each face of the object, and body and symbols as
 two materials. The faces' nodes ("F1", ...) are in the object frame, mm, z up; the root node scales
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 
 from generator.export.colours import BODY_RGB, RGB, SYMBOL_RGB
 from generator.export.formats import ExportedObject, Files
-from generator.solid.part import Part
+from generator.solid.part import Part, transform
 from generator.solid.triangulate import Mesh
 
 _HEADER = b"encoded-objects binary STL, mm".ljust(80, b" ")
@@ -36,14 +35,8 @@ _VERTICES, _INDICES = 34962, 34963  # buffer targets
 def named_facets(part: Part, *, alone: bool) -> list[tuple[str, int]]:
     """Return name and number of the facets that are faces of the object.
 
-    Parameters
-    ----------
-    part
-        A panel, or the whole body.
-    alone
-        Whether it is the only part: then each of its facets is a face; a round face has the
-        name and the number of its first facet. A panel carries one face: the facet with the
-        symbols, or its first one where there are none.
+    Of the only part (`alone`) these are all its facets; a round face has the name and the number of
+    its first facet. A panel carries one face: the facet with the symbols, or its first one.
     """
     if alone:
         numbers = np.unique(object_faces(part)).tolist()
@@ -57,7 +50,7 @@ def object_faces(part: Part) -> NDArray[np.int64]:
     """Return for each facet of a whole body the facet that stands for its face of the object.
 
     That is the facet itself, or the first one of a round face (F2 for F2.2, F2.3, ...); the
-    facets of a symbol (F2/r1c2/top) belong to the face that it stands on.
+    facets of a symbol (F2/r1c2/top) belong to its face.
     """
     first: dict[str, int] = {}
     faces = [facet.name.partition("/")[0].partition(".")[0] for facet in part.facets]
@@ -103,19 +96,9 @@ def stl_chunks(mesh: Mesh) -> Iterator[bytes | memoryview]:
 
 
 def glb_bytes(name: str, parts: Sequence[Part], meshes: Sequence[Mesh]) -> bytes:
-    """Return the file of an object.
+    """Return the file of an object; meshes in part frames, mm.
 
-    Parameters
-    ----------
-    name
-        Of the object; name of the root node.
-    parts, meshes
-        The parts and the mesh of each, part frame, mm.
-
-    Notes
-    -----
-    Of an object in one part every facet is a node; of an object in several parts every
-    part is, under the name of the face it carries.
+    Each facet of a single part is a node; of several parts each part is, named as its face.
     """
     buffer = _Buffer()
     nodes: list[dict[str, Any]] = [{"name": name, "matrix": _ROOT, "children": []}]
@@ -164,8 +147,7 @@ def _faces(
 ) -> Iterator[tuple[str, NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]]:
     """Yield name, vertices in the object frame, triangles, and 1 for those of a symbol."""
     for part, mesh in zip(parts, meshes, strict=True):
-        T = part.T_object_part
-        vertices = mesh.vertices @ T[:3, :3].T + T[:3, 3]
+        vertices = transform(part.T_object_part, mesh.vertices)
         embossed = symbol_triangles(part, mesh).astype(np.int64)
         if len(parts) > 1:
             [(name, _)] = named_facets(part, alone=False)

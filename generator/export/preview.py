@@ -4,7 +4,7 @@ Where it is known, faces bear the share of touches that they answer, as a number
 The left view looks from the front, right and above; the right one from the opposite corner,
 with panels moved apart, so that every face of a convex object is seen. Orthographic, flat
 shading, two by two samples for each pixel. Object frame in mm, z up. Coordinates stand in three
-rows, (3, N): extents and depths run along them. Why by hand: `raster`.
+rows, (3, N): extents and depths run along them.
 """
 
 from __future__ import annotations
@@ -91,19 +91,10 @@ def preview_png(
     meshes: Sequence[Mesh],
     answered: Mapping[str, Shares] = NOTHING_KNOWN,
 ) -> bytes:
-    """Return the picture.
+    """Return the picture of an object of extent `size_mm`, (3,); meshes in part frames, mm.
 
-    Parameters
-    ----------
-    name
-        Of the object, the title.
-    size_mm
-        Its extent in x, y and z, mm, for the subtitle.
-    parts, meshes
-        The parts and the mesh of each, part frame, mm.
-    answered
-        Shares of touches that are answered at once, and within three, by the name of a face: its
-        label, and by the first its colour.
+    `answered`: shares of touches answered at once, and within three, by the name of a face: its
+    label, and by the first its colour.
     """
     samples, width, top = SAMPLES, WIDTH, TOP
     bottom = HEIGHT - BOTTOM
@@ -146,15 +137,11 @@ def _scene(
 ) -> Scene:
     """Gather all parts in the object frame; panels move out by a share of the size.
 
-    Closed panels hide their backs, so these are left out unless the panels move apart.
-
-    Parameters
-    ----------
-    turned
-        (3, n) vertices of each mesh, mm, along the object's axes and from the part's origin.
+    Backs, which closed panels hide, are left out unless the panels move apart. `turned`: (3, n)
+    vertices of each mesh, mm, along the object's axes and from the part's origin.
     """
     placed = [part.T_object_part for part in parts]
-    bodies = [part.vertices @ T[:3, :3].T + T[:3, 3] for part, T in zip(parts, placed, strict=True)]
+    bodies = [part.seated for part in parts]
     distance = apart * float(np.ptp(np.concatenate(bodies), axis=0).max())
     vertices, triangles, symbols, owners, edges = [], [], [], [], []
     names: list[str] = []

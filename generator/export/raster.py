@@ -5,9 +5,8 @@ pixels, and for each pixel the nearest triangle wins. Depth and triangle number 
 64-bit integer, so that one maximum finds both. Screen frame: pixels, x right, y down, the
 centre of pixel (row i, column j) at (j + 1/2, i + 1/2); depth grows towards the eye.
 
-By hand because of start-up time and depth: of the libraries here only matplotlib draws solids,
-an extra that costs 0.34 s of CPU to import and 0.28 s for the 60 mm cube (28,348 triangles),
-which takes 0.13 s here; it sorts triangles by their middles and lets symbols show through.
+By hand because of start-up time and depth: matplotlib costs 0.34 s of CPU to import and 0.28 s
+for the 60 mm cube (28,348 triangles), which takes 0.13 s here, and lets symbols show through.
 """
 
 from __future__ import annotations
@@ -67,16 +66,10 @@ class DepthBuffer:
 
 
 def rasterise(points: Floats, triangles: Index, screen: Index) -> DepthBuffer:
-    """Return which triangle is seen at each pixel.
+    """Return which triangle is seen at each pixel of `screen` (height, width), which it overwrites.
 
-    Parameters
-    ----------
-    points
-        (3, N) x, y (pixels) and depth (any unit).
-    triangles
-        (T, 3) points, counter-clockwise as seen; others turn their back and are left out.
-    screen
-        (height, width), overwritten; the memory of the result.
+    `points`: (3, N) x, y (pixels) and depth (any unit). Triangles run counter-clockwise; others
+    turn their back and are left out.
     """
     height, width = screen.shape
     buffer = screen.reshape(-1)
@@ -145,8 +138,7 @@ def _rows(y: Floats, height: int) -> tuple[Index, Index]:
 def _spans(x: Floats, y: Floats, rows: Index, count: Index, width: int) -> tuple[Index, Index]:
     """Return first pixel and number of pixels of each triangle in its `count` rows.
 
-    Edges that lead down the screen bound a triangle on the left, those that lead up on the
-    right.
+    Edges that lead down the screen bound a triangle on the left, those that lead up on the right.
     """
     left = np.full(len(rows), 0.0)
     right = np.full(len(rows), float(width))

@@ -1,9 +1,8 @@
-"""What a set has as a whole: the packing list as CSV, and an overview of all plates as PDF.
+"""The files of a whole set: the packing list as CSV, and an overview of all plates as PDF.
 
-The list says for the technician which part of which object lies where: UTF-8, commas, lines end
-in CR LF (RFC 4180). The overview has A4 pages, portrait: the objects, and a plan of every plate as
-the printer shows it. Plate frame of `bed`: x right, y back, origin at the front left, mm. The same
-set gives the same bytes: no dates, fonts embedded.
+The list says which part of which object lies where: UTF-8, commas, lines end in CR LF (RFC 4180).
+The overview has A4 pages, portrait: the objects, and a plan of every plate as the printer shows
+it, in the plate frame of `bed`. The bytes hold no dates, and fonts are embedded.
 """
 
 from __future__ import annotations
@@ -81,17 +80,7 @@ def can_draw() -> bool:
 def overview_pdf(
     title: str, plates: Sequence[Sequence[PackedPart]], beds_mm: Sequence[tuple[float, float]]
 ) -> bytes:
-    """Return the pages.
-
-    Parameters
-    ----------
-    title
-        Name of the set.
-    plates
-        The parts on each plate.
-    beds_mm
-        Width and depth of the bed that each plate is for.
-    """
+    """Return the pages: the parts on each plate, and width and depth of its bed."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_pdf import PdfPages
 

@@ -1,7 +1,6 @@
-"""What a sheet for people says -> one HTML page: no network, no script, prints on paper.
+"""Sections of a sheet -> one HTML page: no network, no script, prints on paper.
 
-Build sheets of objects and sets, and the sheet of a probe kit, are sections in one template,
-`sheet.html.j2`.
+Build sheets of objects and sets, and the sheet of a probe kit, share `sheet.html.j2`.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One heading and what is under it, in this order; what is empty is left out."""
+    """One heading and its content, in this order; empty fields are left out."""
 
     title: str = ""
     text: str = ""

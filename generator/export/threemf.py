@@ -8,13 +8,12 @@ made in both; the same meshes are written and deflated once:
   together; PrusaSlicer asks when a person opens the file, and headless it drops the symbols
   to the bed.
 - ``volumes``: each part is one mesh, and a settings file that PrusaSlicer and SuperSlicer
-  read names the two ranges of its triangles, and `SlicerSettings`. Others see one mesh of
+  read names the two ranges of its triangles, and the slicer's settings. Others see one mesh of
   two materials.
 
-Body and symbols have a material each. Vertices are written where they lie on the bed: PrusaSlicer
-applies the transform of a build item to the first volume alone. A part of two volumes lists the
-vertices of its symbols first, as they are numbered where the symbols are an object; only the
-body's triangles differ, which are few. Part frame in, plate frame out; mm.
+Vertices are written where they lie on the bed: PrusaSlicer applies the transform of a build item
+to the first volume alone. A part of two volumes lists the vertices of its symbols first, as they
+are numbered where the symbols are an object. Part frame in, plate frame out; mm.
 """
 
 from __future__ import annotations
@@ -154,16 +153,7 @@ def print_files(
 ) -> tuple[PrintFile, ...]:
     """Arrange parts on plates and return the 3MF files of each plate.
 
-    Parameters
-    ----------
-    title
-        Of the model.
-    parts
-        In their own frames, mm, as they lie on the bed; of one without symbols name and mesh.
-    bed_mm
-        Usable width and depth of the bed, mm.
-    settings
-        For slicers that read them; None where there are none.
+    Parts lie in their own frames, mm, as on the bed; of one without symbols name and mesh.
     """
     held = [_bed_part(part) for part in parts]
     plates = arrange_plates([part.size for part in held], bed_mm)

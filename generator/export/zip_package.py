@@ -1,7 +1,7 @@
 """Deflated pieces of text -> zip, the package that a 3MF file is (Open Packaging Conventions).
 
-A piece is deflated for itself and ends at a whole byte, so that what several files say is
-deflated once and copied: `zipfile` can only deflate each entry anew. Dates are fixed.
+A piece is deflated for itself and ends at a whole byte, so that text shared by several files is
+deflated once and copied, which `zipfile` cannot do. Dates are fixed.
 RFC 1951 (deflate); PKWARE APPNOTE 6.3 (zip).
 """
 
@@ -50,10 +50,7 @@ def deflate_text(pieces: Iterable[bytes]) -> DeflatedText:
 def zip_package(entries: Mapping[str, Sequence[DeflatedText]]) -> bytes:
     """Return the zip of entries, each by its name (ASCII) and the pieces of its text, in order.
 
-    Raises
-    ------
-    WriteError
-        It would exceed 4 GiB.
+    Raises `WriteError` beyond 4 GiB.
     """
     package = bytearray()
     central = bytearray()
@@ -89,7 +86,7 @@ def zip_package(entries: Mapping[str, Sequence[DeflatedText]]) -> bytes:
 def _crc_of_both(before: int, piece: DeflatedText) -> int:
     """Return the CRC of a text and the piece behind it.
 
-    A CRC is affine in where it begins: over as many zeros it tells what `before` adds.
+    A CRC is affine in its start: over as many zeros it gives the share of `before`.
     """
     moved, own = before, 0
     for start in range(0, piece.size, len(_ZEROS)):

@@ -26,15 +26,7 @@ SIZE_RANGE = 16.0  #: how many times smaller and larger than the face is tried
 def describe_blank(
     names: Mapping[str, Region], cells: Sequence[int], request: LatticeRequest
 ) -> str:
-    """Return the list of faces without a place: names, sizes, cells they hold and need.
-
-    Parameters
-    ----------
-    names
-        Name and region of each face.
-    cells
-        Number of cells that each face holds.
-    """
+    """Return the list of faces without a place: names, sizes, cells that each holds."""
     alike: dict[str, list[str]] = {}
     for (name, region), held in zip(names.items(), cells, strict=True):
         width, height = extent_mm(region)

@@ -36,14 +36,9 @@ class Region:
 
 
 def region_of(loops: Sequence[Points], clearances_mm: Sequence[Points]) -> Region:
-    """Return the region of a polygon given as loops (k, 2) with one clearance per edge.
+    """Return the region of a polygon: loops (k, 2) mm, with one clearance (k,) mm per edge.
 
-    Parameters
-    ----------
-    loops
-        Outer loop counter-clockwise, holes clockwise, mm.
-    clearances_mm
-        One array (k,) per loop; entry e belongs to the edge from vertex e to vertex e + 1.
+    Outer loop counter-clockwise, holes clockwise; entry e is of the edge from vertex e to e + 1.
     """
     return Region(
         np.concatenate(loops),
@@ -67,20 +62,9 @@ def mirror_region(region: Region) -> Region:
 
 
 def blocked_intervals(region: Region, half_mm: float, y: Points) -> tuple[Points, Points]:
-    """Return the open intervals of x that each edge forbids to centres on the lines y.
+    """Return the open intervals of x, (E, Y) mm, that edges forbid to centres on the lines y (Y,).
 
-    Parameters
-    ----------
-    region
-        Edges, in a frame whose axes are those of the footprint square.
-    half_mm
-        Half side of the footprint.
-    y
-        (Y,) mm.
-
-    Returns
-    -------
-    low, high : (E, Y) mm; low >= high where the edge forbids nothing.
+    low >= high where the edge forbids nothing. The region's axes are those of the footprint square.
     """
     eps = region.tolerance
     edges, lines = len(region.start), len(y)
@@ -100,20 +84,9 @@ def blocked_intervals(region: Region, half_mm: float, y: Points) -> tuple[Points
 
 
 def free_grid(region: Region, half_mm: float, y: Points, x: Points) -> NDArray[np.bool_]:
-    """Tell which centres (x, y) may carry a footprint.
+    """Return for centres (y, x) whether the square keeps inside and off every edge, (Y, X) bool.
 
-    Parameters
-    ----------
-    region, half_mm
-        As for `blocked_intervals`.
-    y
-        (Y,) mm, any order.
-    x
-        (X,) mm, rising.
-
-    Returns
-    -------
-    (Y, X) bool: the square lies in the face and keeps every edge's clearance.
+    y in any order, x rising, mm.
     """
     low, high = blocked_intervals(region, half_mm, y)
     width = len(x) + 1

@@ -88,23 +88,12 @@ def choose_lattice(
     *,
     search: bool = True,
 ) -> Lattice:
-    """Return the lattice that shows a place on the most faces, then the most places.
+    """Return the lattice that shows a place on the most faces, then the most places, mm.
 
     Ties are broken by more cells, then by the rotation (that of the first edge, then of longer
-    edges), then by the largest margin to the edges; at last the lattice is centred.
-
-    Parameters
-    ----------
-    regions
-        Faces that share the lattice, all in one frame (mm).
-    half_mm, pitch_mm
-        Half side of the footprint; distance of two symbols.
-    window
-        Rows and columns of the array's window.
-    identifies
-        Rank test for faces into which the window does not fit; None leaves it out.
-    search
-        Try rotations other than along the edges too.
+    edges), then by the largest margin to the edges; at last the lattice is centred. `identifies` is
+    the rank test for faces into which the window does not fit; None leaves it out. `search` tries
+    rotations other than along the edges too.
     """
     found = lattice_candidates(regions, half_mm, pitch_mm, window, search)
     if not found:
@@ -130,10 +119,7 @@ def lattice_candidates(
     window: tuple[int, int],
     search: bool,
 ) -> list[LatticeCandidate]:
-    """Return the best shifts (mm) for every rotation worth a look, edge directions first.
-
-    Parameters as for `choose_lattice`.
-    """
+    """Return the best shifts (mm) for every rotation worth a look, edge directions first."""
     area = sum(abs(_area(region)) for region in regions) / pitch**2
     fine = int(np.clip(np.sqrt(CENTRES / (2.0 * area + 8.0)), 4, 16))
     found = []

@@ -64,34 +64,23 @@ def lay_out(
 
     Parameters
     ----------
-    polyhedron
-        The object, mm.
-    array
-        The array that all objects of a database share.
-    pitch_mm
-        Distance of neighbouring symbols.
+    polyhedron, array, pitch_mm
+        The object, mm; the array that all objects share; distance of neighbouring symbols.
     footprint_half_mm
         Half side of the square, turned with the lattice, that a symbol needs.
     clearances_mm
-        Per face and loop an array (k,): least distance from a footprint to each edge; entry e
-        belongs to the edge from vertex e to vertex e + 1 of the loop.
+        Per face and loop (k,): least distance from a footprint to each edge; entry e belongs to
+        the edge from vertex e to vertex e + 1 of the loop.
     occupied
-        What is taken of the array, or rows and columns (n,) of the cells that are taken.
+        What is taken of the array, or rows and columns (n,) of the taken cells.
     kind
         `auto`, `faces` or `net`.
-    blank_faces
-        Faces that shall carry no symbols.
-    allow_blank_faces
-        Leave a face without an identifiable place blank and warn, instead of refusing.
+    blank_faces, allow_blank_faces
+        Faces that shall carry no symbols; leave others without an identifiable place blank and
+        warn, instead of refusing.
     developed
-        Outlines that count in place of a face's own: all of a round face, unrolled, for the
-        facet that stands for it; a face less what others cover. Such an object has no net:
-        every face has a lattice of its own.
-
-    Returns
-    -------
-    Layout
-        One `FaceLayout` per face, in the order of the polyhedron.
+        Outlines in place of a face's own: of a round face, unrolled, for the facet that stands for
+        it; of a face less what others cover. Such an object has no net.
 
     Raises
     ------
@@ -146,15 +135,7 @@ def lay_out(
 def lay_out_face(
     region: Region, array: SymbolArray, pitch_mm: float, footprint_half_mm: float
 ) -> FaceLayout:
-    """Return how one face would be laid out by itself at the array's first cell.
-
-    Parameters
-    ----------
-    region
-        The face with its clearances, mm.
-    array, pitch_mm, footprint_half_mm
-        As for `lay_out`.
-    """
+    """Return how one face (mm) would be laid out by itself at the array's first cell."""
     request = LatticeRequest(footprint_half_mm, pitch_mm, array.window, rank_test(array))
     lattice = request.choose([region], search=False)
     piece = piece_of((0,), (PiecePose(0.0, 0.0, 0.0),), lattice, request)

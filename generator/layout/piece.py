@@ -133,17 +133,7 @@ def piece_of(
     lattice: Lattice,
     request: LatticeRequest,
 ) -> Piece:
-    """Return the piece that a lattice shows.
-
-    Parameters
-    ----------
-    faces
-        Numbers of the faces, one per region of the lattice.
-    poses
-        T_net_face, in the frame in which the lattice was chosen.
-    lattice, request
-        The lattice and what it carries, which decides what quarter turns are allowed.
-    """
+    """Return the piece that a lattice shows of faces, whose poses T_net_face lie in its plane."""
     owner, low, high = _grid(lattice)
     lattice_poses = [
         _turn_pose(pose, lattice.rotation_rad, *_corner(lattice, low, high, request.pitch_mm))
@@ -157,7 +147,7 @@ def piece_of(
 def turn_piece(piece: Piece, quarter: int, pitch_mm: float) -> Piece:
     """Return the piece turned counter-clockwise by quarter turns, its grid at the origin again.
 
-    `places` and `turns` are kept as they are: only turns in `turns` are allowed afterwards.
+    Only turns in `turns` are allowed afterwards, which is kept as it is.
     """
     poses, owner = piece.poses, piece.owner
     for _ in range(quarter % 4):

@@ -58,11 +58,10 @@ class Layout:
 
 
 def object_code(layout: Layout, rows: int, columns: int) -> str:
-    """Return a short code that no other object on the array has.
+    """Return a short code that no other object on the array has, for backs of small panels.
 
     It is the first cell that the object uses, counted row by row, in letters and digits that are
-    not mistaken for each other. No cell is used twice, so no code is; for backs of small panels.
-    All codes of an array have the same length: 3 letters up to 10,648 cells, 4 up to 234,256.
+    not mistaken for each other: 3 letters up to 10,648 cells, 4 up to 234,256.
     """
     faces = [face for face in layout.faces if len(face.labels)]
     row = min(int(face.rows.min()) for face in faces)

@@ -39,14 +39,8 @@ def count_places(
 ) -> int:
     """Return how many places of one face can be identified.
 
-    Parameters
-    ----------
-    rows, columns
-        (n,) cells in array orientation; only differences matter.
-    window
-        Rows and columns of the array's window.
-    identifies
-        Rank test for cells into which the window does not fit; None leaves it out.
+    Cells (n,) in array orientation, of which differences matter; `identifies` is the rank test for
+    cells into which the window does not fit, None leaves it out.
     """
     if len(rows) == 0:
         return 0
@@ -69,12 +63,7 @@ def count_windows(mask: NDArray[np.bool_], window: tuple[int, int]) -> int:
 def windows_in(free: NDArray[np.bool_], rows: int, columns: int) -> NDArray[np.bool_]:
     """Return where windows fit into many masks at once, bool like `free` but smaller.
 
-    Parameters
-    ----------
-    free
-        Four axes, of which 0 and 2 are lattice rows and columns; 1 and 3 number the masks.
-    rows, columns
-        Size of the window.
+    Axes 0 and 2 are lattice rows and columns; 1 and 3 number the masks.
     """
     height, width = free.shape[0] - rows + 1, free.shape[2] - columns + 1
     if height <= 0 or width <= 0:

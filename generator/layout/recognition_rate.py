@@ -87,9 +87,8 @@ class FaceViews:
 class AnswerTable:
     """How often a reader answers, measured: pitch x symbols seen whole x loaded share.
 
-    Between its entries it is linear, beyond them constant. What is not answered at once is
-    answered by the second or third touch the likelier, the more symbols stand around those that
-    are seen whole already.
+    Linear between its entries, constant beyond them. What is not answered at once is answered by
+    the second or third touch the likelier, the more symbols stand around those seen whole already.
     """
 
     pitch_mm: tuple[float, ...]  #: rising
@@ -119,8 +118,7 @@ class AnswerTable:
 class AnsweredShare:
     """Share that a sensor type answers of the touches that the usual sensor answers, measured.
 
-    Logistic in the loaded share: larger sensors hang over borders, and membranes of gels bridge
-    them.
+    Logistic in the loaded share: larger sensors hang over borders, which membranes of gels bridge.
     """
 
     across_mm: float  #: of the type, as `SensorType.across_mm`
@@ -141,20 +139,10 @@ def face_rates(
     symbol_half_mm: float,
     sensor: SensorType = USUAL_SENSOR,
 ) -> dict[int, RecognitionRate]:
-    """Return the rate of each face by its number; equal faces share the work.
+    """Return the rate of each flat face by its number; equal faces share the work.
 
-    Nothing is returned of arrays that are read by a scan: no rate was measured there.
-
-    Parameters
-    ----------
-    faces
-        Flat faces: outline and symbols.
-    order, cells
-        Symbols and cells of the array.
-    pitch_mm, symbol_half_mm
-        Pitch of the symbols, and from a symbol's centre to the end of its strokes.
-    sensor
-        What touches the faces.
+    Empty for arrays that are read by a scan: no rate was measured there. `order` and `cells` are
+    those of the array, `symbol_half_mm` is from a symbol's centre to the end of its strokes.
     """
     if touches_needed(order, cells, pitch_mm, sensor_mm=sensor.across_mm) > 1:
         return {}
@@ -209,19 +197,7 @@ def face_views(
     view: SensorView,
     poses: int = POSES,
 ) -> FaceViews:
-    """Return what a sensor meets on one face.
-
-    Parameters
-    ----------
-    loops
-        Outline of the face: the outer loop (k, 2) counter-clockwise, holes clockwise, mm.
-    face, pitch_mm
-        Its symbols.
-    view
-        The sensor.
-    poses
-        How many of them.
-    """
+    """Return what a sensor meets on one face, its outline given as loops (k, 2) mm."""
     centre, turn = _poses_on(loops, poses)
     return views_at(loops, face, pitch_mm, view, centre, turn)
 
@@ -234,15 +210,7 @@ def views_at(
     centre_mm: Points,
     turn_rad: Points,
 ) -> FaceViews:
-    """Return what a sensor meets at given poses of one face.
-
-    Parameters
-    ----------
-    loops, face, pitch_mm, view
-        As for `face_views`.
-    centre_mm, turn_rad
-        (P, 2) and (P,) of the sensor, face frame.
-    """
+    """Return what a sensor meets at poses (P, 2) mm and (P,) rad of one face, face frame."""
     start, end = _edges(loops)
     c, s = np.cos(turn_rad)[:, None], np.sin(turn_rad)[:, None]
     ax, ay = _in_sensor(start, centre_mm, c, s)
@@ -258,10 +226,9 @@ def views_at(
 def answered_shares(
     views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorType = USUAL_SENSOR
 ) -> tuple[float, float | None]:
-    """Return the shares of touches of a face that will be answered at once, and within three.
+    """Return the shares of touches that will be answered at once, and within three.
 
-    The second is known of the usual sensor alone: None of others. `pitch_mm` is that of the face's
-    symbols.
+    The second is known of the usual sensor alone: None of others.
     """
     once = answered_at_once(table, pitch_mm, views.seen, views.loaded, sensor)
     if sensor.name != USUAL_SENSOR.name:
@@ -295,18 +262,10 @@ def answered_at_once(
     loaded: Points,
     sensor: SensorType = USUAL_SENSOR,
 ) -> Points:
-    """Return the probability that a sensor's touch is answered at once at each pose, (P,).
+    """Return the probability that a touch is answered at once at each pose, (P,).
 
-    Parameters
-    ----------
-    table
-        Measured with the usual sensor.
-    pitch_mm
-        Of the symbols.
-    seen, loaded
-        (P,) symbols seen whole, and the loaded share.
-    sensor
-        That touches; the table is looked up at the pitch divided by its coarseness.
+    `table`, measured with the usual sensor, is looked up at the pitch divided by the sensor's
+    coarseness; `seen` (P,) symbols seen whole, `loaded` (P,) the loaded share.
     """
     usual, share = table.at(pitch_mm / sensor.coarseness, seen, loaded), answered_share(sensor)
     return usual if share is None else usual * share.at(loaded)
@@ -340,10 +299,7 @@ def _between(value: Any, steps: Sequence[float]) -> tuple[Any, Any, Any]:
 
 
 def _around(face: FaceLayout, centre: Points, reach_mm: float) -> NDArray[np.int64]:
-    """Return how many symbols stand within a distance of each pose, (P,).
-
-    Symbols are sorted by x, so that each pose looks at its strip alone: as many as on a small face.
-    """
+    """Return how many symbols stand within a distance of each pose, (P,), by strips of x."""
     order = np.argsort(face.centres_mm[:, 0], kind="stable")
     x, y = face.centres_mm[order].T
     first, last = (np.searchsorted(x, centre[:, 0] + by) for by in (-reach_mm, reach_mm))
@@ -419,10 +375,7 @@ def _integral(y: Points, half: float) -> Points:
 def _seen_whole(
     face: FaceLayout, pitch: float, view: SensorView, centre: Points, turn: Points
 ) -> NDArray[np.bool_]:
-    """Return which cells around each pose bear a symbol seen whole, (P, rows, columns).
-
-    Only cells that the sensor can reach are looked at: as many on a large face as on a small one.
-    """
+    """Return which cells in reach of each pose bear a symbol seen whole, (P, rows, columns)."""
     free = np.array(view.half_mm) - view.symbol_half_mm
     place = face.placement
     c, s = np.cos(place.rotation_rad), np.sin(place.rotation_rad)
@@ -446,10 +399,7 @@ def _seen_whole(
 
 
 def _bearing(face: FaceLayout, pitch_mm: float) -> tuple[NDArray[np.bool_], tuple[int, int]]:
-    """Return which cells of a face's box bear symbols, and its least row and column.
-
-    Rows and columns count from the anchor, as they lie in the plane.
-    """
+    """Return which cells of a face's box bear symbols; its least row and column from the anchor."""
     place = face.placement
     c, s = np.cos(place.rotation_rad), np.sin(place.rotation_rad)
     x, y = face.centres_mm.T

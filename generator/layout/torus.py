@@ -39,19 +39,7 @@ class TorusPosition:
 def place_pieces(
     occupancy: Occupancy, pieces: Sequence[tuple[Mask, Sequence[int]]]
 ) -> list[TorusPosition | None]:
-    """Place pieces on the free cells, big ones first.
-
-    Parameters
-    ----------
-    occupancy
-        What is taken already; it is not changed.
-    pieces
-        For each piece its mask (rows, columns) and its allowed quarter turns.
-
-    Returns
-    -------
-    One position per piece, None where no free place was found.
-    """
+    """Return where pieces (mask, allowed quarter turns) are placed, big ones first, or None."""
     order = sorted(
         (k for k, (mask, _) in enumerate(pieces) if mask.any()),
         key=lambda k: (-max(pieces[k][0].shape), -int(pieces[k][0].sum()), k),
@@ -101,12 +89,11 @@ def _forms(mask: Mask, turns: Iterable[int]) -> dict[int, Mask]:
 
 
 class Board:
-    """The part of the torus that is looked at, as bits, with a margin around it.
+    """The part of the torus that is looked at (`board_size`), as bits, with a margin around it.
 
     Bit (y + 1) stride + x + 1 is cell (y, x), counted from the first one of the occupancy. Where
     the extent is the whole side of the array the margin repeats the other side; elsewhere it
-    counts as taken. Of a large array the opened corner is looked at (`board_size`), which grows
-    when nothing fits any more.
+    counts as taken.
     """
 
     def __init__(self, occupancy: Occupancy, margin: int) -> None:

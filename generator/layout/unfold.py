@@ -62,15 +62,7 @@ Priority = Callable[[int, int], float]  # (edge, faces between this one and the 
 
 
 def unfold(polyhedron: Polyhedron, *, seed: int = 0) -> Net:
-    """Return the net with the fewest pieces among the trees that are tried.
-
-    Parameters
-    ----------
-    polyhedron
-        A closed solid; faces may be non-convex and have holes.
-    seed
-        Of the random trees; the same seed gives the same net.
-    """
+    """Return the net with the fewest pieces among the trees that are tried."""
     surface = _surface(polyhedron)
     best: Net | None = None
     work = 0
@@ -89,10 +81,7 @@ def unfold(polyhedron: Polyhedron, *, seed: int = 0) -> Net:
 def split(net: Net, piece: int) -> Net:
     """Return the net with one piece cut in two along the fold that leaves the most equal halves.
 
-    Parameters
-    ----------
-    net, piece
-        A piece of at least two faces; the others are kept, the halves come last.
+    A piece of at least two faces; the others are kept, the halves come last.
     """
     faces = net.pieces[piece]
     below = {face: [face] for face in faces}
@@ -244,11 +233,7 @@ def triangles_of(loops: Sequence[Points]) -> Triangles:
 
 
 def overlap(first: Triangles, second: Triangles, tolerance: float) -> bool:
-    """Whether any triangle of the first set reaches into one of the second (lengths in mm).
-
-    Separating axes: two triangles overlap if along every edge normal of both they reach into each
-    other by more than the tolerance; so faces that share an edge or a vertex of the net never do.
-    """
+    """Whether two sets of triangles (n, 3, 2) share more than a border; by separating axes."""
     second = _near_triangles(second, first, tolerance)
     first = _near_triangles(first, second, tolerance)
     if len(first) == 0 or len(second) == 0:

@@ -39,18 +39,10 @@ def orientation(a: ArrayLike, b: ArrayLike, c: ArrayLike) -> int:
 
 
 def side_of_polygon(loops: Sequence[Points], points: ArrayLike) -> NDArray[np.int8]:
-    """Tell for each point whether it lies inside, on the boundary of, or outside a polygon.
+    """Return for each point (n, 2): +1 inside, 0 exactly on the boundary, -1 outside; (n,) int8.
 
-    Parameters
-    ----------
-    loops
-        Loops of shape (k, 2); outer loop and holes in any order and direction (even-odd rule).
-    points
-        (n, 2), same frame and unit.
-
-    Returns
-    -------
-    (n,) int8: +1 inside, 0 exactly on the boundary, -1 outside. Exact for the numbers given.
+    Loops (k, 2), outer loop and holes in any order and direction (even-odd rule). Exact for the
+    numbers given.
     """
     p = np.atleast_2d(np.asarray(points, dtype=np.float64))
     px, py = p[:, 0], p[:, 1]

@@ -34,10 +34,7 @@ def segments(rings: Sequence[Ring]) -> tuple[Ring, Ring, NDArray[np.int64], NDAr
 
 
 def edges_cross(rings: Sequence[Ring]) -> bool:
-    """Whether two edges that share no corner meet, touching included.
-
-    Neighbouring edges may not fold back on each other either.
-    """
+    """Whether two edges that share no corner meet, touching included, or neighbours fold back."""
     starts, ends, a, b = segments(rings)
     n = len(starts)
     if n > 512:
@@ -98,14 +95,9 @@ def distance(points: Ring, rings: Sequence[Ring]) -> NDArray[np.float64]:
 
 
 def boxes_inside(centres: Ring, half: ArrayLike, rings: Sequence[Ring]) -> NDArray[np.bool_]:
-    """Whether axis-parallel boxes lie inside an area: no edge meets them, one point inside.
+    """Whether boxes along the axes lie inside an area: no edge meets them, centres (n, 2) inside.
 
-    Parameters
-    ----------
-    centres
-        (n, 2).
-    half
-        Half sides: one for squares, or two.
+    `half`: half sides, one for squares, or two.
     """
     free = points_inside(centres, rings)
     size = np.broadcast_to(np.asarray(half, dtype=np.float64), 2)

@@ -260,10 +260,7 @@ def face_problems(surface: Surface) -> list[FaceProblem]:
 
 
 def crossing_problems(surface: Surface) -> list[FaceProblem]:
-    """Return the faces that are cut or touched by edges and vertices that are not their own.
-
-    A convex solid has no vertex in front of any face and is done after one product.
-    """
+    """Return the faces that are cut or touched by edges and vertices that are not their own."""
     tolerance = CLOSENESS * surface.size
     vertices, problems = surface.vertices, []
     edges = np.array(sorted({(min(e), max(e)) for f in surface.faces for e in directed_edges(f)}))

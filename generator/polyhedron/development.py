@@ -44,15 +44,10 @@ class Development:
 
 
 def development(polyhedron: Polyhedron, surface: Developable) -> Development:
-    """Unroll a round face.
+    """Unroll a round face, mm.
 
-    Parameters
-    ----------
-    polyhedron
-        The solid, mm.
-    surface
-        Facets in order, each a loop (lower left, lower right, upper right, upper left) seen from
-        outside, or a triangle (lower left, lower right, tip).
+    Its facets are loops (lower left, lower right, upper right, upper left) seen from outside, or
+    triangles (lower left, lower right, tip).
     """
     loops = [polyhedron.faces[facet].loops[0] for facet in surface.facets]
     frames = [face_frame(polyhedron, facet) for facet in surface.facets]

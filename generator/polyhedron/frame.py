@@ -34,10 +34,7 @@ def face_frame(polyhedron: Polyhedron, face: int) -> Matrix:
 
 
 def face_polygon(polyhedron: Polyhedron, face: int) -> tuple[Matrix, ...]:
-    """Return the loops of a face in its own frame: (k, 2) mm each, the outer one first.
-
-    The outer loop runs counter-clockwise, holes clockwise.
-    """
+    """Return the loops of a face in its own frame: (k, 2) mm each, the outer one first."""
     loops = polyhedron.faces[face].loops
     x, y, _ = face_axes(polyhedron.vertices, loops)
     axes = np.stack([x, y], axis=1)
@@ -57,10 +54,9 @@ def face_normal(polyhedron: Polyhedron, face: int) -> Matrix:
 
 
 def side_of_face(polyhedron: Polyhedron, face: int, points: ArrayLike) -> NDArray[np.int8]:
-    """Tell where points (n, 2), face frame, lie: +1 inside, 0 on an edge, -1 outside; (n,) int8.
+    """Return for points (n, 2), face frame: +1 inside, 0 on an edge, -1 outside; (n,) int8.
 
-    By exact orientation: right for non-convex faces, holes and slivers, where the sum of
-    areas of thesis 6.3 is wrong (numerics, case 8).
+    Exact: right for non-convex faces, holes and slivers, where thesis 6.3's sum of areas is wrong.
     """
     return side_of_polygon(face_polygon(polyhedron, face), points)
 
@@ -79,8 +75,8 @@ def edge_length(polyhedron: Polyhedron, edge: int) -> float:
 def dihedral(polyhedron: Polyhedron, edge: int) -> float:
     """Return the angle inside the solid between the faces of an edge, in (0, 2 pi).
 
-    Below pi at a convex edge (pi/2 on a cube), above pi at a reflex one. By atan2, exact to
-    the last bits even for nearly flat edges and knife edges, where acos fails.
+    Below pi at a convex edge, above pi at a reflex one. By atan2, exact for nearly flat edges and
+    knife edges, where acos fails.
     """
     link = polyhedron.edges[edge]
     left, right = face_normal(polyhedron, link.left), face_normal(polyhedron, link.right)

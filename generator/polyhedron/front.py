@@ -28,22 +28,9 @@ Loop = NDArray[np.float64]  #: (k, 2) mm
 def covered_parts(
     polyhedron: Polyhedron, faces: Collection[int], distance_mm: float
 ) -> dict[int, tuple[Loop, ...]]:
-    """Return the parts of faces in front of which the solid is nearer than a distance.
+    """Return the parts of faces in front of which, along the normal, the solid is nearer than this.
 
-    Parameters
-    ----------
-    polyhedron
-        The solid.
-    faces
-        Those asked for.
-    distance_mm
-        From the face, along its normal.
-
-    Returns
-    -------
-    dict
-        Face -> loops in its frame, mm, that run as holes do; faces without such parts are left
-        out.
+    Face -> loops in its frame, mm, that run as holes do; faces without such parts are left out.
     """
     start = np.cumsum([0] + [sum(map(len, face.loops)) for face in polyhedron.faces])[:-1]
     corner = np.concatenate([loop for face in polyhedron.faces for loop in face.loops])

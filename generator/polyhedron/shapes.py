@@ -128,10 +128,10 @@ def dodecahedron(side: float) -> Polyhedron:
 
 
 def polyhedron_of(vertices: ArrayLike, faces: Sequence[FaceLike]) -> Polyhedron:
-    """Return the polyhedron of vertices [[x, y, z], ...] and faces [[0, 1, 2], ...].
+    """Return the polyhedron of vertices [[x, y, z], ...] and faces [[0, 1, 2], ...]: F1, F2, ...
 
-    Vertices are counted from 0, counter-clockwise seen from outside; a face with holes is a
-    list of loops, the outer one first. Faces are F1, F2, ... in the order given.
+    Vertices count from 0, counter-clockwise seen from outside; a face with holes is a list of
+    loops, the outer one first.
     """
     return polyhedron("polyhedron", vertices, faces)
 

@@ -132,30 +132,15 @@ FaceLike = Face | Sequence[int] | Sequence[Sequence[int]]
 def polyhedron(kind: str, vertices: ArrayLike, faces: Sequence[FaceLike]) -> Polyhedron:
     """Build a winged-edge polyhedron and prove that it is a solid.
 
-    Parameters
-    ----------
-    kind
-        Where the solid comes from: `cube`, ..., `polyhedron`, `file`.
-    vertices
-        (V, 3) mm, object frame; copied.
-    faces
-        Each a loop of vertex numbers (from 0), or a list of loops (the outer one first, then
-        holes), or a `Face`; counter-clockwise seen from outside, holes clockwise. Faces
-        without a name are called F1, F2, ...
+    `kind` says where it comes from: `cube`, ..., `polyhedron`, `file`. Vertices (V, 3) mm, object
+    frame, are copied. A face is a loop of vertex numbers (from 0), a list of loops (the outer one
+    first, then holes), or a `Face`; counter-clockwise seen from outside, holes clockwise. Faces
+    without a name are called F1, F2, ...
 
-    Returns
-    -------
-    Polyhedron
-        With outward faces: a solid given inside out is turned, and vertices that lie off
-        their faces' planes by a rounding are moved onto them; `notes` says so.
+    A solid given inside out is turned, and vertices that lie off their faces' planes by a rounding
+    are moved onto them; `notes` says so. Raises `ShapeError` with everything that is wrong, face by
+    face (`check`).
 
-    Raises
-    ------
-    ShapeError
-        Everything that is wrong, face by face: see `check_faces` and `check_edges`.
-
-    Examples
-    --------
     >>> corner = [(0, 0, 0), (30, 0, 0), (0, 30, 0), (0, 0, 30)]
     >>> solid = polyhedron("polyhedron", corner, [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
     >>> len(solid.edges), solid.euler_characteristic, solid.faces[2].name
@@ -191,10 +176,9 @@ def polyhedron(kind: str, vertices: ArrayLike, faces: Sequence[FaceLike]) -> Pol
 
 
 def winged_edges(faces: Sequence[Loops]) -> tuple[WingedEdge, ...]:
-    """Return the edges of a closed surface with all their links.
+    """Return the edges of a closed surface with all their links, as they are met, face by face.
 
-    Edges are numbered as they are met, face by face; an edge's left face is the one that
-    meets it first.
+    An edge's left face is the one that meets it first.
     """
     number: dict[tuple[int, int], int] = {}  # directed edge -> edge
     face_of: dict[tuple[int, int], int] = {}

@@ -4,10 +4,10 @@
 
     part's STL --slicer--> G-code --gcode--> Toolpath --faults--> Toolpath
         --beads, deposit--> Deposit --view (above | sideways)--> PrintedSurface
-        --survey, check--> what became of each symbol
+        --survey, check--> verdict on each symbol
 
-Nothing here knows how touches are simulated; a `PrintedSurface` is a grid of heights over a
-face. What is modelled and what is not stands in `beads`, `faults` and `view`. mm throughout.
+A `PrintedSurface` is a grid of heights over a face, mm. Limits of the model stand in `beads`,
+`faults` and `view`.
 """
 
 from __future__ import annotations

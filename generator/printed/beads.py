@@ -1,10 +1,10 @@
-"""Toolpath -> beads: what each move leaves behind, with the volume that was extruded.
+"""Toolpath -> beads: the plastic that each move leaves, with the volume that was extruded.
 
 A bead is a straight piece of plastic with a stadium section: as high as its layer, flat above
 and below, round at the sides; its width follows from the volume laid on its length (the flow
 model of slic3r: A = h (w - h) + pi h^2 / 4). Plastic too little for that lies as a round
 string on the layer below. Where a stroke begins and ends the bead is round, and set back so
-far that the round ends hold what was extruded and no more: so seams show. Part frame: mm, z
+far that the round ends hold no more than was extruded, which shows seams. Part frame: mm, z
 up as printed. Beads do not run, sag or shrink.
 """
 
@@ -79,14 +79,9 @@ def join_beads(*beads: Beads) -> Beads:
 
 
 def beads_of(path: Toolpath, *, starved_mm: float = 0.0) -> Beads:
-    """Return the beads of all moves that leave plastic on the part.
+    """Return the beads of all moves that leave plastic on the part, in the frame of the path.
 
-    Parameters
-    ----------
-    path
-        The moves; the beads are in its frame.
-    starved_mm
-        By how much each stroke begins late, for want of pressure.
+    For want of pressure each stroke begins `starved_mm` late.
     """
     moves = np.flatnonzero(path.of_part)
     start, end = path.start_mm[moves], path.end_mm[moves]

@@ -1,13 +1,11 @@
-"""Parts -> what becomes of every symbol on one printer: slice, print, compare.
+"""Parts -> the fate of every symbol on one printer: slice, print, compare, and draw as a PNG.
 
 The whole of `encode-object SPEC --printed-check`. Each part is sliced by PrusaSlicer from the
-mesh that its STL holds; faces that look down on the bed or lean are named, not judged.
+mesh of its STL; faces that look down on the bed or lean are named, not judged.
 
-Symbols as deposited beside their design, as a PNG.
-
-One row for each kind of symbol: that of median overlap, and the worst. Each shows design,
-deposit (shaded, light from the upper left) and their footprints at half height: what both
-cover, what was lost, what was widened. A symbol's y axis runs up the picture.
+The picture has one row for each kind of symbol: that of median overlap, and the worst. Each shows
+design, deposit (shaded, light from the upper left) and their footprints at half height. A
+symbol's y axis runs up the picture.
 """
 
 from __future__ import annotations
@@ -58,21 +56,7 @@ def check_parts(
 ) -> PrintedCheck:
     """Print all parts in simulation and compare every symbol with its design.
 
-    Parameters
-    ----------
-    parts
-        As they are printed.
-    profile
-        Machine, nozzle, layers.
-    faults
-        Of the machine; none if left out.
-    seed
-        Of what faults leave to chance, the same for the same parts.
-
-    Raises
-    ------
-    PrintError
-        PrusaSlicer is missing or refuses a part.
+    Raises `PrintError` if PrusaSlicer is missing or refuses a part.
     """
     find_slicer()
     slicer_version()
@@ -142,17 +126,7 @@ _STEP_MM = 0.05  # of the tiles' lattice
 
 
 def check_png(title: str, tiles: Sequence[SymbolTile], names: Sequence[str] = ()) -> bytes:
-    """Return the picture.
-
-    Parameters
-    ----------
-    title
-        First line: object, profile and faults.
-    tiles
-        All symbols.
-    names
-        Of the alphabet's symbols, by label.
-    """
+    """Return the picture: its first line, all symbols, and their names in the alphabet by label."""
     labels = sorted({tile.check.label for tile in tiles})
     pairs = [_median_and_worst([t for t in tiles if t.check.label == label]) for label in labels]
     width = _MARGIN * 2 + _NAME + 6 * TILE + 6 * _GAP + 2 * _MARGIN

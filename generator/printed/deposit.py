@@ -1,7 +1,6 @@
-"""A sliced part, printed by a machine with faults: all plastic, in the part's frame.
+"""A sliced part, printed by a machine with faults: all plastic, in the part's frame, mm.
 
-SlicedPart + PrintFaults + Generator -> Deposit. Beside the beads of the moves there are the
-blobs where loops begin and the strings that travels draw. mm.
+Besides the beads of the moves there are blobs where loops begin and strings along travels.
 """
 
 from __future__ import annotations
@@ -44,17 +43,7 @@ class Deposit:
 def deposit(
     sliced: SlicedPart, faults: PrintFaults | None = None, rng: np.random.Generator | None = None
 ) -> Deposit:
-    """Print a sliced part.
-
-    Parameters
-    ----------
-    sliced
-        The part's moves.
-    faults
-        Of the machine; none if left out.
-    rng
-        Draws what faults leave to chance; needed with flow spread, jitter or strings.
-    """
+    """Print a sliced part; `rng` draws flow spread, jitter and strings of the machine's faults."""
     faults = faults or PrintFaults()
     rng = rng if rng is not None else np.random.default_rng(0)
     shift = sliced.T_part_gcode[:3, 3]
@@ -87,8 +76,8 @@ def seam_blobs(path: Toolpath, diameter_mm: float) -> Beads:
 def strings(path: Toolpath, share: float, diameter_mm: float, rng: np.random.Generator) -> Beads:
     """Return threads between the ends of some travels within a layer, at the nozzle's height.
 
-    A chain of travels (lift, go, lower) is one; it draws its thread from where the plastic
-    ended to where it begins again.
+    A chain of travels (lift, go, lower) is one; it draws its thread from the end of the plastic to
+    where it begins again.
     """
     laying = path.of_part
     before = np.flatnonzero(laying[:-1] & ~laying[1:])

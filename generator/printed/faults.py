@@ -1,9 +1,8 @@
-"""What machines do wrong, as numbers, and what that does to a nozzle's moves.
+"""Faults of machines as numbers, and their effect on a nozzle's moves.
 
-Toolpath + PrintFaults + Generator -> Toolpath, with every move where the nozzle really went
-and every volume as it really came. mm, G-code frame. `usual` and `bad` lie inside what
-machines were found to do: scale .994-1.005, flow .8-1.3, backlash .05-.4, ringing .12, seam
-blobs .25-.5, bow .5.
+Every move of the new Toolpath is where the nozzle really went, every volume as it really came. mm,
+G-code frame. `usual` and `bad` lie inside the range of real machines: scale .994-1.005, flow
+.8-1.3, backlash .05-.4, ringing .12, seam blobs .25-.5, bow .5.
 """
 
 from __future__ import annotations
@@ -73,13 +72,8 @@ _RINGING_SPEED = (10.0, 80.0)  # mm/s: a slower nozzle's wave is no longer than 
 def print_faults(text: str) -> PrintFaults:
     """Return the faults that a text names: `none`, `usual`, `bad`, `k=v,...`, `usual,flow=1.1`.
 
-    Raises
-    ------
-    PrintError
-        For another name, a value that is no number, or one out of its range.
+    Raises `PrintError` for another name, a value that is no number, or one out of its range.
 
-    Examples
-    --------
     >>> print_faults("usual,backlash_mm=0.2").scale_x
     0.997
     """
@@ -115,10 +109,10 @@ def faulty_path(
     *,
     datum_mm: tuple[float, float] = (0.0, 0.0),
 ) -> Toolpath:
-    """Return where the nozzle goes and what comes out of it.
+    """Return where the nozzle goes and how much plastic it lays.
 
     Scale and skew act about `datum_mm`; then backlash, ringing and each layer's jitter move
-    what is left, and the flow changes along the path.
+    it, and the flow changes along the path.
     """
     path = _scale_and_skew(path, faults, datum_mm)
     if faults.backlash_mm > 0:

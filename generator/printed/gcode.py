@@ -1,25 +1,15 @@
-"""G-code file -> Toolpath: where a nozzle goes and how much plastic leaves it.
+"""G-code file -> Toolpath: where a nozzle goes and how much plastic leaves it; mm, machine frame.
 
 Reads G0-G3, G10/G11, G20/G21, G28, G90-G92, M82/M83, M200 in absolute and relative
-coordinates, of Marlin, Klipper and RepRapFirmware, from PrusaSlicer, Cura, Bambu Studio and
-OrcaSlicer (see `dialect`). As in Klipper and PrusaSlicer, G91 makes E relative too and M83
-does so alone. M221, a machine's own correction of its extruder, is left out: the volume is
-what the slicer meant. A `.gcode.3mf` of Bambu Studio is opened, binary G-code is refused.
+coordinates, of Marlin, Klipper and RepRapFirmware. As in Klipper and PrusaSlicer, G91 makes E
+relative too and M83 does so alone. M221, a machine's own correction of its extruder, is left out.
+A `.gcode.3mf` of Bambu Studio is opened, binary G-code is refused.
 
-A machine that follows G-code: line by line -> one row for each straight move.
-
-Absolute and relative coordinates, offsets, inches, arcs as chords, and what comments say of
-features, widths and heights. `gcode` makes a Toolpath of the rows. mm, machine frame.
-
-What slicers write in comments: features, widths, heights, the filament.
-
-Read: PrusaSlicer and its kin (`;TYPE:External perimeter`, `;WIDTH:0.45`, `;HEIGHT:0.2`), Cura
-(`;TYPE:WALL-OUTER`; it says neither width nor height), Bambu Studio and OrcaSlicer for Bambu
-printers (`; FEATURE: Outer wall`, `; LINE_WIDTH: 0.42`, `; LAYER_HEIGHT: 0.2`).
-
-Arcs of G-code (G2 clockwise, G3 counter-clockwise, in the plane of the bed) as chords.
-
-mm; a chord stays within `CHORD_MM` of its arc.
+Comments give features, widths and heights: of PrusaSlicer and its kin (`;TYPE:External
+perimeter`, `;WIDTH:0.45`, `;HEIGHT:0.2`), Cura (`;TYPE:WALL-OUTER` alone), Bambu Studio and
+OrcaSlicer for Bambu printers (`; FEATURE: Outer wall`, `; LINE_WIDTH: 0.42`,
+`; LAYER_HEIGHT: 0.2`). Arcs (G2 clockwise, G3 counter-clockwise, in the plane of the bed) become
+chords within `CHORD_MM` of them.
 """
 
 from __future__ import annotations
@@ -47,23 +37,11 @@ class ArcError(ValueError):
 
 
 def chords(start: Point, end: Point, words: dict[str, float], *, clockwise: bool) -> list[Point]:
-    """Return the points after `start` on an arc, `end` the last.
+    """Return the points (mm) after `start` on an arc, `end` the last; a full circle if equal.
 
-    Parameters
-    ----------
-    start, end
-        mm; equal for a full circle.
-    words
-        I and J, from the start to the centre, or R, the radius, negative for the longer arc;
-        P further full turns.
+    `words`: I and J, from the start to the centre, or R, the radius, negative for the longer arc;
+    P further full turns. Raises `ArcError` if these do not lead from start to end.
 
-    Raises
-    ------
-    ArcError
-        Without centre or radius, or where these do not lead from start to end.
-
-    Examples
-    --------
     >>> chords((1, 0), (0, 1), {"I": -1.0}, clockwise=False)[-1]
     (0, 1)
     """
@@ -334,20 +312,11 @@ _WIDTHS_AGREE = (0.7, 1.5)
 
 
 def read_gcode(path: Path | str, *, filament_mm: float | None = None) -> Toolpath:
-    """Read a file.
+    """Read `.gcode`, `.gco`, `.g`, or the first plate of Bambu Studio's `.gcode.3mf`.
 
-    Parameters
-    ----------
-    path
-        `.gcode`, `.gco`, `.g`, or Bambu Studio's `.gcode.3mf` (its first plate).
-    filament_mm
-        Diameter of the filament; else as the file says, else 1.75.
-
-    Raises
-    ------
-    PrintError
-        A file that cannot be read, a word that is no number or an arc that leads nowhere (with
-        file:line), nothing extruded, or volumes that contradict the widths announced.
+    The filament is as thick as the file says, else 1.75 mm. Raises `PrintError` (with file:line)
+    for a file that cannot be read, a word that is no number, an arc that leads nowhere, nothing
+    extruded, or volumes that contradict the widths announced.
     """
     path = Path(path)
     try:

@@ -1,20 +1,15 @@
-"""Registered parts, printed in simulation and kept: PrintJob + PrintPlan -> files of surfaces.
+"""Registered parts, printed in simulation and kept as files of surfaces.
 
-A folder of prints holds what many runs share, by its content::
+A folder of prints is shared by many runs; names follow from content::
 
     gcode/      NAME-KEY.gcode, by the part's bytes, all settings, the slicer's version
     surfaces/   KEY.npy and KEY.json (`surface_file`), by the part's bytes, settings, version,
                 faults, seed, and the face's place in the part
 
 A part is printed once for all its faces, in the frame of its own bed; scale and skew act about
-the middle of its box. Each surface is then moved so that the middle of its symbols stands where
-it was designed (`middle`). What a file holds follows from its name, whoever made it and when.
-
-Where the symbols of a printed face stand as a whole: PrintedSurface + Embossing -> mm.
-
-Backlash and the play of layers move a whole panel by some hundredths of a mm against its own
-edges, which no touch of its symbols can know. So places on a print are counted from the middle
-of its symbols. mm, face frame.
+the middle of its box. Backlash and the play of layers move a whole panel by some hundredths of a
+mm against its own edges, which no touch of its symbols can know: each surface is moved so that the
+middle of its symbols stands where it was designed. mm, face frame.
 """
 
 from __future__ import annotations
@@ -111,30 +106,14 @@ class PrintJob:
 
 
 def print_plan(profile: str, faults: str, seed: int) -> PrintPlan:
-    """Return how parts are printed, by the names that a person gave.
-
-    Raises
-    ------
-    PrintError
-        An unknown profile or fault.
-    """
+    """Return how parts are printed; raises `PrintError` for an unknown profile or fault."""
     return PrintPlan(print_profile(profile), print_faults(faults), seed)
 
 
 def print_job(
     held: RegisteredObject, part: RegisteredPart, file: Path, faces: Sequence[RegisteredFace]
 ) -> tuple[PrintJob, tuple[str, ...]]:
-    """Return what is printed of a part, and the names of the faces that cannot be looked at.
-
-    Parameters
-    ----------
-    held
-        Whose part it is.
-    part, file
-        As it is registered, and where it is.
-    faces
-        Those of the object that this part bears.
-    """
+    """Return the print of a registered part, and the names of the faces that it cannot show."""
     tiers = outlines(alphabet_from(held.alphabet), held.style)
     shown, unseen = [], []
     for face in faces:
@@ -188,10 +167,7 @@ def left_to_print(job: PrintJob, plan: PrintPlan, folder: Path) -> bool:
 def print_part(job: PrintJob, plan: PrintPlan, folder: Path) -> None:
     """Slice and deposit a part, and keep the surfaces of its faces.
 
-    Raises
-    ------
-    PrintError
-        PrusaSlicer is missing or refuses the part.
+    Raises `PrintError` if PrusaSlicer is missing or refuses the part.
     """
     sliced = slice_part(job.file, plan.profile, supports=job.supports, cache=folder / GCODE)
     rng = np.random.default_rng([plan.seed, int(job.sha256[:16], 16)])

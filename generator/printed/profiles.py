@@ -1,4 +1,4 @@
-"""Print profiles: what the slicer is told of machine, nozzle, layers and filament.
+"""Print profiles: machine, nozzle, layers and filament for the slicer.
 
 A name stands for settings of the slicer's own vendor (PrusaSlicer ships them as one file with
 inheritance, resolved here), and for a few plain options where that file is not installed. A
@@ -54,13 +54,7 @@ DEFAULT = "fdm-0.4-0.2"
 
 
 def print_profile(name: str) -> PrintProfile:
-    """Return a profile by its name, or the one that an exported file holds.
-
-    Raises
-    ------
-    PrintError
-        Names the known ones.
-    """
+    """Return a profile by its name or of an exported file; `PrintError` lists the known ones."""
     if name in PROFILES:
         return PROFILES[name]
     if name.endswith(".ini"):
@@ -77,10 +71,7 @@ def print_profile(name: str) -> PrintProfile:
 def profile_of_printer(printer: Printer) -> PrintProfile:
     """Return the profile by which a spec's printer prints: of its nozzle, its layer or the nearest.
 
-    Raises
-    ------
-    PrintError
-        For a printer that lays no beads, or a nozzle without a profile.
+    Raises `PrintError` for a printer that lays no beads, or a nozzle without a profile.
     """
     nozzle = printer.nozzle_mm
     fitting = [one for one in PROFILES.values() if abs(one.nozzle_mm - nozzle) < _NOZZLE_MM]
@@ -94,13 +85,7 @@ def profile_of_printer(printer: Printer) -> PrintProfile:
 
 
 def settings_of(profile: PrintProfile) -> dict[str, str]:
-    """Return all settings that the slicer is given, by the slicer's own names.
-
-    Raises
-    ------
-    PrintError
-        A file that is no settings file.
-    """
+    """Return all settings by the slicer's own names; raises `PrintError` for no settings file."""
     if profile.file is not None:
         return _read_exported(profile.file)
     vendor = next((f for f in VENDOR_FOLDERS if (f / f"{_VENDOR}.ini").is_file()), None)

@@ -1,10 +1,10 @@
-"""A part's file -> G-code by PrusaSlicer, and where the part lies in it.
+"""A part's file -> G-code by PrusaSlicer, and where the part lies in it. mm.
 
 The part is sliced as its file has it, the flat back on the bed; its box is put on the middle
-of a bed that is large enough, which gives T_part_gcode, and what was printed is compared with
-the part's box, so that a slicer that turned, scaled or moved it does not pass. PrusaSlicer
-2.5 gives other G-code each run unless its memory lies where it lay and one processor works; so
-its environment and the names of its files have a fixed length, too. mm.
+of a bed that is large enough, which gives T_part_gcode, and the plastic is compared with the
+part's box, so that a slicer that turned, scaled or moved it does not pass. PrusaSlicer
+2.5 gives other G-code each run unless its memory lies where it lay and one processor works:
+its environment and the names of its files have a fixed length, too.
 """
 
 from __future__ import annotations
@@ -74,24 +74,11 @@ class SlicedPart:
 def slice_part(
     file: Path, profile: PrintProfile, *, supports: bool = False, cache: Path | None = None
 ) -> SlicedPart:
-    """Slice the file of one part.
+    """Slice the binary STL of one part, mm, as it is printed.
 
-    Parameters
-    ----------
-    file
-        Binary STL, mm, as the part is printed.
-    profile
-        Machine, nozzle, layers.
-    supports
-        Print supports where the slicer finds them needed (whole parts); they are removed.
-    cache
-        Folder that keeps G-code by the part's bytes and all settings; the same is not sliced
-        twice.
-
-    Raises
-    ------
-    PrintError
-        PrusaSlicer is missing or refuses, or what it printed is not where the part is.
+    Supports are printed where the slicer finds them needed (whole parts), and removed. `cache`:
+    folder that keeps G-code by the part's bytes and all settings. Raises `PrintError` if
+    PrusaSlicer is missing or refuses, or the plastic is not where the part is.
     """
     low, high = stl_box(file)
     size = high - low
@@ -121,13 +108,7 @@ def slice_part(
 
 
 def stl_box(file: Path) -> tuple[Floats, Floats]:
-    """Return the lowest and highest x, y, z of a binary STL, mm.
-
-    Raises
-    ------
-    PrintError
-        When it cannot be read.
-    """
+    """Return the lowest and highest x, y, z of a binary STL, mm; raises `PrintError`."""
     try:
         content = file.read_bytes()
     except OSError as error:
@@ -266,15 +247,10 @@ class PlateCost:
 
 
 def slice_plate(file: Path) -> PlateCost:
-    """Slice a 3MF that holds its settings, and return what the slicer reckons.
+    """Slice a 3MF that holds its settings, and return the slicer's estimate.
 
-    Parts stay where they lie: arranged anew with its own distances, six panels of 80 mm find no
-    room on the bed that they fill.
-
-    Raises
-    ------
-    PrintError
-        PrusaSlicer is missing or refuses.
+    Parts stay where they lie: arranged with its own distances, six panels of 80 mm find no room on
+    the bed that they fill. Raises `PrintError` if PrusaSlicer is missing or refuses.
     """
     with tempfile.TemporaryDirectory() as folder:
         gcode = Path(folder) / "plate.gcode"

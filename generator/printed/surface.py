@@ -2,14 +2,11 @@
 
 Surface frame: that of the part's face (origin at its first vertex, x along its first edge, z
 outward; z = 0 is the face as designed). Grid frame: the same plane and z, its axes along the
-printer's. mm. Where there is no plastic within the depth that was looked at, -inf.
+printer's. mm. Without plastic within the depth of the view, -inf.
 
-Printed surfaces as files that many processes share: PrintedSurface -> files -> SurfaceFile.
-
-Two files for each surface, `NAME.npy` with heights as whole steps of 0.5 um and `NAME.json`
-with everything else; where the second is, the first is whole. The heights are mapped into
-memory, so that all processes of a machine share one copy of what they touch, and only some
-surfaces stay mapped. mm.
+Files that many processes share: `NAME.npy` with heights as whole steps of 0.5 um and `NAME.json`
+with all else; where the second is, the first is whole. The heights are mapped into memory: all
+processes of a machine share one copy.
 """
 
 from __future__ import annotations
@@ -69,18 +66,10 @@ class PrintedSurface:
 def interpolate(
     at: Floats, shape: tuple[int, ...], height: Callable[[Index, Index], NDArray[np.floating]]
 ) -> Floats:
-    """Return heights between the places of a grid, -inf off it.
+    """Return heights (n,) between the places of a grid of `shape` ny, nx, -inf off it.
 
-    Bilinear between the grid's places, the nearest place's where a neighbour is empty.
-
-    Parameters
-    ----------
-    at
-        (n, 2) columns and rows, not whole.
-    shape
-        ny, nx of the grid.
-    height
-        Rows (m,), columns (m,) -> heights (m,) of places, -inf where there is nothing.
+    Bilinear at (n, 2) columns and rows, the nearest place's where a neighbour is empty. `height`
+    gives heights (m,) of rows and columns (m,).
     """
     ny, nx = shape
     nearest = np.rint(at).astype(np.int64)
@@ -135,14 +124,7 @@ def write_surface(
 ) -> None:
     """Write a surface as `path` with .npy and .json, each by a rename, the second last.
 
-    Parameters
-    ----------
-    surface
-        Of one face.
-    path
-        Without suffix.
-    moved_mm
-        How far the print stands aside of its frame, x and y; the written surface is moved back.
+    The print stands `moved_mm` (x, y) aside of its frame; the written surface is moved back.
     """
     heights = surface.heights.astype(np.float64)
     low = -DEPTH_MM - UNIT_MM
@@ -180,13 +162,7 @@ def is_written(path: Path) -> bool:
 
 
 def read_surface(path: Path) -> SurfaceFile:
-    """Return the surface that lies at `path` (without suffix).
-
-    Raises
-    ------
-    PrintError
-        It is not there, or cannot be read.
-    """
+    """Return the surface that lies at `path` (without suffix); raises `PrintError` without one."""
     file = path.with_name(f"{path.name}.json")
     try:
         values = json.loads(file.read_bytes())

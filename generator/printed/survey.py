@@ -1,14 +1,8 @@
-"""What was deposited against what was designed, symbol by symbol, on one face.
+"""Deposited against designed symbols, one by one, on one face.
 
-PrintedSurface + Embossing -> one SymbolCheck for each symbol. A symbol's footprint is what
-stands higher than half its height above the face around it, as printed; it is compared with
-the outline at half height after both are laid on each other (how far a symbol stands from its
-place is told apart). Symbol frame: its centre, its own axes, mm.
-
-Symbols as designed, on the lattice on which they are compared with what was printed.
-
-Embossing -> one SymbolDesign for each label. Symbol frame: its centre, its own axes, mm. A
-footprint is what stands higher than half a symbol's height above the face around it.
+A symbol's footprint stands higher than half its height above the face around it, as printed; it
+is compared with the outline at half height after both are laid on each other (the distance of a
+symbol from its place is given apart). Symbol frame: its centre, its own axes, mm.
 """
 
 from __future__ import annotations
@@ -107,9 +101,9 @@ def over_face(found: Floats, design: SymbolDesign) -> tuple[Floats, float]:
 
 
 def footprint_shift(found: Floats, design: SymbolDesign, points: Floats) -> Floats:
-    """Return how far the printed footprint's middle lies from the designed one's.
+    """Return how far the printed footprint's middle lies from the designed one's, (2,) mm.
 
-    What lies further from the foot, such as strings, is not counted.
+    Plastic further from the foot, such as strings, does not count.
     """
     printed = ((found > design.height_mm / 2) & ~design.around).ravel()
     if not printed.any():
@@ -177,17 +171,7 @@ def survey_face(
     face: str = "",
     limits: SurveyLimits = LIMITS,
 ) -> list[SymbolTile]:
-    """Return every symbol of a face as printed.
-
-    Parameters
-    ----------
-    surface
-        In the frame of the embossing's facet.
-    embossing
-        The symbols as designed.
-    part, face
-        Their names.
-    """
+    """Return every symbol of a face as printed; surface in the frame of the embossing's facet."""
     points, designs = symbol_designs(embossing, limits.lattice)
     R = turn(embossing.rotation_rad)
     side = designs[0].footprint.shape if designs else (0, 0)

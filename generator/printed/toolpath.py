@@ -1,4 +1,4 @@
-"""What a G-code file lets a nozzle do, as arrays: one row for each straight move, in order.
+"""The moves of a G-code file as arrays: one row for each straight move, in order.
 
 G-code frame: mm, as the file has it, z up from the bed; z of a move is the nozzle's, which is
 the top of the bead that it leaves. A travel is a move without volume. Arcs are chords here.

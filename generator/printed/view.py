@@ -1,19 +1,14 @@
-"""Deposit + face -> PrintedSurface: the plastic that a touch of one face can meet.
+"""Deposit + face -> PrintedSurface: the plastic that a touch of one face can meet. mm.
 
 Faces that lie level and look up are seen from above, upright ones along the bed. Others are
-refused: they stand on supports or lean, and what a bead does there is not modelled. mm.
+refused: they stand on supports or lean, where beads are not modelled.
 
-Beads -> heights, seen along the bed: the surface of an upright face, with its steps.
+From above, part frame: layer after layer from the top down, each bead is cut into the rows of the
+grid, and only those places of a row are computed that no higher plastic covers.
 
-In every layer some levels are looked at. At one level a bead is a strip with round ends as
-wide as its section is there, and over each place along the face the outermost strip counts.
-View frame: t along the face (level with the bed), z up, n out of the face; mm.
-
-Beads -> heights, seen from above: the surface of what was printed facing up.
-
-Layer after layer from the top down, each bead is cut into the rows of the grid, and only
-those places of a row are worked out that no higher plastic covers: what lies hidden costs
-next to nothing. mm, part frame.
+Along the bed: at each level a bead is a strip with round ends as wide as its section is there, and
+over each place along the face the outermost strip counts. View frame: t along the face (level with
+the bed), z up, n out of the face.
 """
 
 from __future__ import annotations
@@ -59,18 +54,9 @@ _UPRIGHT = 1e-9  # a bead whose run along t is less stands across the face
 def heights_sideways(
     beads: Beads, low_mm: Floats, shape: tuple[int, int], step_mm: float
 ) -> tuple[NDArray[np.float32], int]:
-    """Return n of the outermost plastic over a grid, (nz, nt), and the places worked out.
+    """Return n of the outermost plastic over a grid of `shape` nz, nt, and the places computed.
 
-    Parameters
-    ----------
-    beads
-        All that may show; their places are (t, n).
-    low_mm
-        (2,) t and z of the first place.
-    shape
-        nz, nt.
-    step_mm
-        Between two places.
+    Places of beads are (t, n); `low_mm`: t and z of the first place of the grid.
     """
     nz, nt = shape
     heights = np.full(shape, -np.inf, dtype=np.float32)
@@ -118,18 +104,9 @@ _FLAT = 1e-9  # a bead whose rise is less of its length lies along the rows
 def heights_from_above(
     beads: Beads, low_mm: Floats, shape: tuple[int, int], step_mm: float
 ) -> tuple[NDArray[np.float32], int]:
-    """Return z of the highest plastic over a grid, (ny, nx), and the places worked out.
+    """Return z of the highest plastic over a grid of `shape` ny, nx, and the places computed.
 
-    Parameters
-    ----------
-    beads
-        All that may show.
-    low_mm
-        (2,) x and y of the first place.
-    shape
-        ny, nx.
-    step_mm
-        Between two places.
+    `low_mm`: x and y of the first place of the grid.
     """
     heights = np.full(shape, -np.inf, dtype=np.float32)
     order = np.argsort(-beads.top_mm, kind="stable")
@@ -222,26 +199,11 @@ def face_surface(
     step_mm: float = STEP_MM,
     depth_mm: float = DEPTH_MM,
 ) -> PrintedSurface:
-    """Return the surface over one face.
+    """Return the surface over one face of the whole part.
 
-    Parameters
-    ----------
-    printed
-        The whole part.
-    T_part_face
-        (4, 4) the face's frame: z outward, the face in z = 0.
-    outline_mm
-        (k, 2) points of the face frame whose box, and a margin, is looked at; the part's box
-        if left out.
-    step_mm
-        Between two places of the grid.
-    depth_mm
-        Below the face; deeper plastic is left out.
-
-    Raises
-    ------
-    PrintError
-        For a face that leans, or looks down on the bed.
+    T_part_face (4, 4): z outward, the face in z = 0. The grid covers the box of `outline_mm`, (k,
+    2) points of the face frame, and a margin; of the part's box if left out. Raises `PrintError`
+    for a face that leans, or looks down on the bed.
     """
     normal = T_part_face[:3, 2]
     if not is_seen(T_part_face):

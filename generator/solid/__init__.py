@@ -1,7 +1,6 @@
 """Printable parts: bodies with embossed faces, their triangles and their proof."""
 
 from generator.solid.closed import prove_closed
-from generator.solid.explicit import ExpandedSolid, expand_part
 from generator.solid.measure import box, volume
 from generator.solid.mitre import symbol_clearance_mm, top_inset_mm
 from generator.solid.panels import Panels, panels
@@ -13,7 +12,6 @@ from generator.solid.wrap import round_volume
 
 __all__ = [
     "Embossing",
-    "ExpandedSolid",
     "Facet",
     "Mesh",
     "Panels",
@@ -22,7 +20,6 @@ __all__ = [
     "box",
     "cut_corners",
     "emboss_whole",
-    "expand_part",
     "panels",
     "plain_panels",
     "prove_closed",

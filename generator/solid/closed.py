@@ -1,10 +1,10 @@
-"""Proof that a part is one closed solid, from its plain body and one shape per symbol.
+"""Prove that a part is one closed solid, from its plain body and one shape per symbol.
 
 (1) Body: every directed edge of the facets' loops occurs once, and its reverse once; facets
 are planar. (2) Shape: tiers have equal corners, parallel edges and heights that rise or
 fall, so its sides are planar and close it up to the loops in the facet. (3) Feet lie inside
-their facet and apart from each other, so that they are proper holes of it. Together: the
-part is closed, and its facets meet in their edges alone. No symbol is expanded.
+their facet and apart from each other. Together: the part is closed, and its facets meet in
+their edges alone. No symbol is expanded.
 """
 
 from __future__ import annotations
@@ -21,18 +21,16 @@ from generator.plane.polygon import face_vector, points_inside
 from generator.plane.rings import boxes_inside, edges_cross
 from generator.solid.emboss import to_part, turn
 from generator.solid.part import Embossing, Part, in_frame
-from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]
+
+_PLANARITY = 1e-9  # points may lie off their plane by this share of the part's size
 
 
 def prove_closed(part: Part) -> None:
     """Prove that a part is closed, planar and free of overlapping symbols.
 
-    Raises
-    ------
-    SolidError
-        Naming the facet or the symbol where the proof fails.
+    Raises `SolidError` that names the facet or the symbol where the proof fails.
     """
     _check_edges(part)
     size = float(np.ptp(part.vertices, axis=0).max())
@@ -50,13 +48,13 @@ def prove_closed(part: Part) -> None:
         normal = face_vector(corners)
         normal /= np.linalg.norm(normal)
         points = np.concatenate(corners) - corners[0][0]
-        if np.abs(points @ normal).max() > EMBOSS.planarity * size:
+        if np.abs(points @ normal).max() > _PLANARITY * size:
             fix = "export the model as STEP, or its curved regions as triangles with more digits"
             raise SolidError("a facet is not planar", fix=fix, place=place)
         for embossing in on.get(facet, []):
             flat = in_frame(embossing.T_part_facet, np.concatenate(corners))[:, 2]
             upright = float(embossing.T_part_facet[:3, 2] @ normal)
-            if np.abs(flat).max() > EMBOSS.planarity * size or upright < 1 - EMBOSS.planarity:
+            if np.abs(flat).max() > _PLANARITY * size or upright < 1 - _PLANARITY:
                 raise SolidError("symbols do not stand on their facet", place=place)
             _check_inside(embossing, corners, place)
         _check_apart(on.get(facet, []), place)

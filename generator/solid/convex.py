@@ -1,11 +1,7 @@
-"""A closed body -> convex pieces that fill it, for simulators whose bodies are convex.
+"""Cut a closed body into convex pieces that fill it, for simulators whose bodies are convex.
 
 A piece that is not convex is cut by a plane through its deepest reflex edge: along one of the
-two faces there, or between them, whichever leaves the pieces nearest to their hulls. A piece
-counts as convex when its hull stands out of it by less than `ConvexSettings.depth_mm`.
-
-References
-----------
+two faces there, or between them, whichever leaves the pieces nearest to their hulls.
 B. Chazelle, "Convex partitions of polyhedra", 1984: cuts at reflex edges.
 """
 
@@ -26,16 +22,12 @@ Index = NDArray[np.int64]
 Plane = tuple[Points, float]  #: unit normal (3,), offset (mm)
 _Entry = tuple[float, int, list[Plane], Manifold]  #: less its depth, number, cuts, piece
 
-
-@dataclass(frozen=True, slots=True)
-class ConvexSettings:
-    """When a piece is convex enough, and when to stop."""
-
-    depth_mm: float = 0.1  #: of an edge inside the hull; what a filament printer rounds off
-    most: int = 128  #: pieces, after which nothing is cut: simulators slow down with each
-    thin_mm: float = 0.02  #: a piece that is thinner is left out: no simulator feels it
-    flat: float = 1e-6  #: of the body's size: less is rounding
-    apart: float = 1e-3  #: of that: how far pieces are cut apart
+#: A hull may stand out of its piece by so much: what a filament printer rounds off.
+DEPTH_MM = 0.1
+_MOST = 128  # pieces, after which nothing is cut: simulators slow down with each
+_THIN_MM = 0.02  # a thinner piece is left out: no simulator feels it
+_FLAT = 1e-6  # of the body's size: less is rounding
+_APART = 1e-3  # of that: how far pieces are cut apart
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,23 +39,19 @@ class ConvexPieces:
 
 
 def convex_pieces(
-    vertices: Points, triangles: Index, settings: ConvexSettings | None = None
+    vertices: Points, triangles: Index, *, depth_mm: float = DEPTH_MM, most: int = _MOST
 ) -> ConvexPieces:
-    """Return convex pieces of a closed mesh, the largest first.
+    """Return at most `most` convex pieces of a closed mesh, the largest first.
 
-    Raises
-    ------
-    SolidError
-        The triangles close no body.
+    Raises `SolidError` if the triangles close no body.
     """
-    given = settings or ConvexSettings()
     body = Manifold(Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(triangles)))
     if body.status() != Error.NoError or body.is_empty():
         raise SolidError(
             f"the triangles close no body ({body.status().name})",
             fix="report the spec together with this message",
         )
-    flat = given.flat * float(np.ptp(vertices, axis=0).max())
+    flat = _FLAT * float(np.ptp(vertices, axis=0).max())
     number = count()  # of equal depths the first found is cut first
 
     def entry(piece: Manifold) -> _Entry:
@@ -72,15 +60,15 @@ def convex_pieces(
 
     waiting = [entry(piece) for piece in body.decompose()]
     heapq.heapify(waiting)
-    while waiting[0][0] < -given.depth_mm and len(waiting) < given.most:
-        halves = _best_cut(waiting[0][3], waiting[0][2], given.apart * flat)
+    while waiting[0][0] < -depth_mm and len(waiting) < most:
+        halves = _best_cut(waiting[0][3], waiting[0][2], _APART * flat)
         if len(halves) < 2:
             break
         heapq.heapreplace(waiting, entry(halves[0]))
         for half in halves[1:]:
             heapq.heappush(waiting, entry(half))
     hulls = sorted((piece.hull() for *_, piece in waiting), key=_order)
-    hulls = [hull for hull in hulls if _thickness(hull) > given.thin_mm] or hulls[:1]
+    hulls = [hull for hull in hulls if _thickness(hull) > _THIN_MM] or hulls[:1]
     return ConvexPieces(tuple(map(_mesh, hulls)), -waiting[0][0])
 
 

@@ -1,8 +1,7 @@
-"""Symbols of a face as an embossing of a part's facet.
+"""Make the symbols of a face an embossing of a part's facet.
 
-FaceLayout (centres in the face frame) + outlines -> Embossing. The symbols' x axis runs
-along the array's columns, so it stands at minus the placement's rotation in the face.
-Thesis 5.5, 6.3.
+The symbols' x axis runs along the array's columns: it stands at minus the placement's rotation
+in the face. Thesis 5.5, 6.3.
 """
 
 from __future__ import annotations
@@ -23,25 +22,9 @@ def embossing_of(
     T_part_face: NDArray[np.float64],
     pitch_mm: float,
 ) -> Embossing:
-    """Return the embossing of one face.
+    """Return the embossing of one face on a facet of the part; T_part_face (4, 4).
 
-    Parameters
-    ----------
-    layout
-        Centres (mm, face frame), labels, cells and rotation of the face's symbols.
-    tiers
-        One outline per label of the alphabet.
-    facet
-        Number of the facet in the part.
-    T_part_face
-        (4, 4) from the face frame to the part frame.
-    pitch_mm
-        Of the lattice.
-
-    Raises
-    ------
-    SolidError
-        If a label has no outline.
+    Raises `SolidError` if a label has no outline.
     """
     labels = layout.labels
     if len(labels) and not (labels.min() >= 0 and labels.max() < len(tiers)):

@@ -1,25 +1,21 @@
-"""Panels that fit: no two come nearer than the gap, wherever they meet in the finished object.
+"""Cut panels until no two come nearer than the gap, wherever they meet in the finished object.
 
 Mitres part the panels of faces with a common edge. Faces that share only a corner, or that
 come near each other behind a small face, are parted here: both panels are cut by the plane
 that bisects the angle between the faces, half the gap from it. A plane is moved back a
 little where it would leave a facet too narrow to print. Lengths in mm, object frame unless said.
 
-A plain body cut by a plane: exact clipping of its facets, without a boolean.
-
-Body (vertices, planar facets with loops) + plane + which vertices go -> body. Every edge
-between a vertex that stays and one that goes is cut once, so that neighbours keep common
-corners; what the cut opens is closed by facets in the plane. Vertices that go need not be all
-that lie beyond the plane: one connected piece of them is cut off alone. Lengths in mm.
-
-Reference: Sutherland and Hodgman, Reentrant polygon clipping, Communications of the ACM 17
-(1974); here the pieces of a facet are joined along the plane, so that it may be non-convex.
+A plain body is cut by exact clipping of its facets, without a boolean (Sutherland and Hodgman,
+Reentrant polygon clipping, Communications of the ACM 17, 1974). Every edge between a vertex that
+stays and one that goes is cut once, so that neighbours keep common corners; the pieces of a facet
+are joined along the plane, so that it may be non-convex. Vertices that go need not be all that
+lie beyond the plane: one connected piece of them is cut off alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -28,44 +24,29 @@ from numpy.typing import NDArray
 
 from generator.errors import SolidError
 from generator.plane.polygon import area_vector, face_vector, signed_volume
+from generator.polyhedron.check import directed_edges
 from generator.polyhedron.frame import face_normal
 from generator.polyhedron.winged import Polyhedron
-from generator.solid.part import Facet, Part
-from generator.solid.settings import EMBOSS
+from generator.solid.part import Facet, Part, transform
 from generator.solid.triangulate import triangles
 
 Points = NDArray[np.float64]
 Loop = tuple[int, ...]
 
-
-@dataclass(frozen=True, slots=True)
-class PlainBody:
-    """A closed body of planar facets."""
-
-    vertices: Points  #: (V, 3) mm
-    facets: tuple[Facet, ...]
+_ROUNDING_MM = 1e-6  # a gap smaller by less is kept; 64-bit coordinates round far below
+_PARALLEL = 1e-6  # faces whose unit normals differ by less have no bisecting plane
+_EDGE_MM = 0.05  # a cut that leaves a shorter edge, which no printer makes, is moved back
+_STEP_MM = 0.02  # by which a cut is moved back at a time
+_STEPS = 12  # tries at that; then the one with the longest shortest edge is taken
 
 
 def cut_off(
-    body: PlainBody, normal: Points, offset_mm: float, goes: NDArray[np.bool_], name: str
-) -> PlainBody | None:
-    """Return the body without the vertices that go, closed in a plane.
+    body: Part, normal: Points, offset_mm: float, goes: NDArray[np.bool_], name: str
+) -> Part | None:
+    """Return the body without the vertices that go, closed in the plane normal . x = offset.
 
-    Parameters
-    ----------
-    body
-        Closed.
-    normal, offset_mm
-        Unit vector (3,) and distance: the plane normal . x = offset; what goes lies beyond.
-    goes
-        (V,) bool: vertices beyond the plane, each with all its neighbours beyond it.
-    name
-        Of the facets in the plane.
-
-    Returns
-    -------
-    PlainBody or None
-        None where a facet or the body would fall apart.
+    `goes` (V,) bool: vertices beyond the plane, each with all its neighbours beyond it. New facets
+    are called `name`. None where a facet or the body would fall apart.
     """
     cuts = _Cuts(body, body.vertices @ normal - offset_mm, goes)
     facets: list[Facet] = []
@@ -75,7 +56,7 @@ def cut_off(
             return None
         if loops:
             facets.append(Facet(facet.name, loops))
-    vertices = np.concatenate([body.vertices, *cuts.points])
+    vertices = cuts.all_points()
     lids = cuts.lids()
     if any(area_vector(vertices[list(lid)]) @ normal <= 0 for lid in lids):
         return None  # a lid with a hole: not a panel
@@ -84,15 +65,13 @@ def cut_off(
         return None
     used = np.unique(np.concatenate([loop for facet in facets for loop in facet.loops]))
     number = {old: new for new, old in enumerate(used.tolist())}
-    return PlainBody(
-        vertices[used],
-        tuple(
-            Facet(f.name, tuple(tuple(number[v] for v in loop) for loop in f.loops)) for f in facets
-        ),
+    kept = tuple(
+        Facet(f.name, tuple(tuple(number[v] for v in loop) for loop in f.loops)) for f in facets
     )
+    return replace(body, vertices=vertices[used], facets=kept)
 
 
-def beyond(body: PlainBody, normal: Points, offset_mm: float) -> list[NDArray[np.bool_]]:
+def beyond(body: Part, normal: Points, offset_mm: float) -> list[NDArray[np.bool_]]:
     """Return what lies beyond a plane, one mask (V,) for each connected piece of the surface."""
     height = body.vertices @ normal - offset_mm
     over = height > 0
@@ -116,7 +95,7 @@ def _joined_across(
 ) -> list[tuple[int, int]]:
     """Return pairs of vertices beyond a plane that a facet joins, other than by its edges.
 
-    Every stretch of the facet in the plane has one piece beyond it, from end to end.
+    Each segment in which the facet meets the plane bounds one piece beyond it, from end to end.
     """
     if len(loops) == 1:
         over = height[list(loops[0])] > 0
@@ -125,12 +104,11 @@ def _joined_across(
     whole = [loop[0] for loop in loops if (height[list(loop)] > 0).all()]
     along = np.cross(face_vector([vertices[list(loop)] for loop in loops]), normal)
     ends = []
-    for loop in loops:
-        for a, b in zip(loop, loop[1:] + loop[:1], strict=True):
-            if (height[a] > 0) != (height[b] > 0):
-                share = height[a] / (height[a] - height[b])
-                at = vertices[a] + share * (vertices[b] - vertices[a])
-                ends.append((float(at @ along), a if height[a] > 0 else b))
+    for a, b in directed_edges(loops):
+        if (height[a] > 0) != (height[b] > 0):
+            share = height[a] / (height[a] - height[b])
+            at = vertices[a] + share * (vertices[b] - vertices[a])
+            ends.append((float(at @ along), a if height[a] > 0 else b))
     ends.sort()
     pairs = [(one[1], other[1]) for one, other in zip(ends[::2], ends[1::2], strict=True)]
     anchors = [*(pair[0] for pair in pairs), *whole] if whole else []
@@ -138,24 +116,23 @@ def _joined_across(
 
 
 def corners_beyond(
-    body: PlainBody, normal: Points, offset_mm: float, piece: NDArray[np.bool_]
+    body: Part, normal: Points, offset_mm: float, piece: NDArray[np.bool_]
 ) -> Points:
     """Return the corners (n, 3) of one of the pieces of `beyond`, those in the plane included."""
     cuts = _Cuts(body, body.vertices @ normal - offset_mm, piece)
     for a, b in _edges(body.facets):
         if piece[a] and not piece[b]:
             cuts.cut(a, b)
-    return np.concatenate([body.vertices[piece], *cuts.points])
+    return np.concatenate([body.vertices[piece], np.reshape(cuts.points, (-1, 3))])
 
 
-def shortest_edge_mm(body: PlainBody) -> float:
+def shortest_edge_mm(body: Part) -> float:
     """Return the length of the shortest edge."""
-    edges = np.array(_edges(body.facets))
-    ends = body.vertices[edges]
+    ends = body.vertices[np.array(_edges(body.facets))]
     return float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).min())
 
 
-def body_volume(body: PlainBody) -> float:
+def body_volume(body: Part) -> float:
     """Return the volume, mm^3."""
     return signed_volume(body.vertices, [facet.loops for facet in body.facets])
 
@@ -163,7 +140,7 @@ def body_volume(body: PlainBody) -> float:
 class _Cuts:
     """The points where edges are cut, and how facets leave and enter what stays there."""
 
-    def __init__(self, body: PlainBody, height: Points, goes: NDArray[np.bool_]) -> None:
+    def __init__(self, body: Part, height: Points, goes: NDArray[np.bool_]) -> None:
         self.body = body
         self.height = height
         self.goes = goes.tolist()
@@ -181,8 +158,9 @@ class _Cuts:
             return () if not whole else None
         upward = face_vector([self.body.vertices[list(loop)] for loop in loops])
         along = np.cross(upward, normal)
-        ends = [(float(self._point(c[-1]) @ along), k, False) for k, c in enumerate(chains)]
-        ends += [(float(self._point(c[0]) @ along), k, True) for k, c in enumerate(chains)]
+        points = self.all_points()
+        ends = [(float(points[c[-1]] @ along), k, False) for k, c in enumerate(chains)]
+        ends += [(float(points[c[0]] @ along), k, True) for k, c in enumerate(chains)]
         ends.sort()
         following: dict[int, int] = {}
         for (_, leaves, wrong), (_, enters, right) in zip(ends[::2], ends[1::2], strict=True):
@@ -192,7 +170,7 @@ class _Cuts:
             self.lid_next[chains[enters][0]] = chains[leaves][-1]
         joined = _cycles(following)
         found = [tuple(v for k in cycle for v in chains[k]) for cycle in joined] + whole
-        areas = [float(area_vector(self._points(loop)) @ upward) for loop in found]
+        areas = [float(area_vector(points[list(loop)]) @ upward) for loop in found]
         outer = [loop for loop, area in zip(found, areas, strict=True) if area > 0]
         if len(outer) != 1:
             return None
@@ -205,16 +183,14 @@ class _Cuts:
     def _chains(self, loop: Loop) -> list[Loop]:
         """Return the runs of a loop that stay, each with the points where it is cut."""
         n = len(loop)
-        starts = [k for k in range(n) if self.goes[loop[k - 1]] and not self.goes[loop[k]]]
         chains = []
-        for start in starts:
-            chain = [self.cut(loop[start - 1], loop[start])]
-            k = start
-            while not self.goes[loop[k % n]]:
-                chain.append(loop[k % n])
-                k += 1
-            chain.append(self.cut(loop[(k - 1) % n], loop[k % n]))
-            chains.append(tuple(chain))
+        for k in range(n):
+            if self.goes[loop[k - 1]] and not self.goes[loop[k]]:
+                after = loop[k:] + loop[:k]
+                stays = next(j for j in range(1, n) if self.goes[after[j]])
+                first = self.cut(after[-1], after[0])
+                last = self.cut(after[stays - 1], after[stays])
+                chains.append((first, *after[:stays], last))
         return chains
 
     def cut(self, a: int, b: int) -> int:
@@ -224,18 +200,12 @@ class _Cuts:
             self.numbers[key] = len(self.body.vertices) + len(self.points)
             p, q = self.body.vertices[list(key)]
             share = self.height[key[0]] / (self.height[key[0]] - self.height[key[1]])
-            self.points.append((p + share * (q - p))[None])
+            self.points.append(p + share * (q - p))
         return self.numbers[key]
 
-    def _point(self, number: int) -> Points:
-        first = len(self.body.vertices)
-        point: Points = (
-            self.body.vertices[number] if number < first else self.points[number - first][0]
-        )
-        return point
-
-    def _points(self, loop: Loop) -> Points:
-        return np.array([self._point(v) for v in loop])
+    def all_points(self) -> Points:
+        """Return the vertices (n, 3) of the body, and the points where edges are cut."""
+        return np.concatenate([self.body.vertices, np.reshape(self.points, (-1, 3))])
 
 
 def _cycles(following: dict[int, int]) -> list[list[int]]:
@@ -252,12 +222,7 @@ def _cycles(following: dict[int, int]) -> list[list[int]]:
 
 def _edges(facets: Sequence[Facet]) -> list[tuple[int, int]]:
     """Return all directed edges."""
-    return [
-        edge
-        for facet in facets
-        for loop in facet.loops
-        for edge in zip(loop, loop[1:] + loop[:1], strict=True)
-    ]
+    return [edge for facet in facets for edge in directed_edges(facet.loops)]
 
 
 def _connected(facets: Sequence[Facet]) -> bool:
@@ -277,35 +242,24 @@ Plane = tuple[Points, float]  #: unit normal (3,) and offset; the first panel li
 
 
 def fit_panels(polyhedron: Polyhedron, parts: Sequence[Part], gap_mm: float) -> tuple[Part, ...]:
-    """Return the plain panels of all faces, cut so that they keep `gap_mm` from each other.
+    """Return plain panels, one for each face, cut so that they keep `gap_mm` from each other.
 
-    Parameters
-    ----------
-    polyhedron
-        Closed and oriented; mm, object frame.
-    parts
-        One plain panel for each face, without embossings; facet 0 is the face, facet 1 the back.
-    gap_mm
-        Least distance between two of them.
-
-    Raises
-    ------
-    SolidError
-        If two panels run into each other so that no plane parts them.
+    Facet 0 of a panel is the face, facet 1 the back. Raises `SolidError` if no plane parts two of
+    them.
     """
     fitted = list(parts)
-    seats = [_in_object(part) for part in fitted]
+    seats = [part.seated for part in fitted]
     for one, other in _near_pairs(seats, gap_mm):
         planes = list(_planes(polyhedron, one, other))
-        half = gap_mm / 2 - EMBOSS.fit_rounding_mm
+        half = gap_mm / 2 - _ROUNDING_MM
         if any(_parts(plane, seats[one], seats[other], half) for plane in planes):
             continue
-        if _gap(fitted[one], fitted[other], gap_mm) >= gap_mm - EMBOSS.fit_rounding_mm:
+        if _gap(fitted[one], fitted[other], gap_mm) >= gap_mm - _ROUNDING_MM:
             continue
         fitted[one], fitted[other] = _cut_apart(
             polyhedron, (one, other), (fitted[one], fitted[other]), planes, gap_mm
         )
-        seats[one], seats[other] = _in_object(fitted[one]), _in_object(fitted[other])
+        seats[one], seats[other] = fitted[one].seated, fitted[other].seated
     return tuple(fitted)
 
 
@@ -332,17 +286,17 @@ def _planes(polyhedron: Polyhedron, one: int, other: int) -> Iterator[Plane]:
     for sign in (1.0, -1.0):
         away = m - sign * n
         length = float(np.linalg.norm(away))
-        if length >= EMBOSS.fit_parallel:
+        if length >= _PARALLEL:
             offset = (float(m @ q) - sign * float(n @ p)) / length
             found += [(away / length, offset), (-away / length, -offset)]
     for corner in sorted(set(loops[0]) & set(loops[1])):
         at = polyhedron.vertices[corner]
         to_p, to_q = (float(np.linalg.norm(middle - at)) for middle in (p, q))
-        if min(to_p, to_q) < EMBOSS.fit_parallel:
+        if min(to_p, to_q) < _PARALLEL:
             continue  # the middle of an L can be its inner corner
         away = (q - at) / to_q - (p - at) / to_p
         length = float(np.linalg.norm(away))
-        if length >= EMBOSS.fit_parallel:
+        if length >= _PARALLEL:
             found.append((away / length, float(away @ at) / length))
     yield from (
         (normal, offset)
@@ -360,8 +314,8 @@ def _cut_apart(
 ) -> tuple[Part, Part]:
     """Return two panels cut by the plane that takes the least from them."""
     names = [polyhedron.faces[face].name for face in faces]
-    seats = [_in_object(part) for part in parts]
-    before = sum(body_volume(_body(part)) for part in parts)
+    seats = [part.seated for part in parts]
+    before = sum(body_volume(part) for part in parts)
     best: tuple[float, tuple[Part, Part]] | None = None
     for normal, offset in planes:
         first = _cut_part(parts[0], normal, offset, gap, seats[1], f"{names[0]} by {names[1]}")
@@ -370,13 +324,13 @@ def _cut_apart(
         second = _cut_part(parts[1], -normal, -offset, gap, seats[0], f"{names[1]} by {names[0]}")
         if second is None:
             continue
-        apart = gap / 2 - EMBOSS.fit_rounding_mm
-        if not _parts((normal, offset), _in_object(first), _in_object(second), apart) and (
-            _gap(first, second, gap) < gap - EMBOSS.fit_rounding_mm
+        apart = gap / 2 - _ROUNDING_MM
+        if not _parts((normal, offset), first.seated, second.seated, apart) and (
+            _gap(first, second, gap) < gap - _ROUNDING_MM
         ):
             continue
-        lost = before - sum(body_volume(_body(part)) for part in (first, second))
-        if best is None or lost < best[0] - EMBOSS.fit_rounding_mm:
+        lost = before - sum(body_volume(part) for part in (first, second))
+        if best is None or lost < best[0] - _ROUNDING_MM:
             best = (lost, (first, second))
     if best is None:
         raise SolidError(
@@ -392,29 +346,19 @@ def _cut_part(
 ) -> Part | None:
     """Return a panel that keeps half a gap from a plane near another one; None if it breaks.
 
-    Parameters
-    ----------
-    part
-        Plain panel.
-    normal, offset
-        The plane, object frame; the panel is to lie below it.
-    gap
-        Twice the distance from it.
-    other
-        (n, 3) corners of the other panel, object frame.
-    name
-        Of the facet in the plane.
+    It is to lie below the plane (object frame); `other`: (n, 3) corners of the other panel, object
+    frame; `name` of the facet in the plane.
     """
     T = part.T_object_part
     inward, at = T[:3, :3].T @ normal, offset - gap / 2 - float(T[:3, 3] @ normal)
     low, high = other.min(axis=0) - gap, other.max(axis=0) + gap
-    body = _body(part)
-    allowed = min(shortest_edge_mm(body), EMBOSS.fit_edge_mm)
-    best, best_edge = None, 0.0
-    for step in range(EMBOSS.fit_steps):
-        cut: PlainBody | None = body
-        back = at - step * EMBOSS.fit_step_mm
-        for _ in beyond(body, inward, back):
+    allowed = min(shortest_edge_mm(part), _EDGE_MM)
+    best: Part | None = None
+    best_edge = 0.0
+    for step in range(_STEPS):
+        cut: Part | None = part
+        back = at - step * _STEP_MM
+        for _ in beyond(part, inward, back):
             assert cut is not None
             piece = _first_near(cut, T, inward, back, low, high)
             if piece is None:
@@ -422,26 +366,24 @@ def _cut_part(
             cut = cut_off(cut, inward, back, piece, name)
             if cut is None:
                 break
-        if cut is None or [f.name for f in cut.facets[:2]] != [f.name for f in body.facets[:2]]:
+        if cut is None or [f.name for f in cut.facets[:2]] != [f.name for f in part.facets[:2]]:
             continue
-        if cut is body:
+        if cut is part:
             return part
         edge = shortest_edge_mm(cut)
         if edge > best_edge:
             best, best_edge = cut, edge
         if edge >= allowed:
             break
-    if best is None:
-        return None
-    return Part(part.name, best.vertices, best.facets, (), T)
+    return best
 
 
 def _first_near(
-    body: PlainBody, T: Points, normal: Points, offset: float, low: Points, high: Points
+    body: Part, T: Points, normal: Points, offset: float, low: Points, high: Points
 ) -> NDArray[np.bool_] | None:
     """Return a piece beyond the plane whose box meets that of the other panel."""
     for piece in beyond(body, normal, offset):
-        mine = _seated(T, corners_beyond(body, normal, offset, piece))
+        mine = transform(T, corners_beyond(body, normal, offset, piece))
         if (mine.min(axis=0) <= high).all() and (mine.max(axis=0) >= low).all():
             return piece
     return None
@@ -456,25 +398,9 @@ def _parts(plane: Plane, one: Points, other: Points, half: float) -> bool:
 
 def _gap(one: Part, other: Part, reach: float) -> float:
     """Return the distance of two plain panels, mm, at most `reach`; 0 where they overlap."""
-    solids = [_manifold(part) for part in (one, other)]
+    solids = []
+    for part in (one, other):
+        mesh = triangles(part)
+        seated = transform(part.T_object_part, mesh.vertices)
+        solids.append(Manifold(Mesh64(seated, mesh.triangles.astype(np.uint64))))
     return float(solids[0].min_gap(solids[1], reach))
-
-
-def _manifold(part: Part) -> Manifold:
-    mesh = triangles(part)
-    seated = _seated(part.T_object_part, mesh.vertices)
-    return Manifold(Mesh64(seated, mesh.triangles.astype(np.uint64)))
-
-
-def _in_object(part: Part) -> Points:
-    return _seated(part.T_object_part, part.vertices)
-
-
-def _seated(T_object_part: Points, points: Points) -> Points:
-    """Return points (n, 3) of a part's frame in the object's."""
-    seated: Points = points @ T_object_part[:3, :3].T + T_object_part[:3, 3]
-    return seated
-
-
-def _body(part: Part) -> PlainBody:
-    return PlainBody(part.vertices, part.facets)

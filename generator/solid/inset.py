@@ -1,11 +1,12 @@
-"""Inset of a face polygon with a distance of its own for every edge.
+"""Inset a face polygon with a distance of its own for every edge.
 
-Rings (mm, outer counter-clockwise, holes clockwise) + one inset per edge -> rings with the
-same corners, each on two moved lines, so that sides between two insets are planar.
+Rings (mm, outer counter-clockwise, holes clockwise) keep their corners, each on two moved lines,
+so that sides between two insets are planar.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,10 +14,12 @@ from numpy.typing import NDArray
 
 from generator.plane.polygon import points_inside, signed_area
 from generator.plane.rings import edges_cross, keeps_edges
-from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]  #: (k, 2) mm
 Insets = NDArray[np.float64]  #: (k,) mm, of edge i from corner i to i + 1
+
+#: Neighbours that turn by less share one inset where theirs would push the corner far.
+_FLAT_TURN_RAD = math.radians(15)
 
 
 def shared_insets(ring: Ring, insets: Insets) -> Insets:
@@ -32,7 +35,7 @@ def shared_insets(ring: Ring, insets: Insets) -> Insets:
     )
     shorter = np.minimum(length, np.roll(length, 1))
     slack = np.abs(np.sin(turn)) * shorter / 8
-    flat = np.abs(turn) < EMBOSS.flat_turn_rad
+    flat = np.abs(turn) < _FLAT_TURN_RAD
     result = insets.astype(np.float64)
     for _ in range(len(ring)):
         previous = np.roll(result, 1)
@@ -48,9 +51,8 @@ def shared_insets(ring: Ring, insets: Insets) -> Insets:
 def inset(ring: Ring, insets: Insets) -> Ring:
     """Return the ring whose edge i has moved to its left, into the material, by insets[i].
 
-    Corner i is where the moved lines i - 1 and i meet. Written as the mean of both insets
-    along the bisector and half their difference across it, it has no singularity where the
-    insets are equal, however flat the corner is.
+    Corner i is where the moved lines i - 1 and i meet: the mean of both insets along the bisector
+    and half their difference across it, which has no singularity where the insets are equal.
     """
     along, _ = _directions(ring)
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)  # to the left: inward

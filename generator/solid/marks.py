@@ -1,15 +1,10 @@
-"""Texts on a back as rectangles: how large they are, and where they find room.
+"""Engrave the back of a panel, so that the right panels meet at the right edges.
 
-Facet frame of the back, mm.
-
-What is engraved on the back of a panel, so that the right panels meet at the right edges.
-
-Back polygon + edge numbers + name -> embossings of V-grooves with 45 degree walls, which print
-without support on the bed. Facet frame of the back, seen from outside the panel: mm, every
-number stands on its edge. All numbers of a panel have one size: the largest of a few at
-which all of them find room, or the smallest, and then those without room are reported. The
-name stands in the middle, written out where there is room, else as a short code; where even
-that has none, it goes before the numbers.
+Texts are rectangles in the facet frame of the back, seen from outside the panel, mm. V-grooves
+with 45 degree walls print without support on the bed; every number stands on its edge. All
+numbers of a panel have the largest of a few sizes at which all find room, or the smallest, and
+then those without room are reported. The name stands in the middle, written out where there is
+room, else as a short code; where even that has none, it goes before the numbers.
 """
 
 from __future__ import annotations
@@ -29,9 +24,16 @@ from generator.plane.rings import boxes_inside
 from generator.printers import Printer
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
-from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]
+
+#: Lattice unit of a back's figures, in strokes; the smallest keeps a gap of one stroke.
+MARK_SIZES = (2.0, 1.5, 1.25, 1.0)
+MARK_DEPTH = 0.4  #: of a figure, over its stroke: a fifth of the stroke is left as a floor
+_PLACES = (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9)  # of a number along its edge, best first
+_NAME_APART = 2.0  # between name and number, in gaps of two figures: they are not read as one
+_NAME_ANGLES = 6  # directions of edges, upright ones first, in which a name may be read
+_NAME_TRIES = 200  # places of a code that are tried where it takes the room of numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,9 +97,9 @@ def closer_than(one: TextBox, other: TextBox, clear: float) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class NameMark:
-    """What a panel is called: ways to write it in lines, the best ways first.
+    """What a panel is called: ways to write it in lines, the best rank first.
 
-    The ways of one rank are as good as each other: the largest that finds room is taken.
+    The ways of one rank are equally good: the largest that finds room is taken.
     """
 
     ranks: tuple[tuple[tuple[str, ...], ...], ...]
@@ -120,7 +122,7 @@ def name_places(
     middles = _middles((rings[0].min(axis=0) + rings[0].max(axis=0)) / 2, rings)
     angles = _angles(rings)
     for ways, pen in itertools.product(name.ranks, pens):
-        apart = EMBOSS.name_apart * pen.clear
+        apart = _NAME_APART * pen.clear
         for angle, lines in itertools.product(angles, ways):
             half = pen.half_block(lines)
             centres = np.concatenate([middles, _beside_edges(rings, angle, half, pen.clear)])
@@ -139,7 +141,7 @@ def _angles(rings: Sequence[Ring]) -> list[float]:
         slant = math.atan2(side[1], side[0])
         if min(abs(math.remainder(slant - angle, math.pi)) for angle in angles) > 1e-6:
             angles.append(slant)
-        if len(angles) == EMBOSS.name_angles:
+        if len(angles) == _NAME_ANGLES:
             break
     return angles
 
@@ -149,7 +151,7 @@ def _beside_edges(
 ) -> Ring:
     """Return centres (k, 2) at which a block stands along an edge: for narrow legs of a back."""
     found = [np.zeros((0, 2))]
-    places = np.array(EMBOSS.mark_places)[:, None]
+    places = np.array(_PLACES)[:, None]
     for ring in rings:
         sides = np.roll(ring, -1, axis=0) - ring
         slants = np.arctan2(sides[:, 1], sides[:, 0]) - angle
@@ -261,30 +263,17 @@ def marks_on(
 ) -> BackMarks:
     """Return what is engraved on a facet, and what found no room.
 
-    Parameters
-    ----------
-    edges
-        Numbers of the panel's edges.
-    name
-        Of the panel.
-    rings
-        (k, 2) loops of the facet in its frame, mm.
-    facet, T_part_facet
-        Number and frame of the facet.
-    wall_mm
-        Thickness of the panel; grooves take a third of it at most.
-    printer
-        Gives the stroke.
+    `rings`: (k, 2) loops of the facet in its frame, mm. Grooves take a third of the wall at most.
     """
     stroke = printer.stroke_min_mm
-    depth = min(EMBOSS.mark_depth * stroke, wall_mm / 3)
-    pens = [Pen(size * stroke, stroke, stroke) for size in EMBOSS.mark_sizes]
+    depth = min(MARK_DEPTH * stroke, wall_mm / 3)
+    pens = [Pen(size * stroke, stroke, stroke) for size in MARK_SIZES]
     numbers = _place_numbers(edges, rings, pens)
     written = next(name_places(name, rings, pens, numbers), [])
     if not written:  # the name goes first, where it leaves most numbers their room
         most = -1
         code = NameMark(name.ranks[-1:])
-        for block in itertools.islice(name_places(code, rings, pens[-1:], ()), EMBOSS.name_tries):
+        for block in itertools.islice(name_places(code, rings, pens[-1:], ()), _NAME_TRIES):
             left = _place_edges(edges, rings, pens[-1], block)
             if len(left) > most:
                 most, written, numbers = len(left), block, left
@@ -326,11 +315,11 @@ def _place_edges(
         axis = along / float(np.hypot(*along))
         angle = math.atan2(axis[1], axis[0])
         lift = (half[1] + pen.clear * (1 + 1e-6)) * np.array([-axis[1], axis[0]])
-        centres = mark.start + np.array(EMBOSS.mark_places)[:, None] * along + lift
+        centres = mark.start + np.array(_PLACES)[:, None] * along + lift
         for centre in centres[has_room(centres, angle, half, pen.clear, rings)]:
             box = TextBox(mark.text, centre, angle, half, pen, bar)
             near = any(closer_than(box, other, pen.clear) for other in placed)
-            apart = EMBOSS.name_apart * pen.clear
+            apart = _NAME_APART * pen.clear
             if not near and not any(closer_than(box, other, apart) for other in taken):
                 placed.append(box)
                 break

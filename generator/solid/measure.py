@@ -1,13 +1,7 @@
-"""Box and volume of a part, from its plain body and one shape per symbol.
+"""Box and volume of a part, from its plain body and one shape per symbol; inertia of meshes.
 
-Closed meshes -> volume, centre of mass and inertia, in closed form.
-
-Sums over the tetrahedra that the triangles span with the origin; exact but for rounding, also
-for several bodies at once.
-
-References
-----------
-F. Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", 2004.
+Sums over the tetrahedra that the triangles span with the origin are exact but for rounding
+(F. Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", 2004).
 """
 
 from __future__ import annotations
@@ -18,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
-from generator.plane.polygon import signed_area
+from generator.plane.polygon import signed_area, signed_volume
 from generator.solid.emboss import to_part, turn
 from generator.solid.part import Part
+
+Floats = NDArray[np.float64]
 
 
 def symbol_volume(tiers: Tiers) -> float:
@@ -40,12 +36,7 @@ def symbol_volume(tiers: Tiers) -> float:
 
 def volume(part: Part) -> float:
     """Return the volume of a part with all its symbols, in closed form, mm^3."""
-    total = 0.0
-    for facet in part.facets:
-        for loop in facet.loops:
-            corners = part.vertices[list(loop)]
-            arms = corners[1:] - corners[0]
-            total += float(np.cross(arms[:-1], arms[1:]).sum(axis=0) @ corners[0]) / 6
+    total = signed_volume(part.vertices, [facet.loops for facet in part.facets])
     for embossing in part.embossings:
         counts = np.bincount(embossing.labels, minlength=len(embossing.tiers))
         for count, tiers in zip(counts.tolist(), embossing.tiers, strict=True):
@@ -70,9 +61,6 @@ def box(part: Part) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return low, high
 
 
-Floats = NDArray[np.float64]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Inertia:
     """Of a body of density 1, in the axes of its corners."""
@@ -83,12 +71,9 @@ class Inertia:
 
 
 def inertia_of(corners: Floats) -> Inertia:
-    """Return volume, centre and inertia.
+    """Return volume, centre and inertia of closed meshes.
 
-    Parameters
-    ----------
-    corners
-        (n, 3, 3) corners of the triangles of closed meshes, counter-clockwise from outside, mm.
+    `corners`: (n, 3, 3) of their triangles, counter-clockwise from outside, mm.
     """
     middle = corners.reshape(-1, 3).mean(axis=0)  # near the origin rounding is least
     a, b, c = np.moveaxis(corners - middle, 1, 0)

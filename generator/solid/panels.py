@@ -1,34 +1,32 @@
-"""One mitred panel per face: embossed side up, flat back on the bed.
+"""Make one mitred panel per face: embossed side up, flat back on the bed.
 
-Polyhedron + layout + outlines + wall -> parts. Every edge is cut back as `mitre` says, so
-that the panels of a whole object meet in its edges; the numbers of edges, counted from 1 as
-the polyhedron lists them, stand on the backs beside them. Lengths in mm. Thesis 6.3.
+Every edge is cut back as `mitre` says, so that the panels of an object meet in its edges; the
+numbers of edges, counted from 1 as the polyhedron lists them, stand on the backs. Thesis 6.3.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from generator.alphabet.figures import in_figures
 from generator.alphabet.outline import Tiers
 from generator.errors import SolidError
-from generator.layout.placement import FaceLayout, Layout
+from generator.layout.placement import Layout
 from generator.plane.polygon import face_vector
 from generator.polyhedron.winged import Polyhedron
 from generator.printers import Printer
 from generator.solid.emboss import embossing_of
 from generator.solid.marks import BackMarks, EdgeMark, NameMark, marks_on
 from generator.solid.measure import box
+from generator.solid.mitre import ASSEMBLY_GAP_MM
 from generator.solid.part import Embossing, Part, edge_numbers, in_frame, plane_frame
 from generator.solid.plate import edge_loops, plain_panels
-from generator.solid.settings import EMBOSS
 from generator.solid.whole import move_part
 
-Ring = NDArray[np.float64]
+_LISTED = 3  # kinds of missing numbers that a warning lists in full
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,32 +46,22 @@ def panels(
     *,
     name: str = "",
     code: str = "",
-    gap_mm: float = EMBOSS.assembly_gap_mm,
-    numbers: bool = True,
+    gap_mm: float = ASSEMBLY_GAP_MM,
 ) -> Panels:
-    """Return one panel per face.
+    """Return one panel per face; faces without symbols get a plain one.
 
     Parameters
     ----------
-    polyhedron
-        Closed and oriented; mm, object frame.
-    layout
-        Symbols per face; faces without symbols get a plain panel.
     tiers
         One outline per label.
     wall_mm
         Thickness of the panels.
-    printer
-        Limits the overhang of the sides and gives the stroke of the numbers.
     name
-        Of the object, engraved on the backs, and put before each face's name to name the part:
-        "Cube-F1".
+        Of the object: engraved on the backs, and before each face's name to name the part.
     code
-        Engraved in place of the name where that has no room, see `layout.placement.object_code`.
+        Engraved where the name has no room, see `layout.placement.object_code`.
     gap_mm
         Least distance of two panels in the finished object.
-    numbers
-        Whether backs bear the numbers of their edges, and names.
 
     Raises
     ------
@@ -87,6 +75,8 @@ def panels(
     by_face = {face.face: face for face in layout.faces}
     edges = edge_numbers(polyhedron)
     plain = plain_panels(polyhedron, wall_mm, printer, gap_mm, name)
+    T_part_face = np.eye(4)
+    T_part_face[2, 3] = wall_mm
     parts = []
     missing: dict[str, tuple[str, ...]] = {}
     nameless: list[str] = []
@@ -94,22 +84,20 @@ def panels(
     for face, part in enumerate(plain.fitted):
         embossings: tuple[Embossing, ...] = ()
         if face in by_face and len(by_face[face].labels):
-            embossings = (_symbols(by_face[face], tiers, wall_mm, layout.pitch_mm),)
-        if numbers:
-            marks = _marks(
-                plain.mitred[face],
-                part,
-                edge_loops(polyhedron, face, edges),
-                NameMark.of(letters, code, f"F{face + 1}"),
-                wall_mm,
-                printer,
-            )
-            embossings += marks.embossings
-            if marks.missing:
-                missing[polyhedron.faces[face].name] = marks.missing
-            if not marks.named:
-                nameless.append(polyhedron.faces[face].name)
-        part = Part(part.name, part.vertices, part.facets, embossings, part.T_object_part)
+            embossings = (embossing_of(by_face[face], tiers, 0, T_part_face, layout.pitch_mm),)
+        marks = _marks(
+            plain.mitred[face],
+            part,
+            edge_loops(polyhedron, face, edges),
+            NameMark.of(letters, code, f"F{face + 1}"),
+            wall_mm,
+            printer,
+        )
+        if marks.missing:
+            missing[polyhedron.faces[face].name] = marks.missing
+        if not marks.named:
+            nameless.append(polyhedron.faces[face].name)
+        part = replace(part, embossings=embossings + marks.embossings)
         low, high = box(part)
         middle = (low + high) / 2
         parts.append(move_part(part, np.array([-middle[0], -middle[1], 0.0])))
@@ -117,14 +105,6 @@ def panels(
     if nameless:
         warnings.append(f"no room for a name on the back of {', '.join(nameless)}: mark by hand")
     return Panels(tuple(parts), tuple(warnings))
-
-
-def _symbols(
-    face: FaceLayout, tiers: tuple[Tiers, ...], wall_mm: float, pitch_mm: float
-) -> Embossing:
-    T_part_face = np.eye(4)
-    T_part_face[2, 3] = wall_mm
-    return embossing_of(face, tiers, 0, T_part_face, pitch_mm)
 
 
 def _marks(
@@ -135,10 +115,7 @@ def _marks(
     wall_mm: float,
     printer: Printer,
 ) -> BackMarks:
-    """Return what a panel's back bears: the numbers of its edges and its name.
-
-    The numbers stand along the edges that the back had before it was cut at corners.
-    """
+    """Return the name on a panel's back, and the numbers of the edges it had before cuts."""
     corners = [plain.vertices[list(loop)] for loop in plain.facets[1].loops]
     T = plane_frame(corners[0][0], corners[0][1] - corners[0][0], face_vector(corners))
     rings = [in_frame(T, corner)[:, :2] for corner in corners]
@@ -153,18 +130,17 @@ def _marks(
 
 
 def _no_room(missing: dict[str, tuple[str, ...]]) -> str:
-    """Return the warning about texts that found no room, by the name of the back's face."""
+    """Return the warning about numbers that found no room, by the name of the back's face."""
     backs: dict[str, list[str]] = {}
     for face, texts in missing.items():
         edges = sorted(map(int, texts))
         what = f"edge{'s' if len(edges) > 1 else ''} {', '.join(map(str, edges))}"
         backs.setdefault(what, []).append(face)
-    told = [
+    kinds = list(backs.items())
+    if rest := [face for _, faces in kinds[_LISTED:] for face in faces]:
+        kinds = [*kinds[:_LISTED], ("others", rest)]
+    places = [
         f"of {what} on the back{'s' if len(faces) > 1 else ''} of {', '.join(faces)}"
-        for what, faces in list(backs.items())[: EMBOSS.listed_marks]
+        for what, faces in kinds
     ]
-    rest = [face for faces in list(backs.values())[EMBOSS.listed_marks :] for face in faces]
-    told += [f"of others on the back{'s' if len(rest) > 1 else ''} of {', '.join(rest)}"] * bool(
-        rest
-    )
-    return f"no room for the numbers {'; '.join(told)}"
+    return f"no room for the numbers {'; '.join(places)}"

@@ -1,13 +1,10 @@
 """The intermediate solid: vertices, planar facets with loops, and what stands on them.
 
-A part is a plain polyhedral body plus embossings. An embossing repeats a few symbol
-outlines (tiers) many times on one facet, so a part with 20,000 symbols stays as small
-as its list of centres; exporters instance each outline instead of repeating geometry.
-Part frame: mm, local origin, as the part lies on the printer's bed (z up); its box is
-centred on x and y and stands on z = 0.
-
-A point q of a symbol (its own axes, mm) lies at T_part_facet (R q + centre, z) with R the
-turn by rotation_rad and z the tier's height; `Tiers` tells how its loops run.
+A part is a plain polyhedral body plus embossings. An embossing repeats a few outlines (tiers)
+on one facet: 20,000 symbols are as small as the list of their centres, and exporters instance
+each outline. Part frame: mm, as the part lies on the printer's bed (z up); its box is centred on
+x and y and stands on z = 0. A point q of a symbol (its own axes, mm) lies at
+T_part_facet (R q + centre, z) with R the turn by rotation_rad and z the tier's height.
 """
 
 from __future__ import annotations
@@ -37,6 +34,12 @@ def plane_frame(origin: NDArray[np.float64], ahead: NDArray[np.float64],
 def in_frame(T_to_from: Frame, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return (n, 3) points given in the `to` frame in the `from` frame."""
     result: NDArray[np.float64] = (points - T_to_from[:3, 3]) @ T_to_from[:3, :3]
+    return result
+
+
+def transform(T_to_from: Frame, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (n, 3) points given in the `from` frame in the `to` frame."""
+    result: NDArray[np.float64] = points @ T_to_from[:3, :3].T + T_to_from[:3, 3]
     return result
 
 
@@ -130,7 +133,7 @@ class Embossing:
 class WrappedSymbols:
     """Symbols on a round face: not instanced, each bends over the facets under it.
 
-    Their sides and tops are facets of the part like any other; here stands which ones.
+    Their sides and tops are facets of the part.
     """
 
     face: int  #: face of the object
@@ -153,6 +156,11 @@ class Part:
     T_object_part: NDArray[np.float64]  #: (4, 4)
     wrapped: tuple[WrappedSymbols, ...] = ()
     analytic: tuple[AnalyticFace, ...] = ()  #: what some of the facets stand for
+
+    @property
+    def seated(self) -> NDArray[np.float64]:
+        """Vertices (V, 3) of the body in the object frame, mm."""
+        return transform(self.T_object_part, self.vertices)
 
     @property
     def symbols(self) -> int:

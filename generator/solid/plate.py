@@ -1,7 +1,6 @@
 """The plain bodies of panels: mitred along edges, and cut where corners come near each other.
 
-Polyhedron + wall + printer + gap -> one body per face, without symbols and numbers, and what
-that means for the layout. Lengths in mm. Thesis 6.3.
+Without symbols and numbers. Lengths in mm. Thesis 6.3.
 """
 
 from __future__ import annotations
@@ -21,9 +20,8 @@ from generator.polyhedron.winged import Polyhedron
 from generator.printers import Printer
 from generator.solid.fit import fit_panels
 from generator.solid.inset import inset, regular, shared_insets
-from generator.solid.mitre import Mitre, mitre, top_inset_mm
+from generator.solid.mitre import ASSEMBLY_GAP_MM, GAP_IN_CLEARANCE, Mitre, mitre, top_inset_mm
 from generator.solid.part import Facet, Part, edge_numbers
-from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]
 
@@ -48,12 +46,9 @@ class _Tier:
 def plain_panels(
     polyhedron: Polyhedron, wall_mm: float, printer: Printer, gap_mm: float, name: str
 ) -> PlainPanels:
-    """Return the plain bodies of all panels; the layout and the parts ask for the same ones.
+    """Return the plain bodies of all panels; cached, as layout and parts need the same ones.
 
-    Raises
-    ------
-    SolidError
-        If a face is too small for the wall, or two panels cannot be parted.
+    Raises `SolidError` if a face is too small for the wall, or two panels cannot be parted.
     """
     edges = edge_numbers(polyhedron)
     angles = [dihedral(polyhedron, edge) for edge in range(len(polyhedron.edges))]
@@ -71,12 +66,9 @@ def top_insets_mm(
     wall_mm: float,
     printer: Printer,
     *,
-    gap_mm: float = EMBOSS.assembly_gap_mm,
+    gap_mm: float = ASSEMBLY_GAP_MM,
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return what a panel adds to the printer's clearance along each edge, loop after loop.
-
-    `top_inset_mm` of each edge, raised where nearly parallel neighbours share one inset.
-    """
+    """Return what a panel adds to the printer's clearance along each edge, mm, loop after loop."""
     loops = edge_loops(polyhedron, face, edge_numbers(polyhedron))
     return tuple(
         shared_insets(
@@ -94,8 +86,8 @@ def cut_corners(
 ) -> dict[int, tuple[Ring, ...]]:
     """Return what cuts at corners take from the tops of panels where symbols could stand.
 
-    By face: loops (k, 2) in its frame, mm, clockwise as holes run. What lies within half the
-    printer's clearance of the face's edges, where no foot comes, is left out.
+    By face: loops (k, 2) in its frame, mm, clockwise as holes run. Cuts within half the printer's
+    clearance of the face's edges, where no foot comes, are left out.
     """
     found: dict[int, tuple[Ring, ...]] = {}
     for face, (before, after) in enumerate(zip(plain.mitred, plain.fitted, strict=True)):
@@ -108,7 +100,7 @@ def cut_corners(
             for part in (before, after)
         )
         edges = face_polygon(polyhedron, face)
-        near = EMBOSS.gap_in_clearance * printer.edge_min_mm
+        near = GAP_IN_CLEARANCE * printer.edge_min_mm
         cut = [np.asarray(loop)[::-1].copy() for loop in (top - left).to_polygons()]
         loops = tuple(loop for loop in cut if (distance(loop, edges) > near).any())
         if loops:

@@ -1,17 +1,10 @@
 """Part -> triangles, without a boolean.
 
-Each symbol is triangulated once inside its own lattice square and stamped; what is left of
-the facet, the polygon less the union of these squares, is triangulated once in the frame
-of the lattice. Neighbouring squares share their corners by number, so nothing is welded
-by distance. A symbol whose square does not lie inside its facet, or that stands on no
-lattice, cuts its foot out of the facet instead. Points on a line are kept everywhere.
-
-A polygon with holes and islands into triangles, keeping every point, proven by its area.
-
-Which lattice squares of an embossing lie whole inside their facet, and their union's outline.
-
-Lattice frame: the facet frame turned into the symbols' axes; mm. Corners are numbered by
-their integer place, so neighbouring squares share them exactly.
+Each symbol is triangulated once inside its own lattice square and stamped; the rest of the
+facet, the polygon less the union of these squares, is triangulated once in the frame of the
+lattice: the facet frame turned into the symbols' axes, mm. Squares share their corners by number,
+so nothing is welded by distance. A symbol whose square does not lie inside its facet, or that
+stands on no lattice, cuts its foot out of the facet instead. Points on a line are kept everywhere.
 """
 
 from __future__ import annotations
@@ -31,24 +24,31 @@ from generator.plane.polygon import face_vector, signed_area, triangle_areas
 from generator.plane.rings import boxes_inside
 from generator.solid.emboss import to_part, turn
 from generator.solid.part import Embossing, Facet, Part, in_frame, plane_frame
-from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+#: Triangles thinner than this share of their longest side are flat: the rounding of STL, 1e-6 mm
+#: at 20 mm, turns them over.
+FLAT = 1e-6
+_BENT_FLAT = 1e-5  # the same of pieces of symbols on round faces
+#: By which an area is turned where its triangles do not come out right.
+_CLIPPING_TURNS_RAD = (0.0, 0.3, 1.1, 2.0)
+#: A centre is on the lattice, and a square inside its facet, within this share of the pitch.
+_ON_LATTICE = 1e-6
+
 
 def triangulate_rings(
-    rings: Sequence[Ring], numbers: Index, name: str, flat: float = EMBOSS.flat
+    rings: Sequence[Ring], numbers: Index, name: str, flat: float = FLAT
 ) -> Index:
-    """Return the (m, 3) triangles of an area bounded by rings.
+    """Return the (m, 3) triangles of an area bounded by rings, proven by their area.
 
     Parameters
     ----------
     rings
-        (k, 2) each; the area lies to the left of every edge, so outer loops run
-        counter-clockwise, holes clockwise.
+        (k, 2) each; the area lies to the left of every edge.
     numbers
-        (sum of k,) what to call the points, ring after ring.
+        (sum of k,) names of the points, ring after ring.
     name
         Of the facet, for the error.
     flat
@@ -83,7 +83,7 @@ def _clip_ears(rings: Sequence[Ring], points: Ring, flat: float) -> Index:
     have corners on one line, as the letters of a name do.
     """
     found: Index = np.zeros((0, 3), dtype=np.int64)
-    for angle in EMBOSS.clipping_turns_rad:
+    for angle in _CLIPPING_TURNS_RAD:
         R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         turned = [ring @ R.T for ring in rings] if angle else list(rings)
         # The fast path for convex rings makes triangles of three points on a line.
@@ -104,20 +104,12 @@ def _covers(rings: Sequence[Ring], points: Ring, triangles: Index) -> bool:
     return bool(abs(areas.sum() - wanted) <= 1e-9 * size)
 
 
-def without_slivers(points: Ring, triangles: Index, share: float = EMBOSS.flat) -> Index:
-    """Return a triangulation in which triangles of three points on a line are flipped away.
+def without_slivers(points: Ring, triangles: Index, share: float = FLAT) -> Index:
+    """Return a triangulation (m, 3) in which triangles of three points on a line are flipped away.
 
-    Such a triangle has its longest side in common with another one; exchanging that side
-    for the other diagonal leaves two proper triangles. The outline stays.
-
-    Parameters
-    ----------
-    points
-        (n, 2).
-    triangles
-        (m, 3), counter-clockwise, flat ones included.
-    share
-        Of its longest side: a thinner triangle is flat.
+    Such a triangle shares its longest side with another one; exchanging that side for the other
+    diagonal leaves two proper triangles. The outline stays. A triangle is flat when thinner than
+    `share` of its longest side.
     """
     flat = _is_sliver(points, triangles, share)
     if not flat.any():
@@ -178,26 +170,16 @@ class Squares:
 
 
 def squares_of(embossing: Embossing, rings: Sequence[Ring]) -> Squares | None:
-    """Return the full squares of an embossing, or None if it has none.
-
-    Parameters
-    ----------
-    embossing
-        Symbols of one facet.
-    rings
-        The facet's loops in the lattice frame.
-    """
+    """Return the full squares of an embossing; its facet's `rings` in the lattice frame."""
     pitch = embossing.pitch_mm
     if pitch <= 0 or not len(embossing.labels):
         return None
     centres = embossing.centres_mm @ turn(embossing.rotation_rad)
     cells = np.rint((centres - centres[0]) / pitch).astype(np.int64)
-    on_lattice = (
-        np.abs(centres - centres[0] - cells * pitch).max(axis=1) <= EMBOSS.on_lattice * pitch
-    )
+    on_lattice = np.abs(centres - centres[0] - cells * pitch).max(axis=1) <= _ON_LATTICE * pitch
     halves = np.array([foot_half_mm(tiers) for tiers in embossing.tiers])
-    full = on_lattice & (halves[embossing.labels] < pitch * (0.5 - EMBOSS.on_lattice))
-    full &= boxes_inside(centres, pitch * (0.5 + EMBOSS.on_lattice), rings)
+    full = on_lattice & (halves[embossing.labels] < pitch * (0.5 - _ON_LATTICE))
+    full &= boxes_inside(centres, pitch * (0.5 + _ON_LATTICE), rings)
     cells -= cells.min(axis=0)
     stride = int(cells[:, 1].max()) + 2
     steps = np.array([0, stride, stride + 1, 1])  # lower left, lower right, upper right, upper left
@@ -265,8 +247,8 @@ class SymbolSolid:
 def template_of(tiers: Tiers, pitch_mm: float) -> SymbolSolid:
     """Return the template of a symbol on a facet.
 
-    With a pitch it brings the facet inside its lattice square along, corners
-    counter-clockwise from the lower left; with pitch 0 the foot is cut out of the facet.
+    With a pitch it holds the facet inside its lattice square, corners counter-clockwise from the
+    lower left; with pitch 0 the foot is cut out of the facet.
     """
     points, rings = _number_points(tiers)
     base = np.zeros((0, 3), dtype=np.int64)
@@ -329,12 +311,9 @@ class Mesh:
 
 
 def triangles(part: Part) -> Mesh:
-    """Return the closed mesh of a part with everything that is embossed or engraved.
+    """Return the closed mesh of a part with all that is embossed or engraved.
 
-    Raises
-    ------
-    SolidError
-        If a facet cannot be triangulated because its loops or feet overlap.
+    Raises `SolidError` if loops or feet of a facet overlap.
     """
     builder = _MeshBuilder(part)
     for facet in range(len(part.facets)):
@@ -352,10 +331,7 @@ def body_mesh(part: Part) -> Mesh:
 
 
 def symbol_meshes(part: Part) -> tuple[Mesh, ...]:
-    """Return, for each face's embossing, its symbols as closed solids that stand on the body.
-
-    Embossing numbers in the meshes are those of the part.
-    """
+    """Return each face's symbols as closed solids; embossing numbers are those of the part."""
     meshes = []
     for number, embossing in enumerate(part.embossings):
         if embossing.face is not None:
@@ -420,7 +396,7 @@ class _MeshBuilder:
         name = self.part.facets[facet].name
         # On a round face what was a straight line bends a little: rounding could turn triangles
         # along it that are not quite flat.
-        share = EMBOSS.bent_flat if "/" in name else EMBOSS.flat
+        share = _BENT_FLAT if "/" in name else FLAT
         found = triangulate_rings(rings, np.concatenate(loops), name, share)
         self.found.append((found, facet, -1, None))
 

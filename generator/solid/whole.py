@@ -1,7 +1,4 @@
-"""The whole body as one part: every face a facet, every face embossed.
-
-Polyhedron + layout + outlines -> Part. Thesis 6.3.
-"""
+"""Make the whole body one part: every face a facet, every face embossed. Thesis 6.3."""
 
 from __future__ import annotations
 
@@ -24,28 +21,10 @@ from generator.solid.wrap.wrapped import Body, wrapped_onto
 def emboss_whole(
     polyhedron: Polyhedron, layout: Layout, tiers: tuple[Tiers, ...], name: str
 ) -> Part:
-    """Return the body with all its symbols as one solid.
+    """Return the body with all its symbols as one solid, its box centred on x and y, on z = 0.
 
-    Parameters
-    ----------
-    polyhedron
-        Closed and oriented; mm, object frame.
-    layout
-        Symbols per face; faces without symbols stay plain.
-    tiers
-        One outline per label.
-    name
-        Of the part.
-
-    Returns
-    -------
-    Part
-        In a local frame: the box, symbols included, centred on x and y, standing on z = 0.
-
-    Raises
-    ------
-    SolidError
-        If a label has no outline.
+    Faces of the layout without symbols stay plain; `tiers`: one outline per label. Raises
+    `SolidError` if a label has no outline.
     """
     facets = [Facet(face.name, face.loops) for face in polyhedron.faces]
     body = Body([polyhedron.vertices], len(polyhedron.vertices), facets)

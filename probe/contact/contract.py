@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
 
@@ -36,12 +37,9 @@ class WristStiffness:
 class Touch:
     """Pose, force and wrist of the sensor over a surface.
 
-    A point (x, y) of the sensor lies over the surface's point
-
-        (x_mm + x cos theta - y sin theta, y_mm + x sin theta + y cos theta),
-
-    that is, theta turns the surface's x axis into the sensor's. `tilt_*_rad` is how the
-    unloaded wrist (the arm) stands against the surface, turns about the sensor's x and y.
+    A point (x, y) of the sensor lies over the surface's point (x_mm + x cos theta - y sin theta,
+    y_mm + x sin theta + y cos theta). `tilt_*_rad` is how the unloaded wrist stands against the
+    surface, turns about the sensor's x and y.
     """
 
     x_mm: float
@@ -69,6 +67,23 @@ class Contact:
     tilt_y_rad: float
     level: str  #: footprint, tabs, layer, gel
     iterations: int
+
+
+def no_contact(sensor: SensorType, touch: Touch, level: str) -> Contact:
+    """Return the contact of a touch without a force: zeros."""
+    zeros = np.zeros(sensor.shape)
+    return Contact(zeros, math.inf, touch.tilt_x_rad, touch.tilt_y_rad, level, iterations=0)
+
+
+def refuse_steep(tilt_x_rad: float, tilt_y_rad: float, steepest_rad: float = STEEPEST_RAD) -> None:
+    """Refuse a plate that comes to rest at tilts that are not small."""
+    tilt = max(abs(tilt_x_rad), abs(tilt_y_rad))
+    if tilt > steepest_rad:
+        raise ContactError(
+            f"the plate tips: it comes to rest at a tilt of {math.degrees(tilt):.3g} degrees, "
+            f"beyond {math.degrees(STEEPEST_RAD):.3g}",
+            fix="move the sensor, press with less force, or take a stiffer wrist",
+        )
 
 
 def heights_at(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:

@@ -1,21 +1,13 @@
-"""Forces on top of a pad, from the forces at its base, as far as they can be known.
+"""Forces on top of a pad, from the forces at its base, as far as they can be known. Thesis 4.2.
 
-Forces on the tactels under a pad (N) -> forces on the pad's top over each tactel (N). A wave
-of pressure arrives at the base as B(q h) (`layer_influence`); at the tactels' Nyquist frequency
-of 0.61 (h = 1 mm), 0.185 (2 mm), 0.0065 (4 mm, nu = .4999). To invert that is to grow the noise
-by its inverse, so
+A wave of pressure arrives at the base as B(q h) (`layer_influence`); at the tactels' Nyquist
+frequency of 0.61 (h = 1 mm), 0.185 (2 mm), 0.0065 (4 mm, nu = .4999). To invert that grows the
+noise by its inverse: below `LEAST_SHARE` it is refused, above, forces f >= 0 are found for which
+|K f - m|^2 + (sigma/tau)^2 |f|^2 is least: K the blur from tactel to tactel, m the readings, sigma
+their noise, tau the root mean square of m. Signal under the noise is left out, and counted.
+What arrives beyond the matrix counts for the outermost tactels, as in `layer_influence`.
 
-- below `LEAST_SHARE` at Nyquist (h >= 4 mm at the usual pitch) it is refused;
-- above, forces f >= 0 are sought for which |K f - m|^2 + (sigma/tau)^2 |f|^2 is least: K is
-  the layer's blur from tactel to tactel, m the readings, sigma their noise, tau the root mean
-  square of m. Signal under the noise is left out, not invented, and counted.
-
-Nothing pulls on a pad, so f >= 0 is no assumption. What arrives beyond the matrix counts for the
-outermost tactels, as in `layer_influence`. Thesis 4.2.
-
-References
-----------
-C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapters 23 and 25.
+References: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapters 23 and 25.
 """
 
 from __future__ import annotations
@@ -45,20 +37,12 @@ class DeblurredImage:
     forces_n: Array  #: (rows, columns) over each tactel, >= 0
     noise_n: float  #: standard deviation of one of them, root mean square
     resolved: int  #: directions of the image that stand above the noise, of rows times columns
-    arrives: float  #: share of a wave at the tactels' Nyquist frequency that the pad passes
 
 
 def deblur(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> DeblurredImage:
-    """Return the forces on top of the pad.
+    """Return the forces on top of a pad under readings (rows, columns), N.
 
-    Parameters
-    ----------
-    forces_n
-        (rows, columns) force on each tactel, N.
-    sensor
-        Its overlay must be a pad.
-    noise_n
-        Standard deviation of one reading, N; 0 takes readings and blur as exact.
+    `noise_n` is the standard deviation of one reading, N; 0 takes readings and blur as exact.
 
     Raises
     ------
@@ -90,14 +74,13 @@ def deblur(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> Deblur
     blur, strengths = blur_of(sensor)
     level = math.sqrt(float(np.mean(np.square(read))))
     if level == 0:
-        return DeblurredImage(np.zeros(shape), 0.0, 0, arrives)
+        return DeblurredImage(np.zeros(shape), 0.0, 0)
     share = noise_n / level
     kept = strengths / (np.square(strengths) + share**2)
     return DeblurredImage(
         _fit_pressures(blur, read.ravel(), share).reshape(shape),
         noise_n * math.sqrt(float(np.mean(np.square(kept)))),
         int(np.count_nonzero(strengths > share)),
-        arrives,
     )
 
 
@@ -132,11 +115,6 @@ def blur_of(sensor: SensorType) -> tuple[Array, Array]:
     """Return the blur (n, n) from tactel to tactel, and its singular values (n,).
 
     Column k is what the tactels read of 1 N that presses evenly on the square of tactel k.
-
-    Raises
-    ------
-    ContactError
-        When the overlay is no pad.
     """
     grid = influence(sensor, CELLS)
     n, dx, height = grid.cells_per_tactel, grid.dx_mm, sensor.overlay.height_mm

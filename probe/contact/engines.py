@@ -1,10 +1,8 @@
 """Contact engines: programs that share no model press the same touch.
 
 An engine takes a surface, a sensor, a touch and the tips' defects, and gives the force on every
-tactel and the plate at rest. `own` is the ladder of `press`; `mujoco` asks MuJoCo's tactile sensor
-how deep each point of each tip stands in a mesh of the surface.
-
-A third one is a module with a value `ENGINE`, and a line in `ENGINES`.
+tactel and the plate at rest. A third one is a module with a value `ENGINE`, and a line in
+`ENGINES`.
 """
 
 from __future__ import annotations

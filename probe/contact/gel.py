@@ -1,19 +1,13 @@
 """Level "gel": a soft layer behind a membrane, pressed by a rigid plate on the wrist.
 
-Surface + sensor + touch -> depth of the imprint under each pixel, as the force of the gel there.
-The gel is a bed of springs, E / height, on which the plate comes to rest (`plate`). Its surface
-follows what is pressed into it, but a membrane bridges around it: the imprint is the least
-w >= d, d the depth of the surface under the plate, with
+Surface + sensor + touch -> force of the gel at each pixel: depth of the imprint times E / height
+times pixel^2. The gel is a bed of springs, E / height, on which the plate comes to rest (`plate`).
+A membrane bridges around what is pressed in: the imprint is the least w >= d, d the depth of the
+surface under the plate, with w - l^2 laplace(w) = 0 where w > d, an obstacle problem (l the
+membrane's way), solved by projection on a grid finer than the pixels. Optics and matching blur it;
+a pixel sees its mean. What the membrane carries is left out of the rest. mm, N.
 
-    w - l^2 laplace(w) = 0  where w > d,
-
-an obstacle problem (l the membrane's way), solved by projection on a grid finer than the pixels.
-Optics and matching blur it; a pixel sees its mean. What the membrane carries is left out of the
-rest. Depth = force / (E / height) / pixel^2. mm, N.
-
-References
-----------
-R. Glowinski, "Numerical methods for nonlinear variational problems", 1984, ch. II: projection.
+References: R. Glowinski, "Numerical methods for nonlinear variational problems", 1984, ch. II.
 """
 
 from __future__ import annotations
@@ -24,9 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import STEEPEST_RAD, Contact, Touch, heights_at, nothing_under
+from probe.contact.contract import (
+    STEEPEST_RAD,
+    Contact,
+    Touch,
+    heights_at,
+    no_contact,
+    nothing_under,
+)
 from probe.contact.neo_hooke import Linear
-from probe.contact.plate import checked_load, load_of, rest
+from probe.contact.plate import check_load, rest
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
 
@@ -38,22 +39,7 @@ MOST_STEPS = 2000  # of the membrane; each takes off 1 / (1 + 4 way^2) of its er
 
 
 def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
-    """Press a gel on a surface.
-
-    Parameters
-    ----------
-    surface
-        Heights in the surface frame.
-    sensor
-        Its overlay must be a gel.
-    touch
-        Pose, force and wrist. No force gives an exactly zero image.
-
-    Returns
-    -------
-    Contact
-        Force of the gel at each pixel, proportional to the depth of the imprint
-        (`depths_mm`); the plate at rest.
+    """Press a gel on a surface. No force gives an exactly zero image.
 
     Raises
     ------
@@ -64,18 +50,16 @@ def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
         raise ContactError(
             f"a {sensor.overlay.kind} overlay is no gel", fix="take the levels of that overlay"
         )
-    load = load_of(touch)
-    checked_load(load)
+    check_load(touch)
     if touch.force_n == 0:
-        none = np.zeros(sensor.shape)
-        return Contact(none, math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "gel", iterations=0)
+        return no_contact(sensor, touch, "gel")
     step = sensor.pitch_mm / FINE
     points = _grid(sensor, step)
     heights = heights_at(surface, touch, points)
     if heights.max(initial=-math.inf) == -math.inf:
         raise nothing_under(touch)
     law = Linear(_bed_n_mm3(sensor) * step**2)
-    found = rest(points.reshape(-1, 2), heights.ravel(), law, load)
+    found = rest(points.reshape(-1, 2), heights.ravel(), law, touch)
     tilt = max(abs(found.pose.tilt_x_rad), abs(found.pose.tilt_y_rad))
     depth = heights - found.pose.heights_mm(points)
     if tilt > STEEPEST_RAD or depth.max() > sensor.overlay.height_mm:
@@ -104,14 +88,9 @@ def depths_mm(sensor: SensorType, forces_n: Array) -> Array:
 
 
 def bridge(depth_mm: Array, way: float) -> tuple[Array, int]:
-    """Return the least imprint over a depth that a membrane can follow, and the iterations.
+    """Return the least imprint over a depth (n, m) that a membrane can follow, and the iterations.
 
-    Parameters
-    ----------
-    depth_mm
-        (n, m) 0 or more; nothing is pressed beyond it.
-    way
-        Over which the membrane bridges, steps of the grid.
+    `way` is the length over which the membrane bridges, steps of the grid.
     """
     if way == 0:
         return depth_mm, 0

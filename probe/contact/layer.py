@@ -1,9 +1,8 @@
 """Level "layer": a one-piece pad between a rigid plate and a surface. Thesis 4.2.
 
-Surface + sensor + touch -> force on each tactel and the plate's pose. The pad is an elastic
-layer bonded to the matrix, at small strain and without friction on top; it ends with the
-matrix (see `layer_influence` for what that costs near its edge). Heights are sampled where
-they can matter (`layer_patch`), contact is found by an active set (`layer_active_set`).
+The pad is an elastic layer bonded to the matrix, at small strain and without friction on top; it
+ends with the matrix (see `layer_influence` for what that costs near its edge). Heights are sampled
+where they can matter (`layer_patch`), contact is found by an active set (`layer_equilibrium`).
 
 Small strain is the model's limit: beyond a mean indentation of half the pad's height the
 touch is refused, as is a plate that turns by more than 20 degrees.
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import STEEPEST_RAD, Contact, Touch
+from probe.contact.contract import Contact, Touch, no_contact, refuse_steep
 from probe.contact.layer_equilibrium import LayerContact, deep_mm, descend, equilibrium, plate_of
 from probe.contact.layer_influence import Influence, influence, layer_compliance
 from probe.contact.layer_patch import (
@@ -29,7 +28,7 @@ from probe.contact.layer_patch import (
     patch_under,
 )
 from probe.contact.neo_hooke import Linear
-from probe.contact.plate import PlatePose, load_of, rest
+from probe.contact.plate import PlatePose, rest
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
 
@@ -53,25 +52,14 @@ def layer(
     cells_per_tactel: int = 4,
     samples: int = 16,
 ) -> Contact:
-    """Press a one-piece pad on a surface.
+    """Press a one-piece pad on a surface. No force gives an exactly zero image.
 
     Parameters
     ----------
-    surface
-        Heights in the surface frame.
-    sensor
-        Its overlay must be a pad.
-    touch
-        Pose, force and wrist. No force gives an exactly zero image.
     cells_per_tactel
-        Cells along the side of a tactel; 4 gives the tactels to 0.3 %.
+        Along the side of a tactel; 4 gives the tactels to 0.3 %.
     samples
         Points in each cell that can touch: 16, 64 or 256.
-
-    Returns
-    -------
-    Contact
-        Forces (rows, columns) in N, which sum to the touch's force.
 
     Raises
     ------
@@ -80,28 +68,10 @@ def layer(
         more than is small, an indentation beyond small strain, strokes too thin to be sampled,
         a force that is negative or no number, heights that are no numbers.
     """
-    influence(sensor, cells_per_tactel)  # refuses overlays and numbers of cells
+    grid = influence(sensor, cells_per_tactel)  # refuses overlays and numbers of cells
     if touch.force_n == 0:
-        return _no_contact(sensor, touch)
+        return no_contact(sensor, touch, "layer")
     patch = patch_under(surface, sensor, touch, cells_per_tactel=cells_per_tactel, samples=samples)
-    return press_patch(patch, touch)
-
-
-def press_patch(patch: LayerPatch, touch: Touch) -> Contact:
-    """Press the pad on a patch; x, y and theta of the touch are those of the patch.
-
-    Parameters, returned value and errors as for `layer`.
-    """
-    sensor = patch.sensor
-    place = (touch.x_mm, touch.y_mm, touch.theta_rad)
-    if place != (patch.touch.x_mm, patch.touch.y_mm, patch.touch.theta_rad):
-        raise ContactError(
-            "the touch stands elsewhere than the patch",
-            fix="make the patch with the touch's x, y and theta",
-        )
-    if touch.force_n == 0:
-        return _no_contact(sensor, touch)
-    grid = influence(sensor, patch.cells_per_tactel)
     pressed, pose = _find_rest(patch, grid, touch)
     return Contact(
         forces_n=grid.base_forces_n(pressed.levels.image(pressed.pressures)),
@@ -118,8 +88,8 @@ def _find_rest(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[LayerC
 
     Cells and points far below the predicted plate are left out. Those that would be run through are
     taken in, and where the plate turned the levels are computed again; cells once taken in stay, so
-    the passes end. A plate that falls far over has too few levels below it:
-    it goes a part of the way, and looks again.
+    the passes end. A plate that falls far over has too few levels below it: it goes a part of the
+    way.
     """
     pose, depth = _predict_rest(patch, touch)
     looks: list[DepthWindow] = []
@@ -146,12 +116,12 @@ def _find_rest(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[LayerC
         enough = TURNED * max(depth / grid.dx_mm, LEAST)
         enough = min(enough, HELD_RAD) if held else min(enough, FARTHEST_RAD)
         if turn <= enough and not missed.any():
-            _refuse_steep(pose)
+            refuse_steep(pose.tilt_x_rad, pose.tilt_y_rad)
             _refuse_thin(patch, pose, sunk.reshape(grid.rows, -1)[1:-1, 1:-1])
             _refuse_deep(pressed, sunk, depth, touch)
             return pressed, pose
         floor = min(-depth, float((levels.left_out_mm - moved_mm)[missed].min(initial=0.0)))
-    _refuse_steep(pose)
+    refuse_steep(pose.tilt_x_rad, pose.tilt_y_rad)
     _refuse_deep(pressed, sunk, depth, touch)
     raise ContactError(
         f"the plate does not settle within {PASSES} passes over the surface",
@@ -169,37 +139,16 @@ def _press_levels(levels: Levels, touch: Touch) -> tuple[LayerContact, bool]:
 
 
 def _predict_rest(patch: LayerPatch, touch: Touch) -> tuple[PlatePose, float]:
-    """Return a prediction of the plate at rest, and its depth (mm) in the pad.
+    """Predict the plate at rest, and its depth (mm) in the pad.
 
-    The plate is put on independent springs, as stiff as the pad under a stroke of one tactel's
-    width.
+    The plate is put on independent springs, as stiff as the pad under a stroke one tactel wide.
     """
-    pad = patch.sensor.overlay
     matter = np.flatnonzero(patch.highest_mm > -math.inf)
-    compliance = layer_compliance(
-        np.array(2 / patch.sensor.pitch_mm),
-        height_mm=pad.height_mm,
-        young_mpa=pad.young_mpa,
-        poisson=pad.poisson,
-    )
+    compliance = layer_compliance(np.array(2 / patch.sensor.pitch_mm), patch.sensor.overlay)
     springs = Linear(patch.dx_mm**2 / float(compliance))
     points, heights = patch.centres_mm[matter], patch.highest_mm[matter]
-    pose = rest(points, heights, springs, load_of(touch), tolerance=1e-6).pose
+    pose = rest(points, heights, springs, touch, tolerance=1e-6).pose
     return pose, float((heights - pose.heights_mm(points)).max())
-
-
-def _largest_tilt(pose: PlatePose) -> float:
-    return max(abs(pose.tilt_x_rad), abs(pose.tilt_y_rad))
-
-
-def _refuse_steep(pose: PlatePose) -> None:
-    turn = _largest_tilt(pose)
-    if turn > STEEPEST_RAD:
-        raise ContactError(
-            f"the plate tips: it comes to rest at a tilt of {math.degrees(turn):.3g} degrees, "
-            f"beyond {math.degrees(STEEPEST_RAD):.3g}",
-            fix="move the sensor, press with less force, or take a stiffer wrist",
-        )
 
 
 def _refuse_deep(pressed: LayerContact, sunk_mm: Array, deepest_mm: float, touch: Touch) -> None:
@@ -224,8 +173,8 @@ def _refuse_deep(pressed: LayerContact, sunk_mm: Array, deepest_mm: float, touch
 def _refuse_thin(patch: LayerPatch, pose: PlatePose, sunk_mm: Array) -> None:
     """Refuse strokes whose cover is chance: met by one point of a cell here and there.
 
-    Counted are cells in touch, and on a step: points of theirs stand out by more than points
-    are apart. What is less steep than 45 degrees is no step, however few points it touches.
+    Counted are cells in touch and on a step: points stand out by more than points are apart. What
+    is less steep than 45 degrees is no step, however few points it touches.
     """
     samples = len(patch.heights_mm)
     free = pose.heights_mm(patch.centres_mm) + sunk_mm.ravel()
@@ -239,8 +188,3 @@ def _refuse_thin(patch: LayerPatch, pose: PlatePose, sunk_mm: Array) -> None:
             "the strokes, on the mean: they are too thin to be felt by their true width",
             fix="take more cells per tactel or more samples per cell, or a wider stroke",
         )
-
-
-def _no_contact(sensor: SensorType, touch: Touch) -> Contact:
-    zeros = np.zeros((sensor.rows, sensor.columns))
-    return Contact(zeros, math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "layer", iterations=0)

@@ -92,20 +92,7 @@ class LayerContact:
 
 
 def equilibrium(levels: Levels, plate: RigidPlate) -> LayerContact:
-    """Return the contact in equilibrium, or the last iterate if the sets come again.
-
-    Parameters
-    ----------
-    levels
-        What the cells meet, seen from about where the plate comes to rest.
-    plate
-        Force and wrist.
-
-    Returns
-    -------
-    Pressed
-        `converged` is False when the method gave up.
-    """
+    """Return the contact in equilibrium; `converged` is False if the sets come again."""
     b = np.where(plate.free, 0.0, plate.start)
     pressures = np.zeros(len(levels.cells))
     touching = deep_mm(levels, b) > 0
@@ -239,16 +226,7 @@ def solve_glued(
 ) -> tuple[Array, Array]:
     """Return pressures (of all cells of the levels,) and plate (3,) in balance.
 
-    Parameters
-    ----------
-    system
-        Levels in touch.
-    plate
-        Force and wrist.
-    pressures, b
-        Where to start.
-    tolerance
-        Residual, of the indentation.
+    They start from `pressures` and `b`; `tolerance` is the residual, of the indentation.
     """
     free, K = plate.free, plate.finite
     area = system.levels.grid.dx_mm**2
@@ -294,16 +272,9 @@ def solve_glued(
 
 
 def solve_pressures(system: ContactSystem, rhs: Array, tolerance: float) -> Array:
-    """Return A^-1 rhs, (n, k): pressures under given depths, the plate held fast.
+    """Return A^-1 rhs, (n, k): pressures under depths (n, k) mm, the plate held fast.
 
-    Parameters
-    ----------
-    system
-        Levels in touch.
-    rhs
-        (n, k) depths, mm.
-    tolerance
-        Residual of each column, of its length.
+    `tolerance` is the residual of each column, of its length.
     """
     diagonal = system.diagonal
     found = np.empty_like(rhs)

@@ -39,7 +39,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
@@ -97,14 +97,7 @@ class Influence:
 
 @lru_cache(maxsize=8)
 def influence(sensor: SensorType, cells_per_tactel: int) -> Influence:
-    """Return the pad of a sensor on a grid.
-
-    Parameters
-    ----------
-    sensor
-        With an overlay of kind "pad".
-    cells_per_tactel
-        Along each side of a tactel.
+    """Return the pad of a sensor on a grid of `cells_per_tactel` along each side of a tactel.
 
     Raises
     ------
@@ -125,17 +118,13 @@ def influence(sensor: SensorType, cells_per_tactel: int) -> Influence:
     q = 2 * math.pi / dx * np.hypot(
         scipy.fft.fftfreq(domain[0])[:, None], scipy.fft.rfftfreq(domain[1])[None, :]
     )  # fmt: skip
-    spectrum = layer_compliance(
-        q, height_mm=pad.height_mm, young_mpa=pad.young_mpa, poisson=pad.poisson
-    )
+    spectrum = layer_compliance(q, pad)
     own = float(scipy.fft.irfft2(spectrum, s=domain)[0, 0])
     along = [np.sinc(scipy.fft.fftfreq(domain[0])), np.sinc(scipy.fft.rfftfreq(domain[1]))]
     base = base_ratio(q * pad.height_mm, pad.poisson) / np.square(along[0][:, None] * along[1])
     spectrum.setflags(write=False)
     base.setflags(write=False)
-    edge = edge_compliance(
-        dx, height_mm=pad.height_mm, young_mpa=pad.young_mpa, poisson=pad.poisson
-    )
+    edge = edge_compliance(dx, pad)
     return Influence(sensor, cells_per_tactel, rows, columns, dx, edge, domain, spectrum, base, own)
 
 
@@ -199,25 +188,13 @@ _EDGE_FINE, _EDGE_FIRST, _EDGE_SECOND = 0.939, 0.446, 1.422
 _EDGE_LESS, _EDGE_FROM, _EDGE_SQUEEZED = 0.06, 0.1, 0.1  # share; x; 1 - 2 nu
 
 
-def layer_compliance(q: Array, *, height_mm: float, young_mpa: float, poisson: float) -> Array:
-    """Return surface displacement per pressure, mm/MPa, of waves with wave number q.
+def layer_compliance(q: Array, pad: Overlay) -> Array:
+    """Return the surface's displacement per pressure, mm/MPa, of waves (...) of number q, 1/mm.
 
-    Parameters
-    ----------
-    q
-        (...) wave numbers, 1/mm, >= 0. At 0 it is that of a layer pressed all over:
-        h (1 + nu) (1 - 2 nu) / (E (1 - nu)), which is 0 at nu = 1/2.
-    height_mm, young_mpa, poisson
-        Of the layer; poisson in [0, 1/2].
+    At q = 0 it is that of a layer pressed all over: h (1 + nu) (1 - 2 nu) / (E (1 - nu)).
     """
-    scale = 2 * (1 - poisson**2) * height_mm / young_mpa
-    return scale * compliance_over_s(np.asarray(q, np.float64) * height_mm, poisson)
-
-
-def compliance_ratio(s: Array, poisson: float) -> Array:
-    """Return T(s) (...): the layer's compliance over the half-space's; s = q h >= 0."""
-    s = np.asarray(s, np.float64)
-    return s * compliance_over_s(s, poisson)
+    scale = 2 * (1 - pad.poisson**2) * pad.height_mm / pad.young_mpa
+    return scale * compliance_over_s(np.asarray(q, np.float64) * pad.height_mm, pad.poisson)
 
 
 def compliance_over_s(s: Array, poisson: float) -> Array:
@@ -248,13 +225,13 @@ def base_ratio(s: Array, poisson: float) -> Array:
     return 2 * a * e * (a * ch + s * sh) / (4 * e2 * (a * a + s * s) + (3 - 4 * poisson) * sh * sh)
 
 
-def edge_compliance(dx_mm: float, *, height_mm: float, young_mpa: float, poisson: float) -> float:
+def edge_compliance(dx_mm: float, pad: Overlay) -> float:
     """Return D = kappa dx / E*, mm/MPa: what edges inside a cell of side dx add, see above."""
-    x, squeezed = dx_mm / height_mm, 1 - 2 * poisson
-    bend = _EDGE_SECOND * squeezed / (_EDGE_FINE * (1 - poisson) ** 2 - _EDGE_FIRST * squeezed)
+    x, squeezed = dx_mm / pad.height_mm, 1 - 2 * pad.poisson
+    bend = _EDGE_SECOND * squeezed / (_EDGE_FINE * (1 - pad.poisson) ** 2 - _EDGE_FIRST * squeezed)
     kappa = _EDGE_FINE / (1 + _EDGE_FIRST * x + _EDGE_SECOND * x * x / (1 + bend * x))
     less = _EDGE_LESS * math.exp(-squeezed / _EDGE_SQUEEZED) * x / ((x + _EDGE_FROM) * (1 + x))
-    return kappa * (1 - less) * dx_mm * (1 - poisson**2) / young_mpa
+    return kappa * (1 - less) * dx_mm * (1 - pad.poisson**2) / pad.young_mpa
 
 
 def _sinh_excess(square: Array) -> Array:

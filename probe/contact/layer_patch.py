@@ -1,10 +1,9 @@
 """Heights of the surface under the pad's cells, and the levels of matter that each cell meets.
 
-Surface + cells + place -> LayerPatch: heights only where they can matter. Every cell is sampled at
-4 points; a cell whose neighbourhood is level needs no more, one that can touch is sampled in full
-(16 points by default), all others never. The points of a cell are a lattice whose columns and rows
-are all different, and neighbouring cells sample different quarters of it, so a stroke along an axis
-is seen down to dx / 16.
+Surface + cells + place -> LayerPatch. Every cell is sampled at 4 points; a cell whose
+neighbourhood is level needs no more, one that can touch is sampled in full (16 points by default).
+The points of a cell are a lattice whose columns and rows are all different, and neighbouring cells
+sample different quarters of it, so a stroke along an axis is seen down to dx / 16.
 
 Patch + a plane near the plate -> Levels. The points of a patch are sorted by their depth below
 the surface, seen from the plane, into at most `MOST_LEVELS` bins. A cell of the pad takes
@@ -108,22 +107,11 @@ def patch_under(
 ) -> LayerPatch:
     """Return the first samples under the matrix; no cell is sampled in full yet.
 
-    Parameters
-    ----------
-    surface
-        What is touched.
-    sensor, touch
-        The matrix, and where it stands.
-    cells_per_tactel
-        Cells along the side of a tactel.
-    samples
-        Points of a cell that is sampled in full: 16, 64 or 256.
-
     Raises
     ------
     ContactError
-        When the number of samples is another, the surface gives a height that is no number, or
-        carries strokes too thin to be seen.
+        When the number of samples per cell is not 16, 64 or 256, the surface gives a height that is
+        no number, or carries strokes too thin to be seen.
     """
     if samples not in SAMPLES:
         raise ContactError(
@@ -180,9 +168,9 @@ def _refuse_hidden(
 ) -> None:
     """Refuse a surface whose top is under the matrix and was seen by no point.
 
-    Checked only where the first samples did not meet the top of the surface: a blank place, strokes
-    thinner than the points are apart, or the top of something round. The last rises over the
-    highest point seen about it by less than what was seen there differs.
+    Where the first samples missed the top, it is a blank place, strokes thinner than the points are
+    apart, or the top of something round. The last rises over the highest point seen about it by
+    less than what was seen there differs.
     """
     seen, top = float(high.max()), surface.top_mm
     if top <= seen + LEVEL_MM:
@@ -282,16 +270,7 @@ def levels_of(
 ) -> Levels:
     """Return the levels of the cells of a patch that were sampled in full.
 
-    Parameters
-    ----------
-    patch
-        Heights under the matrix.
-    grid
-        The pad's cells: those of the patch and a ring about them.
-    window
-        Points below are left out.
-    earlier
-        Matter in these, deeper than the window, is one more level.
+    Points below the `window` are left out; matter in `earlier` windows, deeper, is one more level.
     """
     depth = window.depths_mm(patch)
     top = float(depth.max())

@@ -1,16 +1,13 @@
 """MuJoCo's tactile sensor on a surface: an engine that shares no model with ours.
 
-Surface + sensor + touch + tips -> Contact. MuJoCo holds the part as a signed distance field on an
-octree of fixed depth, made of the part under the sensor alone: a written part is cut, heights
-alone (a print, a registered face) become a mesh. Its `tactile` sensor gives the depth of every
-point of every tip in the part, along the shortest way out. Each point is a column of the overlay's
-elastomer (neo-Hookean, its share of the tip's area); the plate advances and tilts until forces and
-moments balance those of the touch and the wrist. Left out: the wall between points of a tip,
-friction, and depths beyond the half width of a stroke, where the shortest way out leads through its
-side.
-
-The simulation is never stepped: one touch is a handful of forward evaluations. SI units are
-MuJoCo's; mm and N here.
+MuJoCo holds the part as a signed distance field on an octree of fixed depth, made of the part under
+the sensor alone: a written part is cut, heights alone (a print, a registered face) become a mesh.
+Its `tactile` sensor gives the depth of every point of every tip in the part, along the shortest way
+out. Each point is a column of the overlay's elastomer (neo-Hookean, its share of the tip's area);
+the plate advances and tilts until forces and moments balance those of the touch and the wrist. Left
+out: the wall between points of a tip, friction, and depths beyond the half width of a stroke, where
+the shortest way out leads through its side. The simulation is never stepped: one touch is a handful
+of forward evaluations. SI units are MuJoCo's; mm and N here.
 """
 
 from __future__ import annotations
@@ -25,10 +22,17 @@ from scipy.ndimage import grey_closing
 
 from encoded_objects.base.errors import require
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import STEEPEST_RAD, Contact, Touch, heights_at, nothing_under
+from probe.contact.contract import (
+    STEEPEST_RAD,
+    Contact,
+    Touch,
+    heights_at,
+    no_contact,
+    nothing_under,
+)
 from probe.contact.engines import Engine
 from probe.contact.neo_hooke import NeoHooke
-from probe.contact.plate import checked_load, load_of
+from probe.contact.plate import check_load
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.surface.body import (
@@ -62,23 +66,7 @@ MOVED_MM = 0.05  # by which the mesh of heights may move, to need fewer triangle
 
 
 def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
-    """Press a sensor on a surface.
-
-    Parameters
-    ----------
-    surface
-        A written part, or heights alone, which are meshed first.
-    sensor
-        Any matrix; its overlay must be of tabs.
-    touch
-        Pose, force and wrist.
-    tips
-        Sampling (7 points are enough here) and defects of the tips.
-
-    Returns
-    -------
-    Contact
-        Forces (rows, columns) in N, which sum to the touch's force.
+    """Press a sensor with tabs on a written part, or on heights alone, which are meshed first.
 
     Raises
     ------
@@ -92,17 +80,15 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
             f"engine mujoco knows tabs, the overlay is a {sensor.overlay.kind}",
             fix="take --engine own for a pad",
         )
-    checked_load(load_of(touch))
-    shape = (sensor.rows, sensor.columns)
+    check_load(touch)
     if touch.force_n == 0:
-        tilts = (touch.tilt_x_rad, touch.tilt_y_rad)
-        return Contact(np.zeros(shape), math.inf, *tilts, "mujoco", 0)
+        return no_contact(sensor, touch, "mujoco")
     points, drop = tip_points(sensor, tips)
     depths, top_mm = _scene(mesh_under(surface, sensor, touch), sensor, touch, points, drop)
     share = math.pi * sensor.overlay.tab_diameter_mm**2 / 4 / points.shape[1]
     modulus = STIFFER * sensor.overlay.young_mpa
     law = NeoHooke(modulus * share / sensor.overlay.height_mm, sensor.overlay.height_mm)
-    return _rest(depths, top_mm, law, points.reshape(-1, 2), touch, shape)
+    return _rest(depths, top_mm, law, points.reshape(-1, 2), touch, sensor.shape)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -299,7 +285,7 @@ def mesh_heights_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> 
 
     Heights are sampled twice as densely as they are kept; grooves between beads, narrower than a
     cell, are filled, as rubber does not enter them. Where there is no matter, and below
-    `deep_mm`, the body has a floor.
+    `DEEP_MM`, the body has a floor.
     """
     reach = max(sensor.half_mm) + AROUND_MM
     at = np.linspace(-reach, reach, 2 * CELLS + 1)

@@ -6,13 +6,10 @@ slide at its ends, has the nominal stress
 
     sigma = (E/3) (lambda^-2 - lambda),    lambda = 1 - compression / length,
 
-which grows without bound as the column is crushed (lambda -> 0): no force however large
-gives an impossible strain. Stretched (compression < 0) it stays convex, too.
+which grows without bound as the column is crushed: no force gives an impossible strain.
 
-References
-----------
-R. S. Rivlin, "Large elastic deformations of isotropic materials IV", Phil. Trans. R. Soc. A
-241 (1948) 379-397.
+References: R. S. Rivlin, "Large elastic deformations of isotropic materials IV", Phil. Trans.
+R. Soc. A 241 (1948) 379-397.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Rest of a rigid plate on elastic tips, held by a compliant wrist. Thesis 4.2.
 
 Points (mm, plate frame) with the height of the surface under them, a force law for the tips,
-and a load -> pose of the plate and force at every point. The unknowns are the advance and
+and a touch -> pose of the plate and force at every point. The unknowns are the advance and
 the turns, a = -(z, L tilt_x, L tilt_y), measured from first touch and from the tilt of the
 unloaded wrist; L is half the width, which makes the three of one size. With the rows
 R = [1, y/L, -x/L] a point is pressed by R a + h, and the plate rests where
@@ -12,26 +12,24 @@ is least: convex, with a continuous gradient, for every law whose force rises. P
 stand in groups (the tip of one tab) on a common column: then its compression v takes part,
 psi((R a + h - v)+) + Psi(v), and is eliminated group by group: the system stays 3x3.
 
-Method: semismooth Newton with a line search. Every slope along a step rises, so one sign tells
-which side to search. The 3x3 system is scaled to a unit diagonal; where it is singular and the
+Method: semismooth Newton with a line search (every slope along a step rises, so one sign tells
+which side to search). The 3x3 system is scaled to a unit diagonal; where it is singular and the
 load is not balanced, the step goes down the null space to the next tip. Steps stay short of the
-laws' limits, so forces stay finite. With K = 0 and the centre of pressure outside the hull of
-all tips there is no rest: the plate tips over.
+laws' limits. With K = 0 and the centre outside the hull of all tips there is no rest.
 
-References
-----------
-L. Qi, J. Sun, "A nonsmooth version of Newton's method", Math. Programming 58 (1993) 353-367.
+References: L. Qi, J. Sun, "A nonsmooth version of Newton's method", Math. Programming 58 (1993)
+353-367.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.contact.contract import Touch, WristStiffness
+from probe.contact.contract import Touch
 from probe.contact.neo_hooke import Law
 from probe.errors import ContactError
 
@@ -48,18 +46,6 @@ SEARCHED_SLOPE = 0.1  # of the first slope that a searched step may leave
 MOST_SEARCHES = 200  # lengths tried for one step
 EPS = float(np.finfo(np.float64).eps)
 _NONE = np.zeros(0)
-
-
-@dataclass(frozen=True, slots=True)
-class PlateLoad:
-    """Load on the plate at the centre of its frame."""
-
-    force_n: float  #: along -z
-    wrist: WristStiffness = field(default_factory=WristStiffness)  #: inf holds a turn fast
-    tilt_x_rad: float = 0.0  #: how the unloaded wrist stands
-    tilt_y_rad: float = 0.0
-    moment_x_nmm: float = 0.0
-    moment_y_nmm: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,16 +72,11 @@ class PlateRest:
     iterations: int
 
 
-def load_of(touch: Touch) -> PlateLoad:
-    """Return the load of a touch."""
-    return PlateLoad(touch.force_n, touch.wrist, touch.tilt_x_rad, touch.tilt_y_rad)
-
-
 def rest(
     points_mm: Array,
     heights_mm: Array,
     law: Law,
-    load: PlateLoad,
+    touch: Touch,
     *,
     columns: Columns | None = None,
     start: PlatePose | None = None,
@@ -112,8 +93,8 @@ def rest(
         shorter than the others sees its surface lower by as much.
     law
         Of the tips, called with compressions (n,).
-    load
-        Force, moments and wrist.
+    touch
+        Force, tilt and wrist; a stiffness of inf holds a turn fast.
     columns
         What stands behind the tips; none: they are fixed to the plate.
     start
@@ -127,32 +108,32 @@ def rest(
         For a load that is no number or negative, nothing under the plate, a plate that
         tips, or no convergence.
     """
-    checked_load(load)
-    if load.force_n == 0:
-        free = PlatePose(math.inf, load.tilt_x_rad, load.tilt_y_rad)
+    check_load(touch)
+    if touch.force_n == 0:
+        free = PlatePose(math.inf, touch.tilt_x_rad, touch.tilt_y_rad)
         return PlateRest(free, np.zeros(heights_mm.shape), 0)
     if not heights_mm.max(initial=-math.inf) > -math.inf:
         raise ContactError(
-            f"there is nothing under the plate to bear {load.force_n:g} N",
+            f"there is nothing under the plate to bear {touch.force_n:g} N",
             fix="move the sensor over the object",
         )
-    problem = _pose_problem(points_mm, heights_mm, law, columns, load)
-    state, iterations = newton(problem, _unknowns(problem, load, start), tolerance)
+    problem = _pose_problem(points_mm, heights_mm, law, columns, touch)
+    state, iterations = newton(problem, _unknowns(problem, touch, start), tolerance)
     a = np.zeros(3)
     a[problem.free] = state.a
     half = problem.half_mm
     pose = PlatePose(
         z_mm=problem.datum_mm - float(a[0]),
-        tilt_x_rad=load.tilt_x_rad - float(a[1]) / half,
-        tilt_y_rad=load.tilt_y_rad - float(a[2]) / half,
+        tilt_x_rad=touch.tilt_x_rad - float(a[1]) / half,
+        tilt_y_rad=touch.tilt_y_rad - float(a[2]) / half,
     )
     if iterations is None:
-        raise _no_rest_error(pose, load)
+        raise _no_rest(pose, touch)
     return PlateRest(pose, state.force, iterations)
 
 
-def _no_rest_error(pose: PlatePose, load: PlateLoad) -> ContactError:
-    turned = math.hypot(pose.tilt_x_rad - load.tilt_x_rad, pose.tilt_y_rad - load.tilt_y_rad)
+def _no_rest(pose: PlatePose, touch: Touch) -> ContactError:
+    turned = math.hypot(pose.tilt_x_rad - touch.tilt_x_rad, pose.tilt_y_rad - touch.tilt_y_rad)
     if turned > FAR_TURNED_RAD:
         return ContactError(
             f"the plate tips: turned by {math.degrees(turned):.3g} degrees it still finds no rest",
@@ -164,22 +145,16 @@ def _no_rest_error(pose: PlatePose, load: PlateLoad) -> ContactError:
     )
 
 
-def checked_load(load: PlateLoad) -> None:
+def check_load(touch: Touch) -> None:
     """Refuse a load that is no number, presses upward, or is held by less than nothing."""
-    given = (load.force_n, load.tilt_x_rad, load.tilt_y_rad, load.moment_x_nmm, load.moment_y_nmm)
-    if not all(map(math.isfinite, given)) or load.force_n < 0:
+    given = (touch.force_n, touch.tilt_x_rad, touch.tilt_y_rad)
+    if not all(map(math.isfinite, given)) or touch.force_n < 0:
         raise ContactError(
-            f"a load of {load.force_n:g} N, moments {load.moment_x_nmm:g} and "
-            f"{load.moment_y_nmm:g} N mm, tilts {load.tilt_x_rad:g} and {load.tilt_y_rad:g} rad; "
-            "all must be finite and the force not negative",
+            f"a load of {touch.force_n:g} N, tilts {touch.tilt_x_rad:g} and "
+            f"{touch.tilt_y_rad:g} rad; all must be finite and the force not negative",
             fix="press with a force >= 0",
         )
-    if load.force_n == 0 and (load.moment_x_nmm or load.moment_y_nmm):
-        raise ContactError(
-            f"moments of {load.moment_x_nmm:g} and {load.moment_y_nmm:g} N mm without a force",
-            fix="press with a force, too",
-        )
-    stiffness = (load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad)
+    stiffness = (touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad)
     if not min(stiffness) >= 0 or math.isnan(max(stiffness)):
         raise ContactError(
             f"a wrist of {stiffness[0]:g} and {stiffness[1]:g} N mm/rad; both must be >= 0",
@@ -188,17 +163,16 @@ def checked_load(load: PlateLoad) -> None:
 
 
 def _pose_problem(
-    points: Array, heights: Array, law: Law, columns: Columns | None, load: PlateLoad
+    points: Array, heights: Array, law: Law, columns: Columns | None, touch: Touch
 ) -> PlateProblem:
     x, y = points.T
     half = float(np.abs(points).max()) or 1.0
-    stiffness = np.array([0.0, load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad])
+    stiffness = np.array([0.0, touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad])
     free = np.flatnonzero(np.isfinite(stiffness))
-    level = heights - load.tilt_x_rad * y + load.tilt_y_rad * x
+    level = heights - touch.tilt_x_rad * y + touch.tilt_y_rad * x
     datum = float(level.max())
-    f = np.array([load.force_n, -load.moment_x_nmm / half, -load.moment_y_nmm / half])
     if (stiffness[free[1:]] == 0).any():
-        _require_stable(points[heights > -math.inf] / half, stiffness, f, half)
+        _require_stable(points[heights > -math.inf], stiffness, half)
     rows = np.empty((3, len(heights)))
     rows[0] = 1.0
     np.divide(y, half, out=rows[1])
@@ -209,50 +183,47 @@ def _pose_problem(
         law=law,
         columns=columns,
         K=stiffness[free] / half**2,
-        f=f[free],
+        f=np.array([touch.force_n, 0.0, 0.0])[free],
         free=free,
         half_mm=half,
         datum_mm=datum,
     )
 
 
-def _require_stable(points: Array, stiffness: Array, f: Array, half: float) -> None:
-    """Refuse a load whose centre of pressure no tips can bear, as the wrist does not hold."""
-    at = np.array([-f[2], f[1]]) / f[0]  # x and y, of the half width
+def _require_stable(points_mm: Array, stiffness: Array, half: float) -> None:
+    """Refuse a plate whose centre no tips surround, as the wrist does not hold it."""
+    points = points_mm / half
     free_x, free_y = stiffness[2] == 0, stiffness[1] == 0  # a turn about y moves it along x
     if free_x and free_y:
-        stands = _within_hull(points, at, HULL_SLACK)
+        stands = _surround(points)
     else:
         along = 0 if free_x else 1
         low, high = points[:, along].min(), points[:, along].max()
-        stands = bool(low - HULL_SLACK <= at[along] <= high + HULL_SLACK)
+        stands = bool(low <= HULL_SLACK and high >= -HULL_SLACK)
     if not stands:
-        low, high = points.min(axis=0) * half, points.max(axis=0) * half
+        low, high = points_mm.min(axis=0), points_mm.max(axis=0)
         raise ContactError(
-            f"the plate tips: its centre of pressure ({at[0] * half:.4g}, {at[1] * half:.4g}) mm "
-            f"lies outside the hull of the tips that have something under them, x "
-            f"{low[0]:.4g} ... {high[0]:.4g} mm and y {low[1]:.4g} ... {high[1]:.4g} mm, and the "
-            "wrist does not hold it",
+            "the plate tips: its centre lies outside the hull of the tips that have something "
+            f"under them, x {low[0]:.4g} ... {high[0]:.4g} mm and y {low[1]:.4g} ... "
+            f"{high[1]:.4g} mm, and the wrist does not hold it",
             fix="move the sensor, or give the wrist a stiffness",
         )
 
 
-def _within_hull(points: Array, at: Array, slack: float) -> bool:
-    """Tell whether a place lies in the convex hull: seen from it no gap is wider than pi."""
-    away = points - at
-    far = np.abs(away).max(axis=1) > slack
-    if not far.all():
+def _surround(points: Array) -> bool:
+    """Tell whether the origin lies in the convex hull: seen from it no gap is wider than pi."""
+    if not (np.abs(points).max(axis=1) > HULL_SLACK).all():
         return True
-    angles = np.sort(np.arctan2(away[:, 1], away[:, 0]))
+    angles = np.sort(np.arctan2(points[:, 1], points[:, 0]))
     gaps = np.diff(angles, append=angles[0] + 2 * math.pi)
     return bool(gaps.max() <= math.pi + 1e-9)
 
 
-def _unknowns(problem: PlateProblem, load: PlateLoad, pose: PlatePose | None) -> Array:
+def _unknowns(problem: PlateProblem, touch: Touch, pose: PlatePose | None) -> Array:
     """Return the unknowns of a pose, by default first touch."""
     if pose is None:
         return np.zeros(len(problem.f))
-    turns = (load.tilt_x_rad - pose.tilt_x_rad, load.tilt_y_rad - pose.tilt_y_rad)
+    turns = (touch.tilt_x_rad - pose.tilt_x_rad, touch.tilt_y_rad - pose.tilt_y_rad)
     whole = (problem.datum_mm - pose.z_mm, *(turn * problem.half_mm for turn in turns))
     return np.array(whole)[problem.free]
 

@@ -1,16 +1,10 @@
 """Contact of a sensor on a surface by the cheapest model that holds an error. Thesis 4.2.
 
-Levels, from cheap to dear:
-
-    tab overlay    footprint < tabs-7 < tabs-19 < tabs-61
-    pad overlay    footprint < layer-2 < layer-4 < layer-8 < layer-16
-    gel            gel
-
-Error and cost of each level are measured by `tests/bench/contact_precision.py` on
-several indenters against finer references, and kept in `precision.json`. The error of an
-image is the norm of its deviation over the norm of the reference: the cost of the level's
-fineness, not of what the model leaves out (tabs are columns, the layer has no free sides: where a
-pad's own edge is pressed, see docs/contact.md).
+Error and cost of the `LEVELS`, from cheap to dear, are measured by
+`tests/bench/contact_precision.py` on several indenters against finer references, and kept in
+`precision.json`. The error of an image is the norm of its deviation over the norm of the reference:
+the cost of the level's fineness, not of what the model leaves out (tabs are columns, the layer has
+no free sides, see docs/contact.md).
 
 Level "footprint" shares the force by cover alone: the force on a tactel is F times the share of
 its tip under which the surface reaches to within a depth of its highest place, over the sum of all
@@ -26,12 +20,10 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib import resources
 
-import numpy as np
-
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import Contact, Touch
+from probe.contact.contract import Contact, Touch, no_contact
 from probe.contact.engines import Engine
-from probe.contact.plate import PlatePose, checked_load, load_of
+from probe.contact.plate import PlatePose, check_load
 from probe.contact.tabs import heights_under, tabs
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
@@ -66,18 +58,8 @@ def press(
 ) -> Contact:
     """Press the sensor on a surface.
 
-    Parameters
-    ----------
-    surface, sensor, touch
-        Surface, sensor, pose and force.
-    accuracy
-        "auto" holds `AUTO_ERROR`; a number is the error to hold (0.003: 0.3 %); a name
-        takes that level: footprint, tabs, tabs-7, tabs-19, tabs-61, layer, layer-2 ... layer-16.
-
-    Returns
-    -------
-    Contact
-        Force on each tactel and the plate at rest.
+    `accuracy` "auto" holds `AUTO_ERROR`; a number is the error to hold (0.003: 0.3 %); a name takes
+    that level.
 
     Raises
     ------
@@ -97,13 +79,7 @@ def press(
 
 
 def level_for(sensor: SensorType, accuracy: Accuracy = "auto") -> str:
-    """Return the name of the level that `press` takes.
-
-    Raises
-    ------
-    ContactError
-        See `press`.
-    """
+    """Return the name of the level that `press` takes; raises `ContactError` as it does."""
     kind = sensor.overlay.kind
     if isinstance(accuracy, str) and accuracy != "auto":
         level = DEFAULTS.get(accuracy, accuracy)
@@ -168,9 +144,8 @@ def _tabs(points: int, surface: HeightMap, sensor: SensorType, touch: Touch) -> 
     return tabs(surface, sensor, touch, Tips(points))
 
 
-# Loaded where they are used: scipy takes its time.
 def _layer(cells: int, surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
-    from probe.contact.layer import layer
+    from probe.contact.layer import layer  # loads scipy
 
     return layer(surface, sensor, touch, cells_per_tactel=cells)
 
@@ -181,56 +156,25 @@ def _gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     return gel(surface, sensor, touch)
 
 
-def footprint(
-    surface: HeightMap,
-    sensor: SensorType,
-    touch: Touch,
-    tips: Tips | None = None,
-    *,
-    depth_mm: float | None = None,
-) -> Contact:
-    """Share the force by cover.
+def footprint(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
+    """Share the force by cover; the wrist's stiffness has no effect.
 
-    Parameters
-    ----------
-    surface
-        Heights in the surface frame.
-    sensor
-        Tabs are sampled on their round tips, a pad on the whole squares of the tactels.
-    touch
-        Pose and force; the wrist has no effect.
-    tips
-        Sampling of the tips; 19 points each by default (a pad: 16).
-    depth_mm
-        How far below the highest place, against the wrist's tilt, the surface counts; a
-        quarter of the overlay's height without it.
-
-    Returns
-    -------
-    Contact
-        Forces (rows, columns), N; the plate at first touch.
+    Tabs are sampled at 19 points of their round tips, a pad at 16 of the tactel's square.
 
     Raises
     ------
     ContactError
         When nothing lies under the sensor, or a force or a height is no number.
     """
-    load = load_of(touch)
-    checked_load(load)
-    shape = (sensor.rows, sensor.columns)
+    check_load(touch)
     if touch.force_n == 0:
-        return Contact(
-            np.zeros(shape), math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "footprint", iterations=0
-        )
-    depth = COVER_DEPTH * sensor.overlay.height_mm if depth_mm is None else depth_mm
-    if not 0 <= depth < math.inf:
-        raise ContactError(f"a depth of {depth:g} mm", fix="give a finite depth >= 0")
-    points, drop = tip_points(sensor, tips or Tips())
+        return no_contact(sensor, touch, "footprint")
+    points, drop = tip_points(sensor, Tips())
     unloaded = PlatePose(0.0, touch.tilt_x_rad, touch.tilt_y_rad)
     level = heights_under(surface, touch, points) - drop - unloaded.heights_mm(points)
     highest = float(level.max())
-    cover = (level >= highest - depth).mean(axis=1)
-    forces = touch.force_n * (cover / cover.sum()).reshape(shape)
+    cover = (level >= highest - COVER_DEPTH * sensor.overlay.height_mm).mean(axis=1)
+    forces = touch.force_n * (cover / cover.sum()).reshape(sensor.shape)
     return Contact(forces, highest, touch.tilt_x_rad, touch.tilt_y_rad, "footprint", iterations=0)
 
 

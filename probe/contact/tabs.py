@@ -15,12 +15,10 @@ skin takes the share s = 1/(1 + beta) of the height, the column the rest.
 - Two heights, slopes, and domed ends are presses of different depth on the skin's points.
 
 The law is the least energy over the column's compression: convex and C1 in the plate's pose;
-no point pulls, and a tab's force grows with every point's depth.
-
-On a step the covered share is a count of points: in x and y the force moves in small steps, finer
-with more points. Forces act at the points, so a tab that is pressed on one side turns the plate.
-Where strokes are so thin that one or two points of a tip meet them by chance, tips get more
-points; strokes too thin for the finest pattern are refused.
+no point pulls, and a tab's force grows with every point's depth. On a step the covered share is a
+count of points: the force moves in small steps, finer with more points. Where strokes are so thin
+that one or two points of a tip meet them by chance, tips get more points; strokes too thin for the
+finest pattern are refused.
 """
 
 from __future__ import annotations
@@ -33,17 +31,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from probe.contact.contract import STEEPEST_RAD, Contact, Touch, heights_at, nothing_under
-from probe.contact.neo_hooke import Linear, NeoHooke
-from probe.contact.plate import (
-    Columns,
-    PlateLoad,
-    PlatePose,
-    PlateRest,
-    checked_load,
-    load_of,
-    rest,
+from probe.contact.contract import (
+    Contact,
+    Touch,
+    heights_at,
+    no_contact,
+    nothing_under,
+    refuse_steep,
 )
+from probe.contact.neo_hooke import Linear, NeoHooke
+from probe.contact.plate import Columns, PlatePose, PlateRest, check_load, rest
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
@@ -64,23 +61,9 @@ SAMPLED = 8  # every so many points of a tip one predicts the pose
 
 
 def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None = None) -> Contact:
-    """Press separate tabs on a surface.
+    """Press separate tabs on a surface, with 19 points on each tip by default.
 
-    Parameters
-    ----------
-    surface
-        Heights in the surface frame.
-    sensor
-        Its overlay must be of tabs.
-    touch
-        Pose, force and wrist. No force gives an exactly zero image.
-    tips
-        Sampling, dome and defects of the tips; 19 points each by default.
-
-    Returns
-    -------
-    Contact
-        Forces (rows, columns) in N, which sum to the touch's force.
+    No force gives an exactly zero image; other forces (rows, columns) sum to the touch's.
 
     Raises
     ------
@@ -90,24 +73,22 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
         are no numbers, strokes too thin for any pattern.
     """
     overlay = sensor.overlay
-    checked_tabs(overlay)
-    shape = (sensor.rows, sensor.columns)
-    load = load_of(touch)
-    checked_load(load)
+    _check_tabs(overlay)
+    check_load(touch)
     if touch.force_n == 0:
-        return Contact(
-            np.zeros(shape), math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "tabs", iterations=0
-        )
-    tips = tips or _PLAIN
+        return no_contact(sensor, touch, "tabs")
+    tips = tips or Tips()
     points, drop = tip_points(sensor, tips)
     heights = heights_under(surface, touch, points) - drop
     stiffness = min(touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad)
     if touch.force_n * sensor.reach_mm > HOPELESS_RAD * stiffness > 0:
         # Linear springs show whether the force would turn the plate over.
         law = Linear(overlay.young_mpa * math.prod(sensor.step_mm) / overlay.height_mm)
-        _require_stable(rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, HOPELESS_RAD)
-    found, forces = tabs_at_rest(points, heights, overlay, load)
-    _require_stable(found.pose, STEEPEST_RAD)
+        pose = rest(points.reshape(-1, 2), heights.ravel(), law, touch).pose
+        refuse_steep(pose.tilt_x_rad, pose.tilt_y_rad, HOPELESS_RAD)
+    found, forces = tabs_at_rest(points, heights, overlay, touch)
+    pose = found.pose
+    refuse_steep(pose.tilt_x_rad, pose.tilt_y_rad)
     if by_chance := _met_by_chance(heights, forces, overlay):
         finer = next((q for q in FINER if q > tips.points), None)
         if finer:
@@ -118,32 +99,15 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
                 f"them with {BY_CHANCE} at most",
                 fix="give wider strokes; printed ones have 0.1 mm or more",
             )
-    return Contact(
-        forces.reshape(shape),
-        found.pose.z_mm,
-        found.pose.tilt_x_rad,
-        found.pose.tilt_y_rad,
-        "tabs",
-        found.iterations,
-    )
-
-
-def _require_stable(pose: PlatePose, steepest_rad: float) -> None:
-    tilt = max(abs(pose.tilt_x_rad), abs(pose.tilt_y_rad))
-    if tilt > steepest_rad:
-        raise ContactError(
-            f"the plate tips: it comes to rest at a tilt of {math.degrees(tilt):.3g} degrees, "
-            f"beyond {math.degrees(STEEPEST_RAD):.3g}",
-            fix="move the sensor, press with less force, or take a stiffer wrist",
-        )
+    forces = forces.reshape(sensor.shape)
+    return Contact(forces, pose.z_mm, pose.tilt_x_rad, pose.tilt_y_rad, "tabs", found.iterations)
 
 
 def _met_by_chance(heights_mm: Array, forces_n: Array, overlay: Overlay) -> int:
     """Return how many tabs meet the surface with a point or two that stand out of their tips.
 
-    None, unless they are several, and the most of those that stand on a step. To stand out is to
-    be higher than the rest of the tip by more than points are apart: what is less steep than 45
-    degrees does not.
+    None, unless they are several, and the most of those that stand on a step. To stand out is to be
+    higher than the rest of the tip by more than points are apart, which is steeper than 45 degrees.
     """
     q = heights_mm.shape[1]
     apart = overlay.tab_diameter_mm / 2 * math.sqrt(math.pi / q)
@@ -154,10 +118,7 @@ def _met_by_chance(heights_mm: Array, forces_n: Array, overlay: Overlay) -> int:
 
 
 def heights_under(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
-    """Return the heights under points (..., 2) of the sensor.
-
-    Refused where they are no numbers, or nothing at all lies under the points.
-    """
+    """Return the heights under points (..., 2) of the sensor; refuse to press on nothing."""
     heights = heights_at(surface, touch, points_mm)
     if heights.max(initial=-math.inf) == -math.inf:
         raise nothing_under(touch)
@@ -165,20 +126,20 @@ def heights_under(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
 
 
 def tabs_at_rest(
-    points_mm: Array, heights_mm: Array, overlay: Overlay, load: PlateLoad
+    points_mm: Array, heights_mm: Array, overlay: Overlay, touch: Touch
 ) -> tuple[PlateRest, Array]:
-    """Return the plate at rest and the force (n,) of each tab; what hangs free is left out.
+    """Return the plate at rest and the force (n,) of each tab.
 
     The plate's rest is predicted, and points of (n, q) well below it are not computed. If one of
     them touches after all, it is taken in and the rest is computed again.
     """
     n, q = heights_mm.shape
     skin, column = tip_laws(overlay, q)
-    predicted, depth = predicted_pose(points_mm, heights_mm, overlay, load)
+    predicted, depth = predicted_pose(points_mm, heights_mm, overlay, touch)
     points, heights = points_mm.reshape(-1, 2), heights_mm.ravel()
     pressed = heights - predicted.heights_mm(points)
     kept = pressed >= min(-MARGIN * depth, float(pressed.max()))
-    if min(load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad) == 0:
+    if min(touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad) == 0:
         kept = heights > -math.inf  # the hull of all points decides whether a free plate stands
     while True:
         some = np.flatnonzero(kept)
@@ -190,7 +151,7 @@ def tabs_at_rest(
         compressed = predicted_columns(pressed[some], starts, q, overlay)
         columns = Columns(column, starts, np.cumsum(first) - 1, compressed)
         found = rest(
-            points.take(some, axis=0), heights[some], skin, load,
+            points.take(some, axis=0), heights[some], skin, touch,
             columns=columns, start=predicted, tolerance=TOLERANCE,
         )  # fmt: skip
         missed = (heights > found.pose.heights_mm(points)) & ~kept
@@ -199,9 +160,6 @@ def tabs_at_rest(
             forces[of_tab[starts]] = np.add.reduceat(found.forces_n, starts)
             return found, forces
         kept |= missed
-
-
-_PLAIN = Tips()
 
 
 @lru_cache(maxsize=16)
@@ -216,7 +174,7 @@ def tip_laws(overlay: Overlay, points: int) -> tuple[NeoHooke, NeoHooke]:
     )
 
 
-def checked_tabs(overlay: Overlay) -> None:
+def _check_tabs(overlay: Overlay) -> None:
     """Refuse an overlay that is no tabs, or of no size."""
     if overlay.kind != "tab":
         raise ContactError(
@@ -232,7 +190,7 @@ def checked_tabs(overlay: Overlay) -> None:
 
 
 def predicted_pose(
-    points_mm: Array, heights_mm: Array, overlay: Overlay, load: PlateLoad
+    points_mm: Array, heights_mm: Array, overlay: Overlay, touch: Touch
 ) -> tuple[PlatePose, float]:
     """Return a prediction of the plate at rest, and of the depth of the tabs.
 
@@ -241,14 +199,14 @@ def predicted_pose(
     """
     q = heights_mm.shape[1]
     level = heights_mm
-    if load.tilt_x_rad or load.tilt_y_rad:
-        unloaded = PlatePose(0.0, load.tilt_x_rad, load.tilt_y_rad)
+    if touch.tilt_x_rad or touch.tilt_y_rad:
+        unloaded = PlatePose(0.0, touch.tilt_x_rad, touch.tilt_y_rad)
         level = heights_mm - unloaded.heights_mm(points_mm)
     high = level > level.max() - overlay.height_mm / 4
     share = high.astype(np.float64) @ np.full(q, 1 / q)
     stiffer = float(share @ ((1 + SKIN) / (1 + SKIN * share))) / max(float(share.sum()), 1 / q)
     area = math.pi * overlay.tab_diameter_mm**2 / 4 * stiffer**CRUSHED
-    free = min(load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad) == 0
+    free = min(touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad) == 0
     some = slice(None, None, SAMPLED)
     if free or not heights_mm[:, some].max() > -math.inf:
         some = slice(None)  # a needle, or a hull that matters
@@ -256,9 +214,9 @@ def predicted_pose(
     heights = heights_mm[:, some].ravel()
     area *= len(heights_mm) / heights.size
     law = NeoHooke(overlay.young_mpa * area / overlay.height_mm, overlay.height_mm)
-    z = level.max() - _level_depth(-np.sort(-level[:, some], axis=None), law, load.force_n)
-    start = PlatePose(float(z), load.tilt_x_rad, load.tilt_y_rad)
-    found = rest(points, heights, law, load, start=start, tolerance=0.02)
+    z = level.max() - _level_depth(-np.sort(-level[:, some], axis=None), law, touch.force_n)
+    start = PlatePose(float(z), touch.tilt_x_rad, touch.tilt_y_rad)
+    found = rest(points, heights, law, touch, start=start, tolerance=0.02)
     return found.pose, max(float((heights - found.pose.heights_mm(points)).max()), 0.0)
 
 

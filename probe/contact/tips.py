@@ -35,22 +35,10 @@ class Tips:
 
 
 def tip_points(sensor: SensorType, tips: Tips) -> tuple[Array, Array]:
-    """Return the sample points of the tips, and their depths.
+    """Return the sample points (rows * columns, q, 2) of the tips, row by row, and their depths.
 
-    Parameters
-    ----------
-    sensor
-        Tabs have round tips, a pad the squares of its tactels.
-    tips
-        Number of points, dome and defects.
-
-    Returns
-    -------
-    points_mm
-        (rows * columns, q, 2), sensor frame, row by row.
-    drop_mm
-        (rows * columns, q) depth below the plane of the undeformed tips, z away from the
-        object: negative for a tab that is longer than drawn.
+    The depths (rows * columns, q) mm lie below the plane of the undeformed tips, z away from the
+    object: negative for a tab that is longer than drawn.
 
     Raises
     ------
@@ -58,7 +46,7 @@ def tip_points(sensor: SensorType, tips: Tips) -> tuple[Array, Array]:
         When the number of points is none of the patterns', or a shape is wrong.
     """
     points, drop = _draw_tips(sensor, tips.points, tips.dome_mm)
-    shape = (sensor.rows, sensor.columns)
+    shape = sensor.shape
     if tips.shifts_mm is not None:
         shifts = _require_shape(tips.shifts_mm, (*shape, 2), "shifts")
         points = points + shifts.reshape(-1, 1, 2)

@@ -99,15 +99,10 @@ def take_lock(descriptor: int) -> None:
 def is_locked(path: Path) -> bool:
     """Tell whether a running process holds the lock on this file."""
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        with open(path, "rb") as file:
+            answer = fcntl.fcntl(file, fcntl.F_OFD_GETLK, _lock_request(fcntl.F_RDLCK))
     except OSError:
         return False
-    try:
-        answer = fcntl.fcntl(descriptor, fcntl.F_OFD_GETLK, _lock_request(fcntl.F_RDLCK))
-    except OSError:
-        return False
-    finally:
-        os.close(descriptor)
     kind: int = struct.unpack(_FLOCK, answer)[0]
     return kind != fcntl.F_UNLCK
 
@@ -149,13 +144,9 @@ def series_of(path: Path) -> list[tuple[int, Path]]:
 
 
 def check_name(path: Path, *, replace: bool) -> None:
-    """Refuse a name that no recording can have, or that is taken.
+    """Refuse a name that no recording can have, or that is taken and not to be replaced.
 
-    Raises
-    ------
-    RecordingError
-        Another suffix than .h5 or .hdf5; or a recording of that name exists, and `replace` is
-        not set.
+    Raises RecordingError: another suffix than .h5 or .hdf5, or a recording of that name.
     """
     if path.suffix not in (".h5", ".hdf5") or is_part(path):
         raise RecordingError(
@@ -177,14 +168,10 @@ def final_name(
 
     Parameters
     ----------
-    part
-        The closed file.
-    path
-        The name that was asked for.
-    number
-        Of the file in its recording, from 1.
-    last
-        Whether the recording ends with this one.
+    part, path
+        The closed file, and the name that was asked for.
+    number, last
+        Of the file in its recording, from 1, and whether the recording ends with it.
     replace
         Remove the files of an older recording of that name.
 
@@ -211,24 +198,21 @@ def final_name(
 
 def next_free(folder: Path, stem: str, suffix: str) -> Path:
     """Return the first free name of STEM-001, STEM-002, ..."""
-    for number in count(1):
-        path = folder / f"{stem}-{number:03d}{suffix}"
-        related = (path, part_of(path), path.with_suffix(".npy"))
-        if not any(other.exists() for other in related):
-            return path
-    raise AssertionError
+    paths = (folder / f"{stem}-{number:03d}{suffix}" for number in count(1))
+    return next(
+        path
+        for path in paths
+        if not any(one.exists() for one in (path, part_of(path), path.with_suffix(".npy")))
+    )
 
 
 def _missing_error(path: Path) -> RecordingError:
-    part = part_of(path)
-    if not is_part(path) and part.exists():
-        return not_closed_error(part)
+    if not is_part(path) and part_of(path).exists():
+        return not_closed_error(part_of(path))
+    fix = "check the name of the file"
     if is_part(path) and final_of(path).exists():
         fix = f"it was closed meanwhile: read {final_of(path).name}"
-        return RecordingError("there is no such recording", fix=fix, place=str(path))
-    return RecordingError(
-        "there is no such recording", fix="check the name of the file", place=str(path)
-    )
+    return RecordingError("there is no such recording", fix=fix, place=str(path))
 
 
 def _lock_request(kind: int) -> bytes:

@@ -5,12 +5,10 @@
   libhdf5 walks along the lengths, and never stops where a damaged file says zero.
 - Links and headers: HDF5 lets a dataset stand in any other file, and lets 1,400 bytes claim
   10^9 images. A recording holds all its values itself, and no more than its size allows.
-- A file without its end: `h5py.File(path, "r")` refuses a file whose writer was killed ("may use
-  h5clear", a programme that pip does not bring) and one that is shorter than it says. Through a
-  Python file HDF5 looks at no flags; only the length must be right (`PaddedFile`).
+- A file without its end: `h5py.File(path, "r")` refuses a file whose writer was killed, and one
+  that is shorter than it says. Through a Python file HDF5 looks at no flags; only the length must
+  be right (`PaddedFile`).
 
-References
-----------
 HDF5 File Format Specification 3.0, II.A: superblock; III.E: global heap; IV.A.2: link, data layout
 and external data files messages. RFC 1951: deflate packs at most 1,032 bytes into one.
 """
@@ -104,9 +102,8 @@ def open_hdf5(
 class Superblock:
     """The first bytes of an HDF5 file: who left it open, and how long it should be."""
 
-    version: int
     writing: bool  #: opened for writing and not closed
-    swmr: bool  #: opened so that others can read it meanwhile
+    blank: bool  #: nothing was flushed yet: not opened for readers
     end: int  #: bytes that the file should have
     size: int  #: bytes that it has
 
@@ -116,24 +113,13 @@ class Superblock:
         return self.size < self.end
 
     @property
-    def blank(self) -> bool:
-        """Whether nothing was flushed yet."""
-        return self.writing and not self.swmr
-
-    @property
     def whole(self) -> bool:
         """Whether it was closed by its writer and has its whole length."""
         return not self.writing and not self.truncated
 
 
 def superblock_of(path: Path) -> Superblock | None:
-    """Return the superblock of a file; None if it is no HDF5 file.
-
-    Raises
-    ------
-    OSError
-        The file cannot be read.
-    """
+    """Return the superblock of a file; None if it is no HDF5 file, OSError if it is unreadable."""
     size = os.path.getsize(path)
     with open(path, "rb") as file:
         start = 0
@@ -152,10 +138,9 @@ def _parse_superblock(head: bytes, size: int) -> Superblock | None:
         return None
     width = head[13] if version < 2 else head[9]
     flags = head[11] if version >= 3 else 0
-    at, end = _END_AT[version], size
-    if width == 8 and len(head) >= at + 8:
-        end = int.from_bytes(head[at : at + 8], "little")
-    return Superblock(version, bool(flags & _WRITING), bool(flags & _SWMR), end, size)
+    at, writing = _END_AT[version], bool(flags & _WRITING)
+    end = _number(head, at) if width == 8 and len(head) >= at + 8 else size
+    return Superblock(writing, writing and not flags & _SWMR, end, size)
 
 
 class PaddedFile(io.RawIOBase):
@@ -170,10 +155,6 @@ class PaddedFile(io.RawIOBase):
         self._file = file
         self._length = max(head.end, head.size)
         self._at = 0
-
-    def readable(self) -> bool:
-        """Say that it can be read."""
-        return True
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
         """Go to a place."""
@@ -193,9 +174,7 @@ class PaddedFile(io.RawIOBase):
 def check_file(file: h5py.File, path: Path) -> list[h5py.h5d.DatasetID]:
     """Check an open HDF5 file before anything in it is read.
 
-    Returns
-    -------
-    Datasets to be kept open as long as the file, so that their large chunks are not unpacked
+    Returns datasets to be kept open as long as the file: so their large chunks are not unpacked
     again for every block.
 
     Raises
@@ -247,7 +226,11 @@ def check_file(file: h5py.File, path: Path) -> list[h5py.h5d.DatasetID]:
                 if cache is not None:
                     held.append(h5py.h5d.open(group, name, cache))
     for group, name, place in soft:  # no link of the file leads out of it: these can be followed
-        if not _resolves(group, name):
+        try:
+            resolves = h5py.h5o.exists_by_name(group, name)
+        except RuntimeError:  # a link to itself, or through something that is no group
+            resolves = False
+        if not resolves:
             raise RecordingError(
                 f"{place[:80]} is a link that leads nowhere",
                 fix="delete the link, or copy the images into a file of their own",
@@ -271,15 +254,6 @@ def _links(group: h5py.h5g.GroupID) -> list[tuple[bytes, int]]:
     return found
 
 
-def _resolves(group: h5py.h5g.GroupID, name: bytes) -> bool:
-    import h5py
-
-    try:
-        return bool(h5py.h5o.exists_by_name(group, name))
-    except RuntimeError:  # a link to itself, or through something that is no group
-        return False
-
-
 def _checked_cache(
     dataset: h5py.h5d.DatasetID, path: Path, place: str, most: int
 ) -> h5py.h5p.PropDAID | None:
@@ -298,24 +272,23 @@ def _checked_cache(
     chunk = made.get_chunk() if chunked else (1,) * len(shape)
     piece = math.prod(chunk) * size
     pieces = math.prod(-(-n // c) for n, c in zip(shape, chunk, strict=True))
-    asked = pieces * (max(piece, _PIECE) if chunked else piece)
     if chunked and piece > _MOST_CHUNK:
         raise RecordingError(
             f"{place[:80]} is stored in chunks of {piece:,} bytes, {_MOST_CHUNK:,} can be read",
             fix="save it in smaller chunks, of 64 images each",
             place=str(path),
         )
-    if asked > most:
+    if pieces * (max(piece, _PIECE) if chunked else piece) > most:
         raise RecordingError(
             f"{place[:80]} claims {' x '.join(map(str, shape))} values, more than a file of "
             f"{path.stat().st_size:,} bytes can hold",
             fix="save only what was measured, without a place for more",
             place=str(path),
         )
-    access = dataset.get_access_plist()
-    slots, usual, weight = access.get_chunk_cache()
     if not chunked or piece <= _LARGE_CHUNK:
         return None
+    access = dataset.get_access_plist()
+    slots, usual, weight = access.get_chunk_cache()
     access.set_chunk_cache(slots, max(piece, usual), weight)
     return access
 
@@ -329,19 +302,14 @@ def _leads_out(path: Path, place: str) -> RecordingError:
 
 
 def strings_end(path: Path) -> bool:
-    """Tell whether every collection of strings in the beginning of a file has an end.
-
-    Raises
-    ------
-    OSError
-        The file cannot be read.
-    """
+    """Tell whether every collection of strings in the beginning of a file has an end."""
     room = 2 * path.stat().st_size  # collections lie apart; those that were freed may overlap
     with open(path, "rb") as file:
         for start in _heaps(file):
-            data = _objects(file, start)
-            room -= len(data)
-            if room < 0 or not _ends(data):
+            file.seek(start + 8)
+            objects = file.read(max(0, min(_number(file.read(8), 0), _SEARCHED) - _HEAD))
+            room -= len(objects)
+            if room < 0 or not _ends(objects):
                 return False
     return True
 
@@ -357,12 +325,6 @@ def _heaps(file: BinaryIO) -> Iterator[int]:
             at = data.find(_HEAP, at + 1)
         if len(data) < _AT_ONCE:
             return
-
-
-def _objects(file: BinaryIO, start: int) -> bytes:
-    """Return the objects of a collection, as far as the file has them."""
-    file.seek(start + 8)
-    return file.read(max(0, min(_number(file.read(8), 0), _SEARCHED) - _HEAD))
 
 
 def _ends(data: bytes) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import RecordingError
-from probe.recording.files import explain_errors
+from probe.recording.files import draft_of, explain_errors, final_name
 from probe.recording.guard import MOST_TACTELS, open_hdf5
 from probe.recording.layout import (
     CHUNK,
@@ -52,10 +52,7 @@ def open_hdf5_frames(
 ) -> Iterator[FrameFile]:
     """Open an HDF5 file of frames; see `open_hdf5`.
 
-    Raises
-    ------
-    RecordingError
-        It is no recording, is of a newer format, damaged, or not closed (and not `live`).
+    Raises RecordingError also where it is no recording, or of a newer format.
     """
     with open_hdf5(path, live=live, damaged=damaged) as (file, head):
         yield _checked(file, path, closed=head.whole)
@@ -67,12 +64,8 @@ def write_hdf5(
     """Write a recording as a file that will be called `place`; returns the number of its frames.
 
     When something fails, the draft is removed. The HDF5 library crashes when it cannot write, so
-    it writes to a `_Draft`, which raises afterwards.
-
-    Raises
-    ------
-    RecordingError
-        The folder cannot be written, the disk is full.
+    it writes to a `_Draft`, which raises afterwards: RecordingError, the folder cannot be written
+    or the disk is full.
     """
     import h5py
 
@@ -97,6 +90,15 @@ def write_hdf5(
     return written
 
 
+def write_recording(
+    out: Path, origin: RecordingOrigin, blocks: Iterable[FrameBlock], *, replace: bool
+) -> None:
+    """Write a recording of one file under its name, whole or not at all; see `write_hdf5`."""
+    draft = draft_of(out)
+    write_hdf5(draft, origin, blocks, out)
+    final_name(draft, out, replace=replace)
+
+
 class _Draft(io.FileIO):
     """A file that takes whatever is written; `check` raises the first error that occurred."""
 
@@ -105,12 +107,10 @@ class _Draft(io.FileIO):
         self.failure: OSError | None = None
 
     def check(self) -> None:
-        """Raise what went wrong."""
         if self.failure is not None:
             raise self.failure
 
     def write(self, data: Any) -> int:
-        """Write all of `data`, or note why not."""
         rest = memoryview(data)
         try:
             while rest and self.failure is None:
@@ -120,7 +120,6 @@ class _Draft(io.FileIO):
         return len(data)
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the length, or note why not."""
         try:
             return super().truncate(size)
         except OSError as error:
@@ -129,11 +128,11 @@ class _Draft(io.FileIO):
 
 
 def _append_block(file: h5py.File, block: FrameBlock, first: int) -> None:
-    """Append frames: the datasets are made first, and what belongs to a frame lies near it.
+    """Append frames: what belongs to a frame lies near it.
 
-    A truncated copy then holds all of the frames that reached it.
+    The datasets are made first, so a truncated copy holds all of the frames that reached it.
     """
-    datasets = {name: values for name, values in block.datasets().items() if values is not None}
+    datasets = block.datasets()
     for name in datasets:
         if name not in file:
             shape = block.counts.shape[1:] if name == "frames" else DATASETS[name][0]
@@ -197,7 +196,7 @@ def _checked(file: h5py.File, path: Path, *, closed: bool) -> FrameFile:
             fix="import a part of each image",
             place=str(path),
         )
-    lengths = [shape[0] for shape in shapes.values()]
+    lengths = {shape[0] for shape in shapes.values()}
     ours = {name: attributes.pop(name, None) for name in _OURS} if own else {}
     origin = RecordingOrigin(
         str(attributes.pop("sensor", "")),
@@ -214,7 +213,7 @@ def _checked(file: h5py.File, path: Path, *, closed: bool) -> FrameFile:
         piece=int(ours.get("piece") or 1),
         frames=min(lengths),
         shape=(rows, columns),
-        even=len(set(lengths)) == 1,
+        even=len(lengths) == 1,
         poses="pose" in names,
         read=lambda start, stop: _read_block(file, path, start, stop),
     )

@@ -30,9 +30,9 @@ from numpy.typing import NDArray
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from probe.errors import RecordingError
 from probe.frame import WRIST
-from probe.recording.files import check_name, draft_of, explain_errors, final_name
+from probe.recording.files import check_name, explain_errors
 from probe.recording.guard import open_hdf5
-from probe.recording.hdf5 import write_hdf5
+from probe.recording.hdf5 import write_recording
 from probe.recording.layout import NOMINAL_HZ, FrameBlock, RecordingOrigin
 from probe.recording.read import Recording
 from probe.recording.table import table_header
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 SUFFIXES: Final = (".png", ".pgm", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg")
 _AT_ONCE: Final = 1024  #: images read at a time
-_FULL: Final = 65535
+_FULL: Final = 65535  #: counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,6 @@ def import_array(
     rate_hz: float = NOMINAL_HZ,
     sensor: str = "",
     sensor_type: str | SensorType | None = None,
-    calibration: str = "",
     replace: bool = False,
 ) -> Recording:
     """Make a recording from an array of images.
@@ -78,7 +77,7 @@ def import_array(
         Which array, when there are several.
     rate_hz
         Frames per second; the array does not tell.
-    sensor, calibration
+    sensor
         What the recording shall say about its origin.
     sensor_type
         A type, its name or file: whose images they are; `fsr-16` if not given.
@@ -103,16 +102,12 @@ def import_array(
         if scale:
             more |= {"scale": scale.scale, "scale_offset": scale.offset}
         units = "counts" if scale is None or scale.scale == kind.unit else "scaled"
-        origin = RecordingOrigin(
-            sensor, calibration, units, sensor_type_text(kind), MappingProxyType(more)
-        )
+        origin = RecordingOrigin(sensor, "", units, sensor_type_text(kind), MappingProxyType(more))
         blocks = (
             _block(images, first, scale, 1e9 / rate_hz)
             for first, images in _images(found, kind.shape)
         )
-        draft = draft_of(out)
-        write_hdf5(draft, origin, blocks, out)
-    final_name(draft, out, replace=replace)
+        write_recording(out, origin, blocks, replace=replace)
     return Recording(out)
 
 
@@ -296,13 +291,14 @@ def _hdf5_arrays(file: h5py.File) -> list[FileArray]:
 
 
 def _dataset(name: str, dataset: h5py.Dataset) -> FileArray:
+    reverse = "MATLAB_class" in dataset.attrs
+    shape = dataset.shape[::-1] if reverse else dataset.shape
+
     def part(slices: tuple[slice, ...]) -> NDArray[Any]:
         with explain_errors(Path(dataset.file.filename), "read"):
             read: NDArray[Any] = dataset[slices[::-1]].T if reverse else dataset[slices]
         return read
 
-    reverse = "MATLAB_class" in dataset.attrs
-    shape = dataset.shape[::-1] if reverse else dataset.shape
     return FileArray(name, tuple(map(int, shape)), dataset.dtype, part)
 
 

@@ -47,6 +47,7 @@ from probe.recording.layout import (
     FrameFile,
     RecordingOrigin,
     are_rigid,
+    json_value,
 )
 
 _MAGIC: Final = b"TOUCHLOG"
@@ -60,17 +61,8 @@ _ORIGIN: Final = ("sensor", "calibration", "units", "sensor_type")
 class JournalWriter:
     """A journal that is being written, and the lock on it.
 
-    Parameters
-    ----------
-    path
-        A name that is free.
-    origin, piece
-        What the head says; `piece` is the number in a series, from 1.
-
-    Raises
-    ------
-    RecordingError
-        The name is taken, the folder cannot be written, the disk is full.
+    `path` is a name that is free, `piece` the number in a series, from 1. Raises RecordingError:
+    the name is taken, the folder cannot be written, the disk is full.
     """
 
     def __init__(self, path: Path, origin: RecordingOrigin, piece: int = 1) -> None:
@@ -89,11 +81,9 @@ class JournalWriter:
     def append(self, block: FrameBlock) -> None:
         """Append frames; when this returns, they are safe.
 
-        Raises
-        ------
-        RecordingError
-            There is no space for more frames; those before are safe, and these if `frames`
-            counts them.
+        Raises RecordingError: no space for more frames. Those before are safe, and these if
+        `frames`
+        counts them.
         """
         rows, columns = block.counts.shape[1:]
         dtype = _record_type((rows, columns))
@@ -118,7 +108,6 @@ class JournalWriter:
         self._end = at
 
     def _reserve(self, needed: int) -> None:
-        """Make sure of space for `needed` more bytes."""
         if self._end + needed > self._reserved - _RESERVED // 2:
             self._reserved = self._end + needed + _RESERVED
             os.posix_fallocate(self._descriptor, 0, self._reserved)
@@ -134,10 +123,7 @@ def is_journal(path: Path) -> bool:
 def open_journal(path: Path, *, live: bool = False) -> Iterator[FrameFile]:
     """Open a journal for reading; its frames are the records to the last whole one.
 
-    Raises
-    ------
-    RecordingError
-        It is damaged, without frames, or still being written (and not `live`).
+    Raises RecordingError: damaged, without frames, or still being written (and not `live`).
     """
     if not live and is_locked(path):
         raise not_closed_error(path)
@@ -187,7 +173,6 @@ class _Records:
             self.number -= 1
 
     def read(self, first: int, stop: int) -> NDArray[Any]:
-        """Return records `first` ... `stop` - 1."""
         size = self._dtype.itemsize
         self._file.seek(self._start + first * size)
         data = self._file.read((min(stop, self.number) - first) * size)
@@ -213,16 +198,10 @@ def _make_file(path: Path) -> int:
 
 
 def _record_type(shape: tuple[int, int]) -> np.dtype[Any]:
-    return np.dtype(
-        [
-            ("counts", "<u2", shape),
-            ("wrist", "<u2", WRIST),
-            ("t_ns", "<i8"),
-            ("seq", "<i8"),
-            ("pose", "<f8", (4, 4)),
-            ("crc", "<u4"),
-        ]
-    )
+    return np.dtype([
+        ("counts", "<u2", shape), ("wrist", "<u2", WRIST), ("t_ns", "<i8"), ("seq", "<i8"),
+        ("pose", "<f8", (4, 4)), ("crc", "<u4"),
+    ])  # fmt: skip
 
 
 def _records(block: FrameBlock, dtype: np.dtype[Any]) -> bytes:
@@ -238,11 +217,11 @@ def _block(records: NDArray[Any], *, poses: bool) -> FrameBlock:
     """Return records as frames; ValueError where one is damaged."""
     if not _is_whole(records):
         raise ValueError("a record with a wrong CRC")
+    if poses and not are_rigid(records["pose"]):
+        raise ValueError("a pose that is no rigid transform")
     counts, t_ns, seq, wrist, pose = (
         np.array(records[name]) for name in ("counts", "t_ns", "seq", "wrist", "pose")
     )
-    if poses and not are_rigid(pose):
-        raise ValueError("a pose that is no rigid transform")
     return FrameBlock(counts, t_ns, seq, wrist, pose if poses else None).frozen()
 
 
@@ -266,7 +245,7 @@ def _head(origin: RecordingOrigin, piece: int, shape: tuple[int, int]) -> bytes:
         **{name: getattr(origin, name) for name in _ORIGIN},
         "more": dict(origin.more),
     }
-    text = json.dumps(said, default=_plain).encode()
+    text = json.dumps(said, default=json_value).encode()
     return _MAGIC + _SUMS.pack(len(text), zlib.crc32(text)) + text
 
 
@@ -281,8 +260,3 @@ def _read_head(file: BinaryIO) -> tuple[dict[str, Any], int]:
         return dict(json.loads(text)), file.tell()
     except RecursionError as error:
         raise ValueError("a head nested too deep") from error
-
-
-def _plain(value: Any) -> Any:
-    """Return an attribute as JSON can hold it."""
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)

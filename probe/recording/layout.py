@@ -12,11 +12,9 @@
     recordings of old), calibration (hash; empty: none), units, piece (number in a series,
     from 1), and what the writer adds
 
-Only /frames is needed to be read: any HDF5 file with counts
-(N, rows, columns) there is a recording.
-Without /seq frames are numbered from 0, without /t_ns they come at 220 frames a second.
-All datasets are chunked and compressed by shuffle and deflate, which every HDF5 library
-reads, in the file format of HDF5 1.10, whose metadata have checksums.
+Any HDF5 file with counts (N, rows, columns) in /frames is a recording; without /seq frames are
+numbered from 0, without /t_ns they come at 220 a second. Datasets are chunked and compressed by
+shuffle and deflate, in the file format of HDF5 1.10, whose metadata have checksums.
 """
 
 from __future__ import annotations
@@ -60,6 +58,11 @@ class RecordingOrigin:
     more: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
 
+def json_value(value: Any) -> Any:
+    """Return an attribute that JSON does not know as one that it does (`default` of `json`)."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameBlock:
     """Consecutive frames of a recording; arrays are read-only."""
@@ -79,21 +82,16 @@ class FrameBlock:
         images, readings = np.empty((0, *shape), np.uint16), np.empty((0, WRIST), np.uint16)
         return cls(images, np.empty(0, np.int64), np.empty(0, np.int64), readings, None)
 
-    def datasets(self) -> dict[str, NDArray[Any] | None]:
-        """Return the arrays under the names that they have in a file."""
-        return {
-            "frames": self.counts,
-            "t_ns": self.t_ns,
-            "seq": self.seq,
-            "wrist": self.wrist,
-            "pose": self.pose,
-        }
+    def datasets(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays under the names that they have in a file; `pose` where it is known."""
+        arrays = (self.counts, self.t_ns, self.seq, self.wrist, self.pose)
+        named = zip(DATASETS, arrays, strict=True)
+        return {name: array for name, array in named if array is not None}
 
     def frozen(self) -> FrameBlock:
         """Make the arrays read-only, and return the block."""
         for array in self.datasets().values():
-            if array is not None:
-                array.setflags(write=False)
+            array.setflags(write=False)
         return self
 
     def frame(self, i: int) -> Frame:
@@ -104,16 +102,14 @@ class FrameBlock:
 
 def block_of(frames: Sequence[Frame]) -> FrameBlock:
     """Return frames as a block; with poses if any frame has one."""
-    pose = None
-    if any(frame.pose is not None for frame in frames):
-        unknown = np.full((4, 4), np.nan)
-        pose = np.stack([unknown if frame.pose is None else frame.pose for frame in frames])
+    unknown = np.full((4, 4), np.nan)
+    poses = [unknown if frame.pose is None else frame.pose for frame in frames]
     return FrameBlock(
         np.stack([frame.counts for frame in frames]),
         np.array([frame.t_ns for frame in frames], np.int64),
         np.array([frame.seq for frame in frames], np.int64),
         np.stack([frame.wrist for frame in frames]),
-        pose,
+        np.stack(poses) if any(frame.pose is not None for frame in frames) else None,
     )
 
 
@@ -121,31 +117,23 @@ def join_blocks(blocks: Sequence[FrameBlock], shape: tuple[int, int]) -> FrameBl
     """Return consecutive blocks as one; without any, an empty one of images of that shape."""
     if len(blocks) < 2:
         return blocks[0] if blocks else FrameBlock.empty(shape)
-    pose = None
-    if any(block.pose is not None for block in blocks):
-        pose = np.concatenate(
-            [
-                np.full((len(block), 4, 4), np.nan) if block.pose is None else block.pose
-                for block in blocks
-            ]
-        )
+    poses = [np.full((len(b), 4, 4), np.nan) if b.pose is None else b.pose for b in blocks]
     return FrameBlock(
         np.concatenate([block.counts for block in blocks]),
         np.concatenate([block.t_ns for block in blocks]),
         np.concatenate([block.seq for block in blocks]),
         np.concatenate([block.wrist for block in blocks]),
-        pose,
+        np.concatenate(poses) if any(block.pose is not None for block in blocks) else None,
     ).frozen()
 
 
 def are_rigid(poses: NDArray[Any]) -> bool:
     """Tell whether poses (n, 4, 4) are rigid transforms, or NaN."""
     known = poses[~np.isnan(poses).all(axis=(1, 2))].astype(np.float64)
-    if not np.isfinite(known).all():
-        return False
     turn = known[:, :3, :3]
     return bool(
-        np.allclose(turn @ turn.transpose(0, 2, 1), np.eye(3), atol=1e-6)
+        np.isfinite(known).all()
+        and np.allclose(turn @ turn.transpose(0, 2, 1), np.eye(3), atol=1e-6)
         and (known[:, 3] == (0, 0, 0, 1)).all()
     )
 

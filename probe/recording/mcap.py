@@ -29,9 +29,9 @@ from encoded_objects.base.errors import require
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from probe.errors import FrameError, RecordingError
 from probe.frame import Frame, frame_from
-from probe.recording.files import check_name, draft_of, explain_errors, final_name
-from probe.recording.hdf5 import write_hdf5
-from probe.recording.layout import FrameBlock, RecordingOrigin, block_of
+from probe.recording.files import check_name, explain_errors
+from probe.recording.hdf5 import write_recording
+from probe.recording.layout import FrameBlock, RecordingOrigin, block_of, json_value
 from probe.recording.read import Recording
 from probe.recording.ros import (
     BASE_FRAME,
@@ -53,19 +53,9 @@ _ENCODINGS: Final = {"32FC1": "f4", "16UC1": "u2", "mono16": "u2", "mono8": "u1"
 
 
 class McapWriter:
-    """An MCAP file of ROS 2 messages that is being written.
+    """An MCAP file of ROS 2 messages that is being written to a stream.
 
-    Parameters
-    ----------
-    stream
-        Where it goes.
-    origin
-        Where the frames come from.
-
-    Raises
-    ------
-    MissingExtraError
-        The libraries of the extra `robot` are not installed.
+    Raises MissingExtraError: the libraries of the extra `robot` are not installed.
     """
 
     def __init__(self, stream: IO[bytes], origin: RecordingOrigin) -> None:
@@ -79,7 +69,7 @@ class McapWriter:
             "calibration": origin.calibration,
             "units": origin.units,
             "sensor_type": origin.sensor_type,
-            "more": json.dumps({name: _plain(value) for name, value in origin.more.items()}),
+            "more": json.dumps(dict(origin.more), default=json_value),
         }
         self._writer.add_metadata(METADATA, said)
 
@@ -113,10 +103,7 @@ class McapWriter:
 def export_mcap(recording: Recording, out: Path) -> int:
     """Write a recording as an MCAP file; returns the number of frames.
 
-    Raises
-    ------
-    RecordingError
-        The recording cannot be read, or the file not be written.
+    Raises RecordingError: the recording cannot be read, or the file not be written.
     """
     with (
         explain_errors(out, "write"),
@@ -126,13 +113,6 @@ def export_mcap(recording: Recording, out: Path) -> int:
         for frame in recording.frames():
             writer.frame(frame)
     return len(recording)
-
-
-def _plain(value: Any) -> Any:
-    """Return a value of an attribute as JSON holds it."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def import_mcap(
@@ -159,9 +139,7 @@ def import_mcap(
     if sensor_type and not origin.sensor_type:
         kind = choose_sensor_type(sensor_type, "", None, str(path))
         origin = dataclasses.replace(origin, sensor_type=sensor_type_text(kind))
-    draft = draft_of(out)
-    write_hdf5(draft, origin, _blocks(frames, path), out)
-    final_name(draft, out, replace=replace)
+    write_recording(out, origin, _blocks(frames, path), replace=replace)
     return Recording(out)
 
 

@@ -8,7 +8,7 @@ it is, to its last whole record.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -55,17 +55,17 @@ class Recording:
     Examples
     --------
     >>> import tempfile
+    >>> import h5py
     >>> import numpy as np
-    >>> from probe.frame import frame_from
-    >>> from probe.recording.record import Recorder
-    >>> path = Path(tempfile.mkdtemp()) / "touch.h5"
-    >>> with Recorder(path) as recorder:
-    ...     recorder.append(frame_from(np.full((16, 16), 7), t_ns=5, seq=0))
+    >>> from encoded_objects import Recording
+    >>> path = Path(tempfile.mkdtemp()) / "mine.h5"
+    >>> with h5py.File(path, "w") as file:  # any HDF5 file with /frames will do
+    ...     file["frames"] = np.full((3, 16, 16), 7, np.uint16)
     >>> recording = Recording(path)
     >>> print(recording)
-    touch.h5: 1 frame
+    mine.h5: 3 frames
     >>> [int(frame.counts[0, 0]) for frame in recording.frames()]
-    [7]
+    [7, 7, 7]
     """
 
     path: Path | str
@@ -111,18 +111,13 @@ class Recording:
         """Return the number of frames."""
         return sum(file.frames for file in self.files)
 
-    def blocks(
-        self, start: int = 0, stop: int | None = None, size: int = _AT_ONCE
-    ) -> Iterator[FrameBlock]:
-        """Yield frames `start` ... `stop` - 1 as blocks of at most `size` frames.
+    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[FrameBlock]:
+        """Yield frames `start` ... `stop` - 1 as blocks of some hundred frames at most.
 
-        Raises
-        ------
-        RecordingError
-            A value that is no count, a pose that is none, a damaged part of the file.
+        Raises RecordingError: a value that is no count, a pose that is none, a damaged part.
         """
         stop = len(self) if stop is None else min(stop, len(self))
-        size = max(1, min(size, _VALUES_AT_ONCE // (self.shape[0] * self.shape[1])))
+        size = max(1, min(_AT_ONCE, _VALUES_AT_ONCE // (self.shape[0] * self.shape[1])))
         for file in self.files:
             if start < min(stop, file.frames):
                 with open_frames(file.path, live=self.live) as source:
@@ -138,10 +133,7 @@ class Recording:
     def sensor_type(self, asked: str | SensorType | None = None) -> SensorType:
         """Return the type of sensor that made it: the one asked for, else the one it names.
 
-        Raises
-        ------
-        SensorTypeError
-            No such type, one of another shape, or nothing tells.
+        Raises SensorTypeError: no such type, one of another shape, or nothing tells.
         """
         return choose_sensor_type(asked, self.origin.sensor_type, self.shape, str(self.path))
 
@@ -152,33 +144,17 @@ class Recording:
                 yield block.frame(i)
 
 
-def read_frames(path: Path | str, *, live: bool = False) -> Iterator[Frame]:
-    """Return an iterator over the frames of a recording; see `Recording`."""
-    return Recording(path, live=live).frames()
-
-
-@contextmanager
-def open_frames(path: Path, *, live: bool = False, damaged: bool = False) -> Iterator[FrameFile]:
+def open_frames(
+    path: Path, *, live: bool = False, damaged: bool = False
+) -> AbstractContextManager[FrameFile]:
     """Open a file of frames: HDF5, or the journal of one that is not closed.
 
-    Parameters
-    ----------
-    path
-        The file.
-    live
-        Also one that is being written, or that its writer left open.
-    damaged
-        In whatever state; parts may be missing.
-
-    Raises
-    ------
-    RecordingError
-        See `Recording`.
+    `live`: also one that is being written, or that its writer left open; `damaged`: in whatever
+    state, parts may be missing. Raises RecordingError, see `Recording`.
     """
-    opened = open_journal(path, live=live) if is_journal(path) else \
-        open_hdf5_frames(path, live=live, damaged=damaged)  # fmt: skip
-    with opened as file:
-        yield file
+    if is_journal(path):
+        return open_journal(path, live=live)
+    return open_hdf5_frames(path, live=live, damaged=damaged)
 
 
 def _files_of(path: Path, live: bool) -> list[Path]:

@@ -34,20 +34,12 @@ class Recorder:
         `touch.h5`. The file appears under this name when the recording is closed; one that
         rolled over becomes `touch-0001.h5`, `touch-0002.h5`, ... Until then the frames are
         in `touch.part.h5`, readable with `live`.
-    sensor
-        Ident of the probe.
-    sensor_type
-        Of the frames; None where nobody knows.
-    calibration
-        Hash of the calibration that belongs to the sensor; empty if there is none.
-    units
-        What the numbers are.
+    sensor, sensor_type, calibration, units
+        See `RecordingOrigin`; the type is None where nobody knows.
     attributes
         More to be said about the recording: names to texts or numbers.
-    flush_s
-        Device time (s) that a crash may cost, at most.
-    roll_over_s
-        Device time (s) in one file.
+    flush_s, roll_over_s
+        Device time (s) that a crash may cost at most, and that goes into one file.
     replace
         Let the new recording take the place of an older one of the same name.
 
@@ -109,14 +101,20 @@ class Recorder:
     def append(self, frame: Frame) -> None:
         """Take a frame.
 
-        Raises
-        ------
-        RecordingError
-            The recording is closed, the frame is of another shape than those before, or the
-            disk is full; then it has been closed with all frames so far, this one included.
+        Raises RecordingError: the recording is closed, the frame is of another shape than those
+        before, or the disk is full; then it has been closed with all frames so far, this one
+        included.
         """
         self._open_journal()
-        self._check_shape(frame)
+        rows, columns = frame.counts.shape
+        self._shape = self._shape or (rows, columns)
+        if frame.counts.shape != self._shape:
+            raise RecordingError(
+                f"a frame of {rows} x {columns} readings in a recording of {self._shape[0]} x "
+                f"{self._shape[1]}",
+                fix="give the --sensor-type of the sensor, one recording for each",
+                place=str(self.path),
+            )
         if self._piece_began_ns is None:
             self._piece_began_ns = frame.t_ns
         elif not 0 <= frame.t_ns - self._piece_began_ns < self._roll_over_ns:
@@ -149,18 +147,6 @@ class Recorder:
             return
         self.flush()
         self._finish(last=True)
-
-    def _check_shape(self, frame: Frame) -> None:
-        """Refuse a frame that is not of the shape of the sensor type, or of the frames before."""
-        rows, columns = frame.counts.shape
-        self._shape = self._shape or (rows, columns)
-        if frame.counts.shape != self._shape:
-            raise RecordingError(
-                f"a frame of {rows} x {columns} readings in a recording of {self._shape[0]} x "
-                f"{self._shape[1]}",
-                fix="give the --sensor-type of the sensor, one recording for each",
-                place=str(self.path),
-            )
 
     def _open_journal(self) -> JournalWriter:
         if self._journal is None:

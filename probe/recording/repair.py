@@ -11,6 +11,7 @@ import dataclasses
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 from types import MappingProxyType
 
@@ -43,19 +44,10 @@ class RepairResult:
 def repair(path: Path | str) -> RepairResult:
     """Make a recording readable that was not closed, or is damaged or truncated.
 
-    Parameters
-    ----------
-    path
-        The file, `touch.part.h5`, or the name that it should have had, `touch.h5`.
+    `path` is the file, `touch.part.h5`, or the name that it should have had, `touch.h5`. A
+    recording that is whole is left as it is.
 
-    Returns
-    -------
-    Where the recording is and how much of it. One that is whole is left as it is.
-
-    Raises
-    ------
-    RecordingError
-        It is being written, holds nothing that can be read, or the disk is full.
+    Raises RecordingError: it is being written, holds nothing that can be read, or the disk is full.
     """
     path = Path(path)
     if not path.exists() and part_of(path).exists():
@@ -114,8 +106,5 @@ def _free_name(part: Path, piece: int) -> Path:
 
 
 def _first_free(path: Path) -> Path:
-    number, free = 1, path
-    while free.exists():
-        number += 1
-        free = path.with_name(f"{path.stem}-{number}{path.suffix}")
-    return free
+    numbered = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(2))
+    return next(name for name in chain([path], numbered) if not name.exists())

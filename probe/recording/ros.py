@@ -126,16 +126,10 @@ def pose_message(T: ArrayLike, t_ns: int, frame_id: str) -> dict[str, Any]:
 def covariance_message(
     T: ArrayLike, covariance: ArrayLike, t_ns: int, frame_id: str
 ) -> dict[str, Any]:
-    """Return the `geometry_msgs/PoseWithCovarianceStamped` of a pose.
+    """Return the `geometry_msgs/PoseWithCovarianceStamped` of a pose (4, 4), mm.
 
-    Parameters
-    ----------
-    T
-        (4, 4), mm.
-    covariance
-        (6, 6) of (x, y, z, rx, ry, rz), axes of the frame that the pose is given in, mm and rad.
-    t_ns, frame_id
-        When, and that frame.
+    `covariance` (6, 6) is of (x, y, z, rx, ry, rz), mm and rad, in the axes of the frame
+    `frame_id`.
     """
     metres = np.diag([1e-3] * 3 + [1.0] * 3)
     spread = metres @ np.asarray(covariance, np.float64) @ metres

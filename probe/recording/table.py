@@ -7,7 +7,6 @@ known in any frame p00 ... p33, T_base_sensor by rows (mm), empty in the frames 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -19,21 +18,10 @@ from probe.recording.read import Recording
 
 
 def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
-    """Write a recording as a table, and return the number of rows.
+    """Write a recording, with `live` also one that is being written, as a table.
 
-    Parameters
-    ----------
-    path
-        A recording.
-    out
-        The table; it appears when it is complete, and replaces a file of that name.
-    live
-        Also one that is being written.
-
-    Raises
-    ------
-    RecordingError
-        The recording cannot be read, or the table not be written.
+    Returns the number of rows. The table appears when it is complete, and replaces a file of that
+    name. Raises RecordingError: the recording cannot be read, or the table not be written.
     """
     recording, out = Recording(path, live=live), Path(out)
     with (
@@ -41,16 +29,12 @@ def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
         staged_file(out) as draft,
         open(draft, "x", encoding="ascii", newline="") as stream,
     ):
-        _write_csv(recording, stream)
+        poses = any(file.poses for file in recording.files)
+        pose = [f"p{r}{c}" for r in range(4) for c in range(4)] if poses else []
+        stream.write(",".join([*table_header(recording.shape), *pose]) + "\n")
+        for block in recording.blocks():
+            stream.write("".join(line + "\n" for line in _lines(block, poses)))
     return len(recording)
-
-
-def _write_csv(recording: Recording, stream: TextIO) -> None:
-    poses = any(file.poses for file in recording.files)
-    pose = [f"p{r}{c}" for r in range(4) for c in range(4)] if poses else []
-    stream.write(",".join([*table_header(recording.shape), *pose]) + "\n")
-    for block in recording.blocks():
-        stream.write("".join(line + "\n" for line in _lines(block, poses)))
 
 
 def table_header(shape: tuple[int, int]) -> list[str]:

@@ -112,44 +112,6 @@ class Washer(_TopAtZero):
 
 
 @dataclass(frozen=True, slots=True)
-class Sphere(_TopAtZero):
-    """The upper half of a ball whose highest point is the origin."""
-
-    radius_mm: float = 20.0
-    floor_mm: float = -math.inf
-
-    def heights_mm(self, points_mm: Array) -> Array:
-        """Return the ball's height; sqrt(R^2 - r^2) - R without its cancellation."""
-        square = np.einsum("ij,ij->i", points_mm, points_mm)
-        rest = self.radius_mm**2 - square
-        depth = square / (self.radius_mm + np.sqrt(np.maximum(rest, 0.0)))
-        return np.where(rest >= 0, np.maximum(-depth, self.floor_mm), self.floor_mm)
-
-
-@dataclass(frozen=True, slots=True)
-class Paraboloid(_TopAtZero):
-    """z = -r^2 / 2R: the body of the closed formulas of contact."""
-
-    radius_mm: float = 20.0  #: R, of curvature at the top
-
-    def heights_mm(self, points_mm: Array) -> Array:
-        """Return the paraboloid's height."""
-        square: Array = np.einsum("ij,ij->i", points_mm, points_mm)
-        return -square / (2 * self.radius_mm)
-
-
-@dataclass(frozen=True, slots=True)
-class HalfPlane(_TopAtZero):
-    """A flat face that ends at a straight edge: matter where x <= 0."""
-
-    floor_mm: float = -math.inf
-
-    def heights_mm(self, points_mm: Array) -> Array:
-        """Return 0 up to the edge and the floor beyond it."""
-        return np.where(points_mm[:, 0] <= 0, 0.0, self.floor_mm)
-
-
-@dataclass(frozen=True, slots=True)
 class RoughSurface:
     """A random surface of stated rms height and shortest wave: a sum of plane waves.
 

@@ -29,8 +29,7 @@ from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker
 from recognizer.bench.message import mosaic_message
 from recognizer.bench.touch_log import TouchLog
-from recognizer.scan.mosaic.grow import add_touch
-from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
+from recognizer.scan.mosaic.mosaic import Mosaic, add_touch, no_touches
 from recognizer.scan.mosaic.planar import PlacedTouch, decoded_place
 from recognizer.scan.session import Scan
 from recognizer.touch.lab import open_lab

@@ -243,7 +243,7 @@ def _count_places(embossed: EmbossedArray, border: _Border) -> int:
 
 def share_of_borders(found: VerifiedHypothesis, tip_mm: float) -> float:
     """Return the share of foreign borders that the image fits as well as the registered one."""
-    face = found.embossed.face(found.hypothesis.face)
+    face = found.face
     if face.round is not None or tip_mm <= 0.0:
         return 1.0
     pressed, top, bare = _free_tactels(found)

@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.compiled import addresses
-from recognizer.touch.lab import EmbossedArray, cell_keys
+from recognizer.touch.lab import EmbossedArray, EncodedFace, cell_keys
 from recognizer.touch.options import TIE_NATS
+from recognizer.touch.recognition import RunnerUp
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.kernels import kernels
 from recognizer.touch.symbols.linearize import LabelsAt
@@ -57,6 +58,37 @@ class Hypothesis:
     column: int
     face: int  #: number in `EmbossedArray.faces`
     score: float  #: log-likelihood of the image, nats
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceHypothesis:
+    """A registered place of a touch, or of a scan, and the fit that lies there."""
+
+    embossed: EmbossedArray
+    hypothesis: Hypothesis
+    fit: Fit
+    score: float  #: log-likelihood of all images, nats
+
+    @property
+    def face(self) -> EncodedFace:
+        """The face that holds the place."""
+        return self.embossed.face(self.hypothesis.face)
+
+    @property
+    def index(self) -> tuple[int, int]:
+        """Row and column of the array's cell under the sensor's centre."""
+        return under_centre(self.embossed, self.fit, self.hypothesis)
+
+    @property
+    def runner_up(self) -> RunnerUp:
+        """The place as the runner-up of an answer."""
+        return RunnerUp(self.face.object, self.face.face, self.index)
+
+    def coincides(self, other: PlaceHypothesis) -> bool:
+        """Whether both are one place, and neither one a pitch off it."""
+        return self.embossed is other.embossed and coincide(
+            self.embossed, self.fit, self.hypothesis, other.fit, other.hypothesis
+        )
 
 
 def find_hypotheses(
@@ -290,12 +322,6 @@ def under_centre(embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis) -> t
     pitch, array = embossed.style.pitch_mm, embossed.array
     i, j = math.floor(fit.x_mm / pitch), math.floor(fit.y_mm / pitch)
     return (hypothesis.row - j) % array.rows, (hypothesis.column + i) % array.columns
-
-
-def neighbours(embossed: EmbossedArray, a: tuple[int, int], b: tuple[int, int]) -> bool:
-    """Whether two cells are one, up to a cell's rounding."""
-    array = embossed.array
-    return (a[0] - b[0] + 1) % array.rows <= 2 and (a[1] - b[1] + 1) % array.columns <= 2
 
 
 def coincide(

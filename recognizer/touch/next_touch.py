@@ -18,20 +18,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType, force_share
-from recognizer.touch.hypothesis import Hypothesis
-from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.hypothesis import PlaceHypothesis
 from recognizer.touch.options import TIE_NATS
 from recognizer.touch.pose import face_pose
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NextTouch, Recognition
 from recognizer.touch.signal import Signal, combine_around, mean_of_strongest
-from recognizer.touch.symbols.fit import Fit
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -103,26 +100,6 @@ def next_limits(sensor: SensorType) -> NextLimits:
         soft_counts=scale * SOFT_COUNTS,
         gap=2 * reach + 1,
     )
-
-
-class PlaceHypothesis(Protocol):
-    """A possible place of a touch: `VerifiedHypothesis`, or one of a scan."""
-
-    @property
-    def embossed(self) -> EmbossedArray:
-        """Array and style."""
-
-    @property
-    def hypothesis(self) -> Hypothesis:
-        """The place of the fit's lattice."""
-
-    @property
-    def fit(self) -> Fit:
-        """Pose of the sensor on that lattice."""
-
-    @property
-    def score(self) -> float:
-        """Log-likelihood, nats."""
 
 
 def propose_next(
@@ -220,7 +197,7 @@ def _symbols_by_face(
     area: FeltArea, one: PlaceHypothesis, steps: Array, novelty: float, limits: NextLimits
 ) -> tuple[Array, Array]:
     """Return (n,) symbols worth at each step on a face, and whether its centre lies on it."""
-    face = one.embossed.face(one.hypothesis.face)
+    face = one.face
     T = face_pose(one.embossed, face, one.hypothesis, one.fit)
     R, at = T[:2, :2], T[:2, 3]
     own = (face.centres_mm - at) @ R  # in the sensor frame of now

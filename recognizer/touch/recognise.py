@@ -156,10 +156,6 @@ def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: i
     best = found[0]
     other = next((one for one in found[1:] if not best.same_place(one)), None)
     margin = math.inf if other is None else best.score - other.score
-    runner_up = None
-    if other is not None:
-        face = other.embossed.face(other.hypothesis.face)
-        runner_up = RunnerUp(face.object, face.face, other.index)
     adjacent = next((one for one in found[1:] if not best.coincides(one)), None)
     nearest = margin
     if adjacent is not None and best.score - adjacent.score < options.margin_by_few:
@@ -169,7 +165,7 @@ def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: i
         margin = nearest
     return answer_at(
         best.embossed, best.fit if reason else best.last_fit(), best.hypothesis, options, seq,
-        reason=reason, margin=margin, runner_up=runner_up,
+        reason=reason, margin=margin, runner_up=None if other is None else other.runner_up,
     )  # fmt: skip
 
 
@@ -246,7 +242,7 @@ def has_residual(found: VerifiedHypothesis) -> bool:
     poorly = evidence.log_likelihood_ratio < POOR_RATIO and evidence.explained < POORLY_EXPLAINED
     if poorly and strongest >= SOFT * image.noise:
         return True
-    face = found.embossed.face(found.hypothesis.face)
+    face = found.face
     if face.round is not None:
         return False
     points = points_on_face(found, face)[forces > PRESSED * strongest]

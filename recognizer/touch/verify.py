@@ -194,7 +194,7 @@ def _fit_hypotheses(
         scores[n, alike] = log_likelihoods_at(embossed, fit, places)
     for n, (place, best) in enumerate(zip(candidates, scores.argmax(axis=0), strict=True)):
         score = float(scores[best, n])
-        verified.append(VerifiedHypothesis(image, embossed, place, again[best], score))
+        verified.append(VerifiedHypothesis(embossed, place, again[best], score, image))
     return sorted(verified, key=lambda one: -one.score)
 
 
@@ -296,7 +296,7 @@ def _verify_under_curvature(
         best = int(np.argmax(scores))
         fit = each[best]
         seen = bend_image(image, sensor, bend, shares[best : best + 1])
-        found = VerifiedHypothesis(seen, embossed, hypothesis, fit, scores[best], bend)
+        found = VerifiedHypothesis(embossed, hypothesis, fit, scores[best], seen, bend)
     return found
 
 

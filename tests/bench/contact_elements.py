@@ -27,12 +27,13 @@ from reference.elements_axisymmetric import section
 from reference.elements_round import indented, washer_pad
 from reference.elements_space import condensed_pad, elements
 from reference.elements_tab import Tab, compressed, partly_covered
+from reference.indenters import paraboloid, sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Contact, Touch, WristStiffness
 from probe.contact.layer import layer
 from probe.surface.contract import HeightMap
-from probe.surface.indenters import Cross, FlatPlate, Paraboloid, RaisedStrip, Sphere
+from probe.surface.indenters import Cross, FlatPlate, RaisedStrip
 
 PAD = SensorType(overlay=Overlay(kind="pad"))
 INNER, OUTER, FORCE = 3.5, 7.5, 80.0
@@ -52,8 +53,8 @@ HELD_OUT: tuple[tuple[str, HeightMap, Touch, Walls], ...] = (
         Touch(-3.0, -2.0, 0.0, 8.0),
         ((2.3, 3.7), (2.5, 6.5)),
     ),
-    ("sphere R = 20 mm", Sphere(20.0), Touch(1.3, -0.7, 0.4, 20.0), ((), ())),
-    ("paraboloid R = 60 mm", Paraboloid(60.0), Touch(-2.0, 1.1, 0.0, 60.0), ((), ())),
+    ("sphere R = 20 mm", sphere(20.0), Touch(1.3, -0.7, 0.4, 20.0), ((), ())),
+    ("paraboloid R = 60 mm", paraboloid(60.0), Touch(-2.0, 1.1, 0.0, 60.0), ((), ())),
     ("cross 8 mm, bars 1.6 mm", Cross(1.6, 8.0), Touch(0.0, 0.0, 0.0, 25.0), ((0.8, 4.0),) * 2),
     (
         "strip 2 x 12 mm, pad's edge",
@@ -150,7 +151,7 @@ def tab() -> list[dict[str, object]]:
 
 
 def space() -> list[dict[str, object]]:
-    ball, force, margin = Sphere(20.0), 20.0, 6.0
+    ball, force, margin = sphere(20.0), 20.0, 6.0
     reach = PAD.half_mm[0] + margin
     r = np.concatenate([np.linspace(0, 6, 121), 6 + (reach - 6) * np.linspace(0, 1, 40)[1:] ** 2])
     z = PAD.overlay.height_mm * (1 - (1 - np.linspace(0, 1, 13)) ** 1.6)

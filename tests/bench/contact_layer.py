@@ -4,13 +4,12 @@
 
 First table: error of the tactels (norm over that of the reference) and CPU time of a touch at
 2, 4, 8 cells per tactel; the references are those of `contact_precision.py`. Second: one touch
-on the washer and on a patch of symbols, in parts. "culled" finds levels
-and pressures with the plate foreseen, "all cells" does so with every cell sampled in full and
-every level taking part; "patch kept" is the next pose over the same place (another force);
-"made anew" makes the influence functions, too. The last columns are one solution with the
-cells in touch known: by the gathered compliance (its Cholesky factor, then a pose with the
-factor cached) and by the conjugate gradients that are used. Third: scenes at random, a count of
-each outcome. CPU times are medians on one thread.
+on the washer and on a patch of symbols, in parts. "culled" finds levels and pressures with the
+plate foreseen, "all cells" with every cell sampled in full and every level taking part; "made anew"
+makes the influence functions, too. The last columns are one solution with the cells in touch known:
+by the gathered compliance (its Cholesky factor, then a pose with the factor cached) and by the
+conjugate gradients that are used. Third: scenes at random, a count of each outcome. CPU times are
+medians on one thread.
 """
 
 from __future__ import annotations
@@ -26,24 +25,17 @@ import numpy as np
 import scipy.fft
 import scipy.linalg
 from contact_precision import ROUND, cases, places, reference
+from reference.indenters import half_plane, sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.layer import layer, press_patch
+from probe.contact.layer import layer
 from probe.contact.layer_equilibrium import contact_system, equilibrium, plate_of, solve_glued
 from probe.contact.layer_influence import influence
 from probe.contact.layer_patch import DepthWindow, levels_of, patch_under
 from probe.contact.plate import PlatePose
 from probe.errors import ContactError
-from probe.surface.indenters import (
-    Cross,
-    HalfPlane,
-    RaisedStrip,
-    RoughSurface,
-    Sphere,
-    TiltedPlane,
-    Washer,
-)
+from probe.surface.indenters import Cross, RaisedStrip, RoughSurface, TiltedPlane, Washer
 
 PAD = SensorType(overlay=Overlay("pad"))
 CELLS = (2, 4, 8)
@@ -88,7 +80,7 @@ def precision(given):
 
 
 def left_out(given):
-    names = ("cells", "in touch", "touch", "culled", "all cells", "patch kept", "made anew",
+    names = ("cells", "in touch", "touch", "culled", "all cells", "made anew",
              "factor", "cached", "gradients")  # fmt: skip
     print(f"\n{'scene':<10}" + "".join(f"{name:>11}" for name in names) + "   ms")
     known = cases(np.random.default_rng(given.seed))
@@ -114,10 +106,6 @@ def left_out(given):
 
             (levels, pressed), some = cpu(lambda f=seen: f(few=True), given.repeat)
             _, every = cpu(lambda f=seen: f(few=False), given.repeat)
-            patch = patch_under(surface, PAD, touch, cells_per_tactel=cells)
-            other = Touch(0.3, 0.2, 0.4, 0.9 * force, wrist=wrist)
-            press_patch(patch, touch)
-            _, again = cpu(lambda p=patch, o=other: press_patch(p, o), given.repeat)
             _, new = cpu(lambda c=cells: influence.__wrapped__(PAD, c), given.repeat)
             system = contact_system(levels, pressed.touching)
             (factor, _), factored = cpu(lambda s=system, g=grid: gathered(s, g), 1)
@@ -131,7 +119,7 @@ def left_out(given):
                 ),
                 given.repeat,
             )
-            times = (whole, some, every, again, whole + new, factored, cached, gradients)
+            times = (whole, some, every, whole + new, factored, cached, gradients)
             print(f"{case:<10}{cells:>11}{len(system.some):>11}"
                   + "".join(f"{ms:>11.2f}" for ms in times), flush=True)  # fmt: skip
 
@@ -160,10 +148,10 @@ def scenes(given):
             young * height * 10 ** rng.uniform(-3, 1.2))  # fmt: skip
         stiffness = 3e3 * 10 ** rng.uniform(-6, 6) * (rng.random() < 0.7)
         wrist = WristStiffness(stiffness, stiffness * 10 ** rng.uniform(-1, 1))
-        surface = (Washer(), RaisedStrip(rng.uniform(0.01, 3)), Sphere(10 ** rng.uniform(0, 3)),
+        surface = (Washer(), RaisedStrip(rng.uniform(0.01, 3)), sphere(10 ** rng.uniform(0, 3)),
                    Cross(rng.uniform(0.3, 3), 15.0), TiltedPlane(*rng.uniform(-0.15, 0.15, 2)),
-                   RoughSurface(int(rng.integers(100)), 10 ** rng.uniform(-4, 0)), HalfPlane(),
-                   HalfPlane(-0.6), RaisedStrip(1.0, 10.0, -0.5))[rng.integers(9)]  # fmt: skip
+                   RoughSurface(int(rng.integers(100)), 10 ** rng.uniform(-4, 0)), half_plane(),
+                   half_plane(-0.6), RaisedStrip(1.0, 10.0, -0.5))[rng.integers(9)]  # fmt: skip
         tilt_x, tilt_y = rng.uniform(-0.17, 0.17, 2) * (rng.random() < 0.6)
         x, y = rng.uniform(-9, 9, 2)
         touch = Touch(x, y, rng.uniform(0, 6.3), force, tilt_x, tilt_y, wrist)

@@ -30,6 +30,7 @@ from pathlib import Path
 import numpy as np
 from reference.elements_axisymmetric import section
 from reference.elements_round import indented, washer_pad
+from reference.indenters import sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
@@ -39,7 +40,7 @@ from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
 from probe.surface.face import endless_face
-from probe.surface.indenters import RaisedStrip, Sphere, TiltedPlane, Washer
+from probe.surface.indenters import RaisedStrip, TiltedPlane, Washer
 
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "probe" / "contact" / "precision.json"
@@ -65,7 +66,7 @@ def cases(rng):
     return {
         "washer": (Washer(), 80.0, 80.0, STIFF),
         "strip": (RaisedStrip(2.0), 40.0, 40.0, STIFF),
-        "sphere": (Sphere(BALL_MM), 40.0, 40.0, STIFF),
+        "sphere": (sphere(BALL_MM), 40.0, 40.0, STIFF),
         "patch": (endless_face(labels, GLYPHS), 80.0, 80.0, STIFF),
         "tilt": (TiltedPlane(0.02, 0.01), 60.0, 60.0, WristStiffness()),
     }

@@ -23,12 +23,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from reference.indenters import half_plane, sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.press import press
 from probe.errors import ContactError
-from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip, Sphere, Washer
+from probe.surface.indenters import FlatPlate, RaisedStrip, Washer
 from probe.surface.mesh import mesh
 
 LEVELS = {"tab": ("footprint", "tabs-19"), "pad": ("layer-2", "layer-4")}
@@ -51,11 +52,11 @@ def scenes():
     corner = tetrahedron()
     yield "no force", Washer(), Touch(0.3, 0.2, 0.4, 0.0), {}
     yield "nothing there", Washer(), Touch(60.0, 0.2, 0.4, 10.0), {}
-    yield "one tab", Sphere(2.0), Touch(0.79, 0.79, 0.0, 0.2), {}
-    yield "one tab, far out", Sphere(2.0), Touch(8.73, 8.73, 0.0, 0.2), {}
-    yield "one tab, free wrist", Sphere(2.0), Touch(8.73, 8.73, 0.0, 0.2, wrist=FREE), {}
-    yield "edge of a face", HalfPlane(), Touch(5.0, 0.0, 0.3, 20.0), {}
-    yield "edge, free wrist", HalfPlane(), Touch(5.0, 0.0, 0.3, 20.0, wrist=FREE), {}
+    yield "one tab", sphere(2.0), Touch(0.79, 0.79, 0.0, 0.2), {}
+    yield "one tab, far out", sphere(2.0), Touch(8.73, 8.73, 0.0, 0.2), {}
+    yield "one tab, free wrist", sphere(2.0), Touch(8.73, 8.73, 0.0, 0.2, wrist=FREE), {}
+    yield "edge of a face", half_plane(), Touch(5.0, 0.0, 0.3, 20.0), {}
+    yield "edge, free wrist", half_plane(), Touch(5.0, 0.0, 0.3, 20.0, wrist=FREE), {}
     yield "corner, 1 N", corner, Touch(0.4, 0.3, 0.2, 1.0), {}
     yield "corner, 100 N", corner, Touch(0.4, 0.3, 0.2, 100.0), {}
     yield "10 degrees", FlatPlate(), Touch(0, 0, 0, 20.0, TEN), {}

@@ -19,8 +19,10 @@ from __future__ import annotations
 
 import argparse
 import statistics
+import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -32,19 +34,12 @@ from probe.calibration import (
     calibration_from,
     known_load,
 )
-from probe.circuit import (
-    DATASHEET,
-    MEASURED,
-    QUIET,
-    Electronics,
-    Fsr,
-    draw_fsr,
-    fsr_of,
-    read_counts,
-    read_sequence,
-)
+from probe.circuit import QUIET, Electronics, Fsr, fsr_of, read_counts, read_sequence
 from probe.circuit.fsr import BREAK_N, GAIN_S
 from probe.errors import CalibrationError
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from reference.drawn_fsr import DATASHEET, MEASURED, draw_fsr
 
 NONE = np.zeros((16, 16))
 FRAMES = 220

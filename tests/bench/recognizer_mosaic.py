@@ -1,4 +1,4 @@
-"""Mosaics of raster scans of cubes, against the truth of the simulation and the thesis's way.
+"""Mosaics of raster scans of cubes, against the truth of the simulation.
 
     python tests/bench/recognizer_mosaic.py --errors 0.5 1 2 --seed 1
     python tests/bench/recognizer_mosaic.py --profiles one-touch --readings counts
@@ -9,8 +9,6 @@ many tactels (rms); 80 N within 10 %, half a degree of tilt, 10 % spread of gain
 tactel, 0.02 N of noise, one dead tactel; or counts of the simulated board. All lengths are in
 tactels of 1.5875 mm. Lines:
 
-    pairs       neighbours at most 4.6 tactels apart, from what the arm believes of both
-    chain       each touch laid on the one before it (or above it), errors about the first
     mosaic      shape error after the best rigid motion; absolute error in the frame
     decoded     the same with decoded places: every touch, or one in twelve
     steps       no arm: steps that err by half a tactel and half a degree each
@@ -39,9 +37,7 @@ from probe.scan.kinesthetic import ArmPath, JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.simulate.registered import registered_object, registered_surface
-from recognizer.scan.mosaic.grow import add_touch, settle_mosaic
-from recognizer.scan.mosaic.mosaic import Mosaic, no_touches, outliers
-from recognizer.scan.mosaic.patch import TouchPatch, patch_of
+from recognizer.scan.mosaic.mosaic import Mosaic, add_touch, no_touches
 from recognizer.scan.mosaic.planar import (
     PlacedTouch,
     PlanarBelief,
@@ -50,12 +46,9 @@ from recognizer.scan.mosaic.planar import (
     planar_belief,
     planar_covariance,
     planar_pose,
-    relative_covariance,
     relative_pose,
     wrap_angle,
 )
-from recognizer.scan.mosaic.register import register_patches
-from recognizer.thesis.merge import product_shift
 from recognizer.touch.lab import open_lab
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
@@ -145,79 +138,19 @@ def shape_errors(poses: np.ndarray, true: np.ndarray) -> np.ndarray:
     return np.hypot(*(b - a @ np.array([[c, s], [-s, c]])).T) / P
 
 
-def pairs(scan: Scan, patches: list[TouchPatch]) -> None:
-    """Print pair registration, ours and the thesis's, and the drift of chains of them."""
-    at = np.array([place.pose for place in scan.believed])
-    ours, theirs, turns, inside, why = [], [], [], [], Counter()
-    ms, their_ms, links = 0.0, 0.0, {}
-    for b in range(len(at)):
-        for a in range(b):
-            if math.hypot(*(at[b] - at[a])[:2]) > 4.6 * P:
-                continue
-            true = relative_pose(scan.true[a], scan.true[b])
-            belief = relative_pose(at[a], at[b])
-            sure = relative_covariance(
-                at[a], at[b], scan.believed[a].covariance, scan.believed[b].covariance
-            )
-            start = time.process_time()
-            found = register_patches(patches[a], patches[b], belief, sure, period_mm=scan.pitch_mm)
-            ms += time.process_time() - start
-            start = time.process_time()
-            window = min(7.5, 3 * math.sqrt(max(sure[0, 0], sure[1, 1])) / P)
-            one, two = (np.asarray(scan.signals[k].forces) for k in (a, b))
-            shift = product_shift(one, two, tuple(belief[:2] / P), window)
-            their_ms += time.process_time() - start
-            theirs.append(math.hypot(*(shift - true[:2] / P)))
-            why[found.reason] += 1
-            links[a, b] = found.pose, np.append(shift * P, belief[2])
-            if found:
-                away = found.pose - true
-                ours.append(math.hypot(*away[:2]) / P)
-                turns.append(away[2] / DEG)
-                inside.append(
-                    float(away @ np.linalg.solve(found.covariance, away)) < chi2_quantile(0.95)
-                )
-    for name, errors, each in (("ours", ours, ms), ("product", theirs, their_ms)):
-        errors = np.array(errors)
-        near = errors[errors <= 1]
-        print(
-            f"  pairs   {name:8} median {np.median(errors):.3f}  rms (<= 1) {rms(near):.3f}  "
-            f"wrong lock {(errors > 1).mean():.4f}  {1e3 * each / sum(why.values()):.1f} ms"
-        )
-    print(
-        f"          undefined {1 - why[''] / sum(why.values()):.3f} {dict(why)}  turn rms "
-        f"{rms(turns):.2f} deg  in 95 % ellipse {np.mean(inside):.3f}"
-    )
-    for number, name in enumerate(("ours", "product")):
-        print(f"  chain   {name:8} rms {rms(chained(links, scan, number)):.2f}")
-
-
-def chained(links, scan: Scan, number: int) -> list[float]:
-    """Return errors, tactels, when each touch is laid on the nearest one before it."""
-    poses = {0: scan.true[0]}
-    for b in range(1, len(scan.true)):
-        befores = [a for a in range(b) if (a, b) in links and a in poses]
-        if befores:
-            a = max(befores)
-            poses[b] = compose_poses(poses[a], links[a, b][number])
-    return [math.hypot(*(poses[n] - scan.true[n])[:2]) / P for n in poses if n]
-
-
-def grown(touches: list[PlacedTouch], pitch_mm: float) -> tuple[Mosaic, float, float]:
-    """Return a mosaic, ms per touch (median) and ms to settle."""
+def grown(touches: list[PlacedTouch], pitch_mm: float) -> tuple[Mosaic, float]:
+    """Return a mosaic, and ms per touch (median)."""
     mosaic, times = no_touches(SENSOR, pitch_mm), []
     for touch in touches:
         start = time.process_time()
         mosaic = add_touch(mosaic, touch)
         times.append(time.process_time() - start)
-    start = time.process_time()
-    mosaic = settle_mosaic(mosaic)
-    return mosaic, 1e3 * float(np.median(times)), 1e3 * (time.process_time() - start)
+    return mosaic, 1e3 * float(np.median(times))
 
 
 def told(name: str, scan: Scan, touches: list[PlacedTouch], *, face: bool) -> None:
     """Grow a mosaic and print what it is worth."""
-    mosaic, ms, settle = grown(touches, scan.pitch_mm)
+    mosaic, ms = grown(touches, scan.pitch_mm)
     away = mosaic.poses - scan.true
     away[:, 2] = wrap_angle(away[:, 2])
     shape = shape_errors(mosaic.poses, scan.true)
@@ -236,8 +169,7 @@ def told(name: str, scan: Scan, touches: list[PlacedTouch], *, face: bool) -> No
             f" (of the defined {rms(shape_errors(mosaic.poses[defined], scan.true[defined])):.3f})"
         )
     undefined = 1 - reasons[""] / len(mosaic)
-    print(f"{line}  undefined {undefined:.3f}  outliers {len(outliers(mosaic))}  "
-          f"{ms:.0f} ms/touch, settled in {settle:.0f} ms")  # fmt: skip
+    print(f"{line}  undefined {undefined:.3f}  {ms:.0f} ms/touch")
     if undefined:
         print(f"                   {dict(reasons)}")
 
@@ -262,12 +194,10 @@ def main() -> None:
 def measure(database: str, profile: str, tactels: float, counts: bool, seed: int) -> None:
     """Print all lines of one profile and one size of errors."""
     scan = scanned(database, "", PITCH_MM[profile], tactels, counts, seed)
-    patches = [patch_of(SENSOR, signal) for signal in scan.signals]
-    n = len(patches)
+    n = len(scan.signals)
     print(f"{profile}, {n} touches, believed places err by {tactels:g} tactels rms")
     believed = np.array([place.pose for place in scan.believed])
     print(f"  as believed      shape rms {rms(shape_errors(believed, scan.true)):.3f}")
-    pairs(scan, patches)
     told("mosaic", scan, touches_of(scan, {}), face=False)
     if profile == "one-touch":
         reader = Reader(open_lab(database), SENSOR)

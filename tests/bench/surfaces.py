@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from reference.indenters import sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from generator.pipeline import encode
@@ -33,7 +34,7 @@ from probe.simulate.source import frames_of
 from probe.simulate.target import part_surface
 from probe.simulate.touch import TouchRanges, random_touches
 from probe.surface.face import endless_face
-from probe.surface.indenters import RoughSurface, Sphere, Washer
+from probe.surface.indenters import RoughSurface, Washer
 
 SPEC = """
 objects:
@@ -122,7 +123,7 @@ def report(folder, given):
     asked("array, as a table", lambda: endless_face(grid, STEPS), places, points)
     asked("array, as a function", lambda: endless_face(lambda r, c: (r * r + c) % 2, STEPS),
           places, points)  # fmt: skip
-    for body in (Washer(), Sphere(), RoughSurface()):
+    for body in (Washer(), sphere(), RoughSurface()):
         asked(type(body).__name__.lower(), lambda body=body: body, places, points)
 
     print(f"\n{'a touch, median of CPU ms':<34}{'all':>12}{'press':>12}{'counts':>12}")

@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 from reference.elements_round import indented, washer_pad
+from reference.indenters import paraboloid
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
@@ -13,15 +14,21 @@ from probe.contact.layer import layer
 from probe.contact.layer_influence import (
     base_ratio,
     compliance_over_s,
-    compliance_ratio,
     edge_compliance,
     influence,
     layer_compliance,
 )
-from probe.surface.indenters import Paraboloid, RaisedStrip, Washer
+from probe.surface.indenters import RaisedStrip, Washer
 
 POISSON = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.5 - 2**-40, 0.5)
 S = [*10.0 ** np.linspace(-8, 2, 41), 0.999999, 1.0, 1.000001, 10.5, 19.7, 200.0, 400.0]
+
+
+def compliance_ratio(s, poisson):
+    """T(s): the layer's compliance over the half-space's."""
+    return s * compliance_over_s(s, poisson)
+
+
 HELD = WristStiffness(math.inf, math.inf)
 
 
@@ -86,11 +93,11 @@ def test_kernel_limits():
     for nu in POISSON:
         assert compliance_ratio(np.array(1e3), nu) == 1  # a half-space
         assert base_ratio(np.array(0.0), nu) == 1
-        even = layer_compliance(np.array(0.0), height_mm=3.0, young_mpa=2.0, poisson=nu)
+        even = layer_compliance(0.0, Overlay("pad", 3.0, young_mpa=2.0, poisson=nu))
         confined = 3.0 * (1 + nu) * (1 - 2 * nu) / (2.0 * (1 - nu))
         assert even == pytest.approx(confined, rel=1e-14, abs=0)
     # Incompressible and thin: a film that flows, u = (q h)^2 h p / (3 G).
-    thin = layer_compliance(np.array(1e-6), height_mm=2.0, young_mpa=3.0, poisson=0.5)
+    thin = layer_compliance(1e-6, Overlay("pad", 2.0, young_mpa=3.0, poisson=0.5))
     assert thin == pytest.approx((2e-6) ** 2 * 2.0 / 3, rel=1e-11)
 
 
@@ -124,8 +131,8 @@ def test_nyquist_of_the_tactels_tells_where_deblurring_ends():
 
 def test_edge_compliance_of_a_thin_compressible_layer_is_its_own():
     for nu in (0.0, 0.3, 0.45):
-        whole = layer_compliance(np.array(0.0), height_mm=1e-4, young_mpa=1.0, poisson=nu)
-        edge = edge_compliance(1.0, height_mm=1e-4, young_mpa=1.0, poisson=nu)
+        thin = Overlay("pad", 1e-4, young_mpa=1.0, poisson=nu)
+        whole, edge = layer_compliance(0.0, thin), edge_compliance(1.0, thin)
         assert edge == pytest.approx(whole, rel=2e-3)
 
 
@@ -139,7 +146,7 @@ def test_hertz_on_a_thick_pad(poisson):
     stiffer = np.trapezoid(1 - compliance_ratio(s, poisson), s) / (math.pi * star * height)
     touch = Touch(0.1, 0.3, 0, force, wrist=HELD)
     sensor = pad(height_mm=height, poisson=poisson)
-    found = layer(Paraboloid(bend), sensor, touch, cells_per_tactel=6)
+    found = layer(paraboloid(bend), sensor, touch, cells_per_tactel=6)
     assert -found.z_mm == pytest.approx(a**2 / bend - stiffer * force, rel=1e-2)
 
 
@@ -150,7 +157,7 @@ def test_thin_incompressible_layer_under_a_paraboloid(ratio, excess, cells):
     sensor = pad(height_mm=height, young_mpa=3.0, poisson=0.5)
     force = math.pi * 10.0**6 / (32 * bend * height**3) * excess
     touch = Touch(0.1, 0.2, 0, force, wrist=HELD)
-    found = layer(Paraboloid(bend), sensor, touch, cells_per_tactel=cells)
+    found = layer(paraboloid(bend), sensor, touch, cells_per_tactel=cells)
     assert -found.z_mm == pytest.approx(10.0**2 / (4 * bend), rel=3e-3)
 
 

@@ -26,7 +26,7 @@ from probe.circuit import QUIET, Electronics, fsr_of, read_counts
 from probe.command import run
 from probe.errors import RecordingError
 from probe.frame import frame_from
-from probe.recording.read import Recording, read_frames
+from probe.recording.read import Recording
 from probe.recording.record import Recorder
 
 COMMAND = (sys.executable, "-c", "from probe.command import main; main()")
@@ -96,7 +96,7 @@ def test_a_touch_of_a_registered_face(asked, lab, tmp_path, overlay):
     assert (told["object"], told["face"], told["frames"]) == ("Cube", "F2", 1)
     assert told["written"] == [str(out), str(png)]
     assert told["first"]["felt_n"] == pytest.approx(80, rel=1e-3)
-    frames = list(read_frames(out))
+    frames = list(Recording(out).frames())
     assert frames[0].counts.max() == told["first"]["peak_counts"]
     assert frames[0].pose is None
     assert (frames[0].counts > 30).sum() >= 40
@@ -120,7 +120,7 @@ def test_a_stream_of_touches_is_recorded_through_the_software_probe(asked, lab, 
     assert (code, err) == (0, "")
     told = json.loads(text)
     assert (told["frames"], told["lost"], told["failed"]) == (220, 0, 0)
-    peaks = [int(frame.counts.max()) for frame in read_frames(out)]
+    peaks = [int(frame.counts.max()) for frame in Recording(out).frames()]
     assert max(peaks) > 100
     assert min(peaks) < 80
 
@@ -149,7 +149,7 @@ def test_a_recording_that_is_ended_by_a_signal_is_complete(tmp_path, number):
         text, err = process.communicate(timeout=SHORT_S)
     assert process.returncode == (0 if number == signal.SIGINT else 128 + number)
     assert err == ""
-    frames = list(read_frames(out))
+    frames = list(Recording(out).frames())
     if number == signal.SIGINT:
         assert text.startswith(f"{out}: {len(frames)} frames in")
     assert [f.seq - frames[0].seq for f in frames] == list(range(len(frames)))
@@ -171,7 +171,7 @@ def test_a_recording_killed_by_signal_9_is_repaired(asked, tmp_path):
     code, text, _ = asked("repair", out, "--json")
     told = json.loads(text)
     assert (code, told["changed"], told["lost"]) == (0, True, 0)
-    frames = list(read_frames(out))
+    frames = list(Recording(out).frames())
     assert len(frames) == told["frames"] == left >= 64
     assert [f.seq for f in frames] == list(range(len(frames)))
 

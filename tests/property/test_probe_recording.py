@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recorded import record, same
 
 from probe.errors import RecordingError
 from probe.frame import Frame, frame_from
-from probe.recording.read import Recording, read_frames
-from probe.recording.record import Recorder
+from probe.recording.read import Recording
 from probe.recording.repair import repair
 
 
@@ -37,16 +37,6 @@ def stream(seed: int, count: int, gaps: float, poses: float) -> list[Frame]:
     return frames
 
 
-def same(a: Frame, b: Frame) -> bool:
-    if (a.pose is None) != (b.pose is None) or (a.pose is not None and (a.pose != b.pose).any()):
-        return False
-    return (
-        (a.t_ns, a.seq) == (b.t_ns, b.seq)
-        and bool((a.counts == b.counts).all())
-        and bool((a.wrist == b.wrist).all())
-    )
-
-
 @settings(deadline=None, max_examples=15)
 @given(
     seed=st.integers(0, 2**32),
@@ -61,9 +51,7 @@ def test_any_stream_is_read_as_it_was(seed, count, poses, flush_s, roll_over_s, 
     frames = stream(seed, count, 0.1, poses)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "touch.h5"
-        with Recorder(path, flush_s=flush_s, roll_over_s=roll_over_s) as recorder:
-            for frame in frames:
-                recorder.append(frame)
+        record(path, frames, flush_s=flush_s, roll_over_s=roll_over_s)
         recording = Recording(path)
         assert len(recording) == count
         assert all(map(same, recording.frames(), frames))
@@ -92,7 +80,7 @@ def test_a_hurt_file_is_refused_or_gives_frames_that_were_recorded(seed, kind):
             content[at:at] = rng.bytes(64)
         path.write_bytes(content)
         by_seq = {frame.seq: frame for frame in frames}
-        for attempt in (read_frames, repaired):
+        for attempt in (lambda path: Recording(path).frames(), repaired):
             try:
                 read = list(attempt(path))
             except RecordingError:
@@ -105,11 +93,8 @@ def recorded() -> tuple[list[Frame], bytes]:
     """Return frames, and the file that holds them."""
     frames = stream(1, 200, 0.1, 0.5)
     with tempfile.TemporaryDirectory() as folder:
-        with Recorder(Path(folder) / "touch.h5") as recorder:
-            for frame in frames:
-                recorder.append(frame)
-        return frames, recorder.files[0].read_bytes()
+        return frames, record(Path(folder) / "touch.h5", frames).files[0].read_bytes()
 
 
 def repaired(path: Path):
-    return read_frames(repair(path).path)
+    return Recording(repair(path).path).frames()

@@ -5,8 +5,6 @@ pieces, and where asked for the symbols as convex pieces of their own, each piec
 stands wherever its symbol does. Mass, centre and inertia: of the parts as they are printed,
 symbols and marks included, all solid; an object of panels is hollow. Metres, kilograms, radians;
 the origin is that of the object frame, so that the frame of a face is its `T_object_face`.
-
-`mjcf`, `urdf`, `sdf` and `usd` each write the model and read it back by another program.
 """
 
 from __future__ import annotations
@@ -26,9 +24,10 @@ from generator.export.colours import BODY_RGB, RGB, SYMBOL_RGB
 from generator.layout.placement import Layout
 from generator.polyhedron import Polyhedron, face_frame
 from generator.solid import Mesh, Part, body_mesh, emboss_whole, symbol_meshes
-from generator.solid.convex import ConvexPieces, ConvexSettings, convex_pieces
+from generator.solid.convex import DEPTH_MM, ConvexPieces, convex_pieces
 from generator.solid.emboss import to_part, turn
 from generator.solid.measure import inertia_of
+from generator.solid.part import transform
 from generator.solid.triangulate import closed_template
 
 Floats = NDArray[np.float64]
@@ -95,28 +94,12 @@ def robot_model(
     density_kg_m3: float,
     symbols_collide: bool = False,
 ) -> RobotModel:
-    """Return the model of an object.
+    """Return the model of an object; `meshes` of its parts, part frame, mm.
 
-    Parameters
-    ----------
-    name
-        Of the object.
-    polyhedron
-        Its shape.
-    parts, meshes
-        What is printed: panels or the whole body, and the mesh of each, part frame, mm.
-    density_kg_m3
-        Of the plastic.
-    symbols_collide
-        Whether other bodies feel the symbols.
-
-    Raises
-    ------
-    SolidError
-        Symbols on a round face are to collide.
+    Raises `SolidError` if symbols on a round face are to collide.
     """
     corners = [
-        _moved(part.T_object_part, mesh.vertices)[mesh.triangles]
+        transform(part.T_object_part, mesh.vertices)[mesh.triangles]
         for part, mesh in zip(parts, meshes, strict=True)
     ]
     inertia = inertia_of(np.concatenate(corners))
@@ -138,16 +121,13 @@ def robot_model(
 
 def _visuals(name: str, parts: Sequence[Part]) -> Iterator[ModelMesh]:
     """Yield the bodies of all parts in one mesh, and their symbols in another."""
-    yield _mesh_of(
-        f"{name}-visual-body",
-        [(_moved(p.T_object_part, m.vertices), m.triangles) for p in parts for m in [body_mesh(p)]],
-        BODY_RGB,
-    )
-    symbols = [
-        (_moved(part.T_object_part, mesh.vertices), mesh.triangles)
-        for part in parts
-        for mesh in symbol_meshes(part)
-    ]
+    bodies, symbols = [], []
+    for part in parts:
+        T = part.T_object_part
+        own = body_mesh(part)
+        bodies.append((transform(T, own.vertices), own.triangles))
+        symbols += [(transform(T, mesh.vertices), mesh.triangles) for mesh in symbol_meshes(part)]
+    yield _mesh_of(f"{name}-visual-body", bodies, BODY_RGB)
     if symbols:
         yield _mesh_of(f"{name}-visual-symbols", symbols, SYMBOL_RGB)
 
@@ -156,9 +136,9 @@ def _body_pieces(name: str, polyhedron: Polyhedron) -> tuple[list[ModelMesh], tu
     """Return the plain shape as convex meshes, and what they lack."""
     plain = emboss_whole(polyhedron, Layout("faces", 1.0, ()), (), name)
     mesh = body_mesh(plain)
-    found = convex_pieces(_moved(plain.T_object_part, mesh.vertices), mesh.triangles)
+    found = convex_pieces(transform(plain.T_object_part, mesh.vertices), mesh.triangles)
     warnings: tuple[str, ...] = ()
-    if found.depth_mm > ConvexSettings().depth_mm:
+    if found.depth_mm > DEPTH_MM:
         warnings = (
             f"{len(found.pieces)} convex collision pieces stand out up to {found.depth_mm:.1f} mm",
         )
@@ -222,11 +202,6 @@ def _mesh_of(
         triangles.append(numbers.reshape(-1, 3) + count)
         count += len(used)
     return ModelMesh(name, M * np.concatenate(vertices), np.concatenate(triangles), colour)
-
-
-def _moved(T: Floats, points: Floats) -> Floats:
-    moved: Floats = points @ T[:3, :3].T + T[:3, 3]
-    return moved
 
 
 def mesh_files(model: RobotModel) -> Iterator[tuple[str, Iterator[bytes]]]:
@@ -312,13 +287,7 @@ class ReadModel:
 
 
 def compare_model(model: RobotModel, read: ReadModel, path: Path) -> None:
-    """Compare a file, as a program read it, with the model.
-
-    Raises
-    ------
-    SolidError
-        It says something else than was meant.
-    """
+    """Compare a file, as a program read it, with the model; raises `SolidError` on a difference."""
     moment = float(np.abs(model.inertia_kg_m2).max())
     wrong = []
     if abs(read.mass_kg / model.mass_kg - 1) > SHARE:

@@ -2,20 +2,12 @@
 
 Every symbol outline of an embossing is written once as a template of entities and stamped
 for each symbol, so that writing costs little more than copying. The text comes in pieces
-of a few MB: memory grows with the number of symbols by a few numbers for each of their
-faces. The same part gives the same bytes: no clock, no path.
+of a few MB. The same part gives the same bytes: no clock, no path.
 
 Names: a facet bears its own name ("F1"); the faces of a symbol are "F1/r12c34/top",
 "F1/r12c34/side" and, within a ring, "F1/r12c34/inside". Tops and sides of symbols share one
 colour; marks (embossings that belong to no face) have none.
 ISO 10303-21 (text), -42 (geometry and topology), -46 (colour), -214 (application).
-
-::
-
-    entities.py  the list of entities; header, units, colours, products, assembly
-    body.py      points, edges and planar facets of the plain body, rims of round faces
-    curved.py    round faces as cylinders and cones, with the symbols on them
-    symbol.py    one symbol as a template
 """
 
 from __future__ import annotations
@@ -80,15 +72,8 @@ def write_assembly_gzipped(exported: ExportedObject) -> Files:
 
 
 def step_chunks(part: Part) -> Iterator[bytes | memoryview]:
-    """Yield the STEP text of a part, ASCII, in consecutive pieces.
+    """Yield the STEP text of a closed part, ASCII, in consecutive pieces.
 
-    Parameters
-    ----------
-    part
-        A closed part; coordinates in mm, part frame.
-
-    Notes
-    -----
     Coordinates are rounded to 1e-10 mm. A plane is placed at one of its own rounded points,
     so that its other points lie within a few 1e-10 mm of it.
     """
@@ -101,15 +86,7 @@ def step_chunks(part: Part) -> Iterator[bytes | memoryview]:
 
 
 def assembly_chunks(name: str, parts: Sequence[Part]) -> Iterator[bytes | memoryview]:
-    """Yield the STEP text of an assembly: each part a product, placed by its `T_object_part`.
-
-    Parameters
-    ----------
-    name
-        Of the object.
-    parts
-        Closed parts, each in its own frame, mm.
-    """
+    """Yield the STEP text of an assembly: each part a product, placed by its `T_object_part`."""
     entities = Entities(sum(map(_entities_at_most, parts)) + _ASSEMBLY_ENTITIES * len(parts))
     yield file_header(step_string(name))
     shared = _shared(entities)
@@ -124,10 +101,7 @@ def assembly_chunks(name: str, parts: Sequence[Part]) -> Iterator[bytes | memory
 
 
 def gzip_chunks(chunks: Iterable[bytes | memoryview]) -> Iterator[bytes]:
-    """Yield a text gzipped, without name or date: `.stpz`, which CAD programs open as STEP.
-
-    Names and numbers of 20,000 symbols repeat: a sixth is left.
-    """
+    """Yield a text gzipped, without name or date: `.stpz`, which CAD programs open as STEP."""
     packer = zlib.compressobj(_GZIP_LEVEL, zlib.DEFLATED, zlib.MAX_WBITS | 16)
     for chunk in chunks:
         yield packer.compress(chunk)
@@ -183,10 +157,7 @@ def _write_symbols(
     shell: list[NDArray[np.int64]],
     coloured: list[NDArray[np.int64]],
 ) -> Iterator[bytes | memoryview]:
-    """Write the symbols of one embossing; append to the lists what refers to them.
-
-    `width`: of a coordinate.
-    """
+    """Write the symbols of one embossing with coordinates of `width`; append their references."""
     facet_axes = embossing.T_part_facet[:3, :3].T
     axes = np.vstack([turn(embossing.rotation_rad).T @ facet_axes[:2], facet_axes[2:]])
     centres = embossing.centres_mm @ facet_axes[:2] + embossing.T_part_facet[:3, 3]

@@ -22,7 +22,7 @@ from generator.export.step.entities import (
     triple,
     unit,
 )
-from generator.solid.part import AnalyticFace, BentSymbol
+from generator.solid.part import AnalyticFace, BentSymbol, transform
 
 Points = NDArray[np.float64]
 
@@ -121,7 +121,7 @@ class _RoundSymbol:
         self.add = on.file.add
         T = on.face.T_part_axis
         self.places = [
-            [[np.round(edge @ T[:3, :3].T + T[:3, 3], _PLACES) for edge in ring] for ring in tier]
+            [[np.round(transform(T, edge), _PLACES) for edge in ring] for ring in tier]
             for tier in symbol.rings
         ]
         self.points = [

@@ -27,11 +27,7 @@ _TIME_STAMP = "1970-01-01T00:00:00"
 class Entities:
     """Entities that are written once, in order; the text waits until it is taken.
 
-    Parameters
-    ----------
-    at_most
-        No more entities will be written than this; it sets the width of the numbers:
-        all have the same, as in #100000, #100001, ...
+    No more than `at_most` are written: it sets the width of the numbers, as in #100000, #100001.
     """
 
     def __init__(self, at_most: int) -> None:
@@ -123,10 +119,8 @@ def numbers_listed(numbers: NDArray[np.int64], width: int, block: int = 240_000)
 def step_string(text: str) -> str:
     r"""Return `text` as the inside of a STEP string: quotes doubled, beyond ASCII as \X2\ or \X4\.
 
-    >>> step_string("O'Neil")
-    "O''Neil"
-    >>> print(step_string("Würfel"))
-    W\X2\00FC\X0\rfel
+    >>> print(step_string("O'Neil, Würfel"))
+    O''Neil, W\X2\00FC\X0\rfel
     """
     if text.isascii() and text.isprintable() and "'" not in text and "\\" not in text:
         return text

@@ -1,14 +1,11 @@
 """One symbol as a template of STEP entities: points, edges, sides, top.
 
-Outlines with as many points share their entities, parts and files share the directions that they
-have: what a template refers to in a file is filled in for each file. The points of a symbol are
-numbered tier by tier and ring by ring. Point i is entity i of the template and its vertex entity
-n + i, so that the coordinates of all symbols of one outline are filled in as one array. The
-footprint (the outer ring of the first tier, seen as a hole of the facet) is a bound that the facet
-refers to.
-
-Engraved symbols have the same topology: with falling z the same vertex order turns the
-sides towards the cavity, which is outside the material.
+Outlines with as many points share their entities, parts and files the directions; the references
+of a template to its file are filled in for each file. The points are numbered tier by tier and
+ring by ring. Point i is entity i of the template and its vertex entity n + i, so that the
+coordinates of all symbols of one outline are filled in as one array. The footprint (the outer
+ring of the first tier) is a bound of the facet. Engraved symbols have the same topology: with
+falling z the vertex order turns the sides towards the cavity, outside the material.
 """
 
 from __future__ import annotations
@@ -80,12 +77,8 @@ def symbol_template(
 
     Parameters
     ----------
-    tiers
-        The outline.
     axes
         (3, 3) rows: the symbol's x, y and z axis in the part frame.
-    entities
-        The file.
     decimal_width, name_widths
         Widths of the fields that each instance fills.
     style
@@ -123,10 +116,7 @@ def _topology(
     name_widths: tuple[int, ...],
     coloured: bool,
 ) -> _SymbolTopology:
-    """Return the entities of an outline with as many points in each ring of each tier.
-
-    `width`: digits of a number.
-    """
+    """Return the entities of an outline with as many points in each ring of each tier."""
     return _SymbolBuilder(sizes, width, decimal_width, name_widths, coloured).built()
 
 
@@ -134,12 +124,7 @@ def _topology(
 def _components(topology: _SymbolTopology, points: bytes, frame: bytes) -> tuple[str, ...]:
     """Return the components of all that a topology refers to, as STEP writes them; "" for a style.
 
-    Parameters
-    ----------
-    points
-        (n, 3) mm, part frame.
-    frame
-        (2, 3) the symbol's z and x axis in the part frame.
+    `points`: (n, 3) mm, part frame; `frame`: (2, 3) the symbol's z and x axis in the part frame.
     """
     corners, axes = np.frombuffer(points).reshape(-1, 3), np.frombuffer(frame).reshape(2, 3)
     a, a_next, b_next, b = corners[topology.quads.T]

@@ -27,28 +27,15 @@ STEP = (".step", ".stp")
 
 
 def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
-    """Read one solid from a file.
+    """Read one solid from a file that ends in .stl (binary or ASCII), .obj, .step or .stp.
 
-    Parameters
-    ----------
-    path
-        A file that ends in .stl (binary or ASCII), .obj, .step or .stp.
-    scale
-        How many times larger the model is made about its origin, in [1e-6, 1e6]; round faces
-        are divided at that size.
+    `scale` in [1e-6, 1e6] makes the model larger about its origin; round faces are divided at that
+    size. The solid is of kind `file`; its faces F1, F2, ... are in the order in which the file
+    first shows them, coordinates mm. Cylinder and cone faces of STEP are runs of facets, its
+    `surfaces`; other round faces are facets that stay `blank`.
 
-    Returns
-    -------
-    Polyhedron
-        Of kind `file`; its faces F1, F2, ... are in the order in which the file first shows
-        them, coordinates as in the file times `scale`, mm. Cylinder and cone faces of STEP are
-        runs of facets, its `surfaces`; other round faces are facets that stay `blank`.
-
-    Raises
-    ------
-    ShapeError
-        With file, place, cause and way out: no such file, too large, truncated, not closed,
-        several bodies, a mesh of too many faces, larger than 10 m.
+    Raises `ShapeError` with file, place, cause and way out: no such file, too large, truncated, not
+    closed, several bodies, a mesh of too many faces, larger than 10 m.
     """
     file = Path(path)
     suffix = file.suffix.lower()
@@ -85,13 +72,7 @@ def _check_size(solid: Polyhedron) -> None:
 
 
 def file_content(file: Path, place: str, largest: int) -> bytes:
-    """Return the bytes of a file, at least one and at most `largest` of them.
-
-    Raises
-    ------
-    ShapeError
-        It is not there, cannot be read, is empty, or too large.
-    """
+    """Return the bytes of a file, at least one and at most `largest`; `ShapeError` if it cannot."""
     try:
         size = file.stat().st_size
         if size > largest:

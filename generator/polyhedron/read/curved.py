@@ -52,17 +52,8 @@ class _Found:
 def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, Any]:
     """Return points and facets of a solid with round faces, and which of them unroll.
 
-    Parameters
-    ----------
-    solid, faces
-        Of the kernel.
-    kinds
-        What each face is: plane, cylinder, cone, sphere, ...
-
-    Raises
-    ------
-    ShapeError
-        There are too many facets, or the kernel cannot divide a face.
+    `solid` and `faces` are the kernel's, `kinds` what each face is: plane, cylinder, sphere, ...
+    Raises `ShapeError` if there are too many facets, or the kernel cannot divide a face.
     """
     counts: list[int] = []
     for coarser in COARSER:

@@ -54,10 +54,7 @@ def _read_model(model: str, scale: float) -> dict[str, Any]:
 def describe_shape(shape: Any) -> dict[str, Any]:
     """Return the faces of the one solid in a shape of the kernel, mm.
 
-    Raises
-    ------
-    ShapeError
-        No solid, several, or faces that cannot be read.
+    Raises `ShapeError` for no solid, several, or faces that cannot be read.
     """
     from OCP.TopAbs import TopAbs_SOLID
 

@@ -31,12 +31,9 @@ Faces = list[tuple[tuple[int, ...], ...]]
 def merge_triangles(soup: Soup) -> tuple[Floats, Faces]:
     """Return vertices (V, 3) mm and faces as loops, the outer loop first, for `polyhedron`.
 
-    Raises
-    ------
-    ShapeError
-        An open, branching or inconsistently oriented mesh (with the first place), one of
-        several bodies, a flat one, a surface of more than `MOST_FACETS` planar faces, or
-        a face that is not planar.
+    Raises `ShapeError` for an open, branching or inconsistently oriented mesh (with the first
+    place), one of several bodies, a flat one, one of more than `MOST_FACETS` planar faces, or a
+    bent face.
     """
     _check_flat(soup)
     soup = split_at_tees(soup)
@@ -303,18 +300,7 @@ def _outer_first(points: Floats, loops: list[tuple[int, ...]]) -> list[tuple[int
 def _check_one_body(soup: Soup, twin: NDArray[np.intp]) -> None:
     """Refuse a mesh of several bodies, and say how large they are and where they lie.
 
-    Parameters
-    ----------
-    soup
-        Closed and oriented polygons, mm.
-    twin
-        (H,) the half-edge that runs the same edge backwards.
-
-    Raises
-    ------
-    ShapeError
-        The surface falls into several; one that runs the other way round than the largest, as
-        the walls of a cavity do, is called a void.
+    One that runs the other way round than the largest, as walls of a cavity do, is called a void.
     """
     count = int(soup.face.max()) + 1
     label = cluster_labels(np.arange(count), soup.face, soup.face[twin])

@@ -33,21 +33,9 @@ LISTED = 6  # regions that a note names with their places
 
 
 def solid_of_soup(soup: Soup, kind: str, scale: float = 1.0) -> Polyhedron:
-    """Return the solid of closed polygons, its curved regions `blank`.
+    """Return the solid of closed polygons, `scale` times larger, its curved regions `blank`.
 
-    Parameters
-    ----------
-    soup
-        Polygons of one body.
-    kind
-        Of the polyhedron.
-    scale
-        How many times larger it is made about the origin.
-
-    Raises
-    ------
-    ShapeError
-        As `merge_triangles` and `polyhedron` say of the mesh as it stands.
+    Raises `ShapeError` as `merge_triangles` and `polyhedron` do of the mesh as it stands.
     """
     try:
         return _solid(soup, kind, scale)
@@ -73,11 +61,6 @@ def _mesh_polyhedron(kind: str, vertices: Floats, faces: list[Loops]) -> Polyhed
 
     Planar faces are called F1, F2, ... in the order of the file, then each curved region is one
     face of many facets: F9, F9.2, F9.3, ...
-
-    Raises
-    ------
-    ShapeError
-        As `polyhedron` does.
     """
     if len(faces) <= MOST_FACES:
         return polyhedron(kind, vertices, faces)

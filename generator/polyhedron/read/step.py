@@ -98,19 +98,10 @@ def _ask_kernel(content: bytes, place: str, scale: float) -> dict[str, Any]:
 
 
 def polyhedron_of_facets(found: dict[str, Any], kind: str) -> Polyhedron:
-    """Return a solid some of whose faces are round, with notes on how and on what stays blank.
+    """Return the solid that `curved_faces` describes, with notes on how and on what stays blank.
 
-    Parameters
-    ----------
-    found
-        What `curved.curved_faces` returns.
-    kind
-        Of the polyhedron.
-
-    Raises
-    ------
-    ShapeError
-        The facets are no solid: walls thinner than the chord errors, a damaged model.
+    Raises `ShapeError` if the facets are no solid: walls thinner than the chord errors, a damaged
+    model.
     """
     points, faces, kept = _weld(np.array(found["points"], dtype=np.float64), found["faces"])
     named = [

@@ -29,19 +29,9 @@ def stl_triangles(
 ) -> NDArray[np.float64]:
     """Return the corners (n, 3, 3) of a file's triangles, mm; exactly its numbers.
 
-    Parameters
-    ----------
-    content, place
-        Of the file; `place` names it in messages.
-    most
-        How many triangles are allowed.
-    padded
-        Whether bytes may follow the last triangle of a binary file, as some programs leave.
-
-    Raises
-    ------
-    ShapeError
-        It is no STL, is cut short, too large, or holds NaN or infinity.
+    At most `most` of them; `padded`: bytes may follow the last triangle of a binary file, as some
+    programs leave. Raises `ShapeError` if it is no STL, is cut short, too large, or holds NaN or
+    infinity.
     """
     if _is_ascii(content):
         return _ascii_triangles(content, place, most)

@@ -1,17 +1,12 @@
 """Round faces as cylinders and cones, with symbols bent onto them: what CAD programs want.
 
-The printed form of a round face is a strip of facets; here is the face that they stand for.
-Symbols are bent onto it by `bend`.
+The printed form of a round face is a strip of facets, which stand for this face. It stays a strip
+where a CAD program could not close it up with its neighbours: a rim that two planar faces share,
+or that borders on facets of a blank face. Lengths in mm, angles in rad, frame of the face's axis.
 
-A face stays a strip where a CAD program could not close it up with its neighbours: a rim that
-two planar faces share, or that borders on facets of a blank face. Lengths in mm, angles in rad.
-
-Straight lines of a development -> curves on the cylinder or cone, as Bezier curves.
-
-A point (x, y) of the plane at height z lies on the surface moved outward by z: on a cylinder x
-goes around and y along the axis, on a cone angle and distance about the tip do. A straight
-line becomes a helix or a geodesic; its Bezier curve goes through points of it, as many as keep
-it on the surface within `bend_error_mm`. Lengths in mm, frame of the face's axis.
+A point (x, y) of the development at height z lies on the surface moved outward by z: on a
+cylinder x goes around and y along the axis, on a cone angle and distance about the tip do. A
+straight line becomes a helix or a geodesic, written as a Bezier curve through points of it.
 """
 
 from __future__ import annotations
@@ -30,8 +25,14 @@ from generator.polyhedron.check import directed_edges
 from generator.polyhedron.development import Development, development
 from generator.polyhedron.winged import Developable, Polyhedron
 from generator.solid.emboss import turn
-from generator.solid.part import AnalyticFace, BentSymbol, Part, Points, Rim
-from generator.solid.settings import EMBOSS
+from generator.solid.part import AnalyticFace, BentSymbol, Part, Points, Rim, transform
+
+_LEAST_FACETS = 3  # fewer facets do not tell an axis
+_ON_CIRCLE = 1e-6  # vertices off their circle by less, as a share of the size, lie on it
+#: Outlines of symbols in STEP lie this near to the round face: CAD programs keep 1e-4.
+BEND_ERROR_MM = 2e-6
+_DEGREES = (2, 9)  # of their Bezier curves; the highest is for symbols at the tip of a cone
+_SAMPLES = 12  # points of a curve at which that is checked
 
 
 class RoundSurfaceMap:
@@ -86,21 +87,15 @@ def bend_lines(
 ) -> list[Points]:
     """Return the control points of lines on the round face, each (degree, 3) without its end.
 
-    Parameters
-    ----------
-    place
-        The round face.
-    starts, steps, z_mm
-        (k, 2), (k, 2), (k,): where a line begins, how far it goes, and its height.
-    walls
-        (k,): lines of one number get one degree, as a ruled surface needs it.
+    `starts`, `steps` (k, 2), `z_mm` (k,): where a line begins, how far it goes, and its height;
+    `walls` (k,): lines of one number get one degree, as a ruled surface needs it.
     """
     found: list[Points] = [np.zeros((0, 3))] * len(starts)
     left = np.arange(len(starts))
-    for n in range(EMBOSS.bend_degrees[0], EMBOSS.bend_degrees[1] + 1):
+    for n in range(_DEGREES[0], _DEGREES[1] + 1):
         controls = _interpolate(place, starts[left], steps[left], z_mm[left], n)
-        bad = np.unique(walls[left][_off(place.face, controls, z_mm[left]) > EMBOSS.bend_error_mm])
-        again = np.isin(walls[left], bad) & (n < EMBOSS.bend_degrees[1])
+        bad = np.unique(walls[left][_off(place.face, controls, z_mm[left]) > BEND_ERROR_MM])
+        again = np.isin(walls[left], bad) & (n < _DEGREES[1])
         for k, own in zip(left[~again].tolist(), controls[~again], strict=True):
             found[k] = own[:-1]
         left = left[again]
@@ -131,7 +126,7 @@ def _bernstein(t: Points, n: int) -> Points:
 
 def _off(face: AnalyticFace, controls: Points, z_mm: Points) -> Points:
     """Return how far curves leave the surface moved outward by z, (k,) mm."""
-    t = np.linspace(0.0, 1.0, EMBOSS.bend_samples)
+    t = np.linspace(0.0, 1.0, _SAMPLES)
     points = _bernstein(t, controls.shape[1] - 1) @ controls
     radius: Points = face.radius_at(points[..., 2], z_mm[:, None])
     off: Points = np.abs(np.hypot(points[..., 0], points[..., 1]) - radius).max(axis=1)
@@ -146,16 +141,8 @@ def analytic_faces(
 ) -> tuple[AnalyticFace, ...]:
     """Return the round faces that can be written as cylinders and cones.
 
-    Parameters
-    ----------
-    polyhedron
-        Its vertices and faces are the first ones of the part; mm, object frame.
-    layouts
-        Symbols of a face, by its carrier.
-    tiers
-        One outline per label.
-    facets
-        Facets of the part that belong to a round face and its symbols, by its carrier.
+    The polyhedron's vertices and faces are the first ones of the part; mm, object frame. `layouts`
+    (symbols) and `facets` (of the part, symbols included) go by the carrier of a round face.
     """
     found = []
     for surface in polyhedron.surfaces:
@@ -180,7 +167,7 @@ def analytic_faces(
 def round_volume(part: Part) -> float | None:
     """Return by how much the body of a part is larger than its mesh, mm^3; None if nowhere round.
 
-    Closed form: circular sectors less triangles, at every height a quadratic of the radius.
+    Circular sectors less triangles, at every height a quadratic of the radius.
     """
     if not part.analytic:
         return None
@@ -205,21 +192,20 @@ def _plain_face(
 ) -> AnalyticFace | None:
     """Return a round face without its symbols; None where its vertices are not on circles."""
     d = development(polyhedron, surface)
-    if len(surface.facets) < EMBOSS.least_analytic_facets:
+    if len(surface.facets) < _LEAST_FACETS:
         return None
     axis = _axis(polyhedron.vertices, d, surface)
     if axis is None:
         return None
     T, reach = axis
     closed = surface.closed
-    inverse = np.linalg.inv(T)
-    ends = polyhedron.vertices[d.vertices] @ inverse[:3, :3].T + inverse[:3, 3]
+    ends = transform(np.linalg.inv(T).astype(np.float64), polyhedron.vertices[d.vertices])
     angles = np.unwrap(np.arctan2(ends[:, 0, 1], ends[:, 0, 0]))
     height = float(ends[:, 1, 2].mean())
     # Lines of a named shape stand outside its round face, see `polyhedron.shapes`.
     pushed = reach[0] - surface.radius_mm if surface.radius_mm < reach[0] and closed else 0.0
     grown = 1.0 - pushed / reach[0]
-    slack = EMBOSS.on_circle * max(1.0, *reach, height)
+    slack = _ON_CIRCLE * max(1.0, *reach, height)
     off = np.ptp(np.hypot(ends[:, :, 0], ends[:, :, 1]), axis=0).max()
     if off > slack or np.ptp(ends[:, :, 2], axis=0).max() > slack:
         return None

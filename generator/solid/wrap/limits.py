@@ -17,8 +17,7 @@ from generator.printers import Printer
 def least_facet_width(development: Development, height_mm: float) -> float:
     """Return the least width of a facet at a height, as a share of its width on the surface.
 
-    Over 1 on a convex face, under 1 in a hole; 0 or less where facets vanish below that
-    height.
+    Over 1 on a convex face, under 1 in a hole; 0 or less where facets vanish below that height.
     """
     d = development
     shares = []

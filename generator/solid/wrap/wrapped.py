@@ -1,23 +1,15 @@
 """Symbols on a round face -> facets of the part, with the feet cut out of the strip.
 
-Every facet that is made is planar: the strip's own ones less the feet, the tops piece by piece,
-the sides as triangles. Points that pieces share have one number, so the part stays closed, which
+Every facet is planar: the strip's own ones less the feet, the tops piece by piece, the sides as
+triangles. Cut points are made once and shared by number, so the part stays closed, which
 `prove_closed` checks edge by edge. Object frame, mm. Thesis 6.3.
 
-A strip of facets: from the plane in which symbols are laid out to the solid.
-
-A point is (x, y) in the plane and z above it, mm. Facet i lies between line i and line i + 1.
-At height z over a facet the strip is the facet's plane moved outward by z; over a line it is
-where the moved planes of both neighbours meet. In between a point is carried along by the share
-at which it lies between the two lines, so that what meets on a line in the plane meets there on
-the solid, and what is level in the plane is level over its facet.
-
-A symbol in the plane of a strip, cut along the lines between its facets.
-
-Tiers at their place -> the pieces of foot, sides and top on each facet. Every cut point is
-made once and shared by all pieces that meet there, so the pieces close up as the symbol did.
-A corner nearer to a line than `nudge_mm` is moved to that distance, on its own side: no
-point lies on a line, no edge runs along one, and no piece is thinner. Lengths in mm.
+A point of the strip is (x, y) in the plane of its development and z above it. Facet i lies
+between line i and line i + 1. At height z over a facet the strip is the facet's plane moved
+outward by z; over a line it is where the moved planes of both neighbours meet. In between a point
+is carried along by the share at which it lies between the two lines. A corner nearer to a line
+than `NUDGE_MM` is moved to that distance, on its own side: no point lies on a line, no edge runs
+along one, and no piece is thinner.
 """
 
 from __future__ import annotations
@@ -37,9 +29,10 @@ from generator.polyhedron.development import Development, development
 from generator.polyhedron.winged import Developable, Polyhedron
 from generator.solid.emboss import turn
 from generator.solid.part import Facet, WrappedSymbols
-from generator.solid.settings import EMBOSS
 
 Points = NDArray[np.float64]
+
+NUDGE_MM = 0.005  #: far below what prints or is felt, far above the rounding of STL
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,10 +103,7 @@ Loop = tuple[int, ...]
 def loops_of(edges: Sequence[tuple[int, int]], place: str) -> list[Loop]:
     """Return the loops that directed edges make.
 
-    Raises
-    ------
-    SolidError
-        A point has not exactly one edge in and one out.
+    Raises `SolidError` if a point has not exactly one edge in and one out.
     """
     after = dict(edges)
     if len(after) != len(edges) or set(after) != set(after.values()):
@@ -131,15 +121,7 @@ def loops_of(edges: Sequence[tuple[int, int]], place: str) -> list[Loop]:
 
 
 def with_holes(loops: Sequence[Loop], points: NDArray[np.float64]) -> list[tuple[Loop, ...]]:
-    """Return each counter-clockwise loop with the clockwise ones that lie in it.
-
-    Parameters
-    ----------
-    loops
-        Of numbers into `points`; none crosses another.
-    points
-        (k, 2).
-    """
+    """Return each counter-clockwise loop with the clockwise ones in it; `points`: (k, 2)."""
     areas = [signed_area(points[list(loop)]) for loop in loops]
     outer = sorted((k for k, area in enumerate(areas) if area > 0), key=lambda k: areas[k])
     found: dict[int, list[Loop]] = {k: [loops[k]] for k in outer}
@@ -174,20 +156,10 @@ class CutSymbol:
 def cut_symbol(
     strip: Strip, rings: list[list[Points]], z_mm: list[float], centre: Points, place: str
 ) -> CutSymbol:
-    """Cut a symbol.
+    """Cut a symbol along the lines between facets; `place` names it in errors.
 
-    Parameters
-    ----------
-    strip
-        The facets.
-    rings
-        [tier][ring] (k, 2) in the plane, outer counter-clockwise, holes clockwise.
-    z_mm
-        Height of each tier.
-    centre
-        (2,) of the symbol; inside a facet.
-    place
-        Names the symbol in errors.
+    `rings`: [tier][ring] (k, 2) in the plane, outer counter-clockwise, holes clockwise; `centre`
+    (2,) of the symbol, inside a facet.
     """
     return _Knife(strip, rings, z_mm, centre, place).cut()
 
@@ -205,9 +177,9 @@ class _Knife:
             raise SolidError("a symbol lies beside its face", place=place)
         foot = np.concatenate([ring for tier in rings for ring in tier])
         first, last = home, home + 1  # lines around the symbol, neither of which it meets
-        while first > 0 and strip.beside(first, foot).min() < EMBOSS.nudge_mm:
+        while first > 0 and strip.beside(first, foot).min() < NUDGE_MM:
             first -= 1
-        while last < strip.facets and strip.beside(last, foot).max() > -EMBOSS.nudge_mm:
+        while last < strip.facets and strip.beside(last, foot).max() > -NUDGE_MM:
             last += 1
         if strip.beside(first, foot).min() <= 0.0 or strip.beside(last, foot).max() >= 0.0:
             raise SolidError("a symbol reaches over the side of its face", place=place)
@@ -243,8 +215,8 @@ class _Knife:
             beside = self.strip.beside(line, ring)
             off = np.where(
                 beside < 0.0,
-                np.minimum(beside, -EMBOSS.nudge_mm),
-                np.maximum(beside, EMBOSS.nudge_mm),
+                np.minimum(beside, -NUDGE_MM),
+                np.maximum(beside, NUDGE_MM),
             )
             ring += (off - beside)[:, None] * self.strip.right[line]
             facet = np.where(off > 0.0, line, facet)
@@ -358,23 +330,9 @@ def wrapped_onto(
     layout: FaceLayout,
     tiers: tuple[Tiers, ...],
 ) -> None:
-    """Wrap the symbols of one round face onto the body.
+    """Wrap the symbols of one round face onto the body, whose facets there are the polyhedron's.
 
-    Parameters
-    ----------
-    body
-        Its facets of this face are still those of the polyhedron.
-    polyhedron, surface
-        The solid and its round face.
-    layout
-        Symbols of the face, in the plane of its development.
-    tiers
-        One outline per label.
-
-    Raises
-    ------
-    SolidError
-        A symbol lies beside the face, or a cut does not close.
+    Raises `SolidError` if a symbol lies off the face, or a cut does not close.
     """
     strip = strip_of(development(polyhedron, surface))
     name = polyhedron.faces[surface.carrier].name

@@ -10,7 +10,7 @@ from generator.alphabet.known import line
 from generator.alphabet.outline import engrave
 from generator.alphabet.strokes import same_shape, turn_glyph
 from generator.errors import AlphabetError
-from generator.solid.settings import EMBOSS
+from generator.solid.marks import MARK_DEPTH, MARK_SIZES
 
 L, E, F, C = (2, 1), (3, 3), (3, 2), (2, 2)
 
@@ -116,7 +116,7 @@ def test_names_are_written_in_capitals_or_not_at_all():
 
 @pytest.mark.parametrize("figure", FIGURES, ids=lambda figure: figure.name)
 def test_every_figure_is_engraved_in_every_size(figure):
-    for size in EMBOSS.mark_sizes:
+    for size in MARK_SIZES:
         for stroke in (0.4, 0.8, 1.6):
-            depth = EMBOSS.mark_depth * stroke
+            depth = MARK_DEPTH * stroke
             assert engrave(figure, size * stroke, stroke, depth).z_mm == (0.0, -depth)

@@ -12,9 +12,8 @@ from generator.polyhedron.development import development
 from generator.polyhedron.shapes import cone, cylinder
 from generator.polyhedron.winged import Face
 from generator.solid import emboss_whole, round_volume, volume
-from generator.solid.settings import EMBOSS
 from generator.solid.wrap import analytic_faces
-from generator.solid.wrap.analytic import RoundSurfaceMap, bend_lines
+from generator.solid.wrap.analytic import BEND_ERROR_MM, RoundSurfaceMap, bend_lines
 from tests.unit.generator.test_solid_wrap import STYLE, TIERS, layout_on
 
 SOLIDS = {
@@ -56,7 +55,7 @@ def test_lines_keep_their_length_and_stay_on_the_face(name):
         length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
         assert length == pytest.approx(np.hypot(*step), rel=3e-4)
         off = np.hypot(points[:, 0], points[:, 1]) - face.radius_at(points[:, 2], np.zeros(401))
-        assert np.abs(off).max() < 2 * EMBOSS.bend_error_mm
+        assert np.abs(off).max() < 2 * BEND_ERROR_MM
 
 
 def test_heights_are_distances_from_the_face():

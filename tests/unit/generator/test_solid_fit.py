@@ -21,7 +21,8 @@ from generator.polyhedron.winged import polyhedron
 from generator.printers import PRINTERS
 from generator.solid import panels, plain_panels, prove_closed, triangles, volume
 from generator.solid.emboss import turn
-from generator.solid.fit import PlainBody, beyond, body_volume, cut_off, shortest_edge_mm
+from generator.solid.fit import beyond, body_volume, cut_off, shortest_edge_mm
+from generator.solid.part import Facet, Part
 from generator.spec import read_specs
 
 FDM = PRINTERS["fdm-0.4"]
@@ -82,7 +83,7 @@ def test_panels_keep_the_gap_everywhere(solid, cuts):
     for part in made.fitted:
         prove_closed(part)
         assert volume(part) == pytest.approx(float(seated(part).volume()), rel=1e-12)
-        assert shortest_edge_mm(PlainBody(part.vertices, part.facets)) >= 0.05
+        assert shortest_edge_mm(part) >= 0.05
     assert any(a is not b for a, b in zip(made.mitred, made.fitted, strict=True)) == cuts
     if cuts:  # mitres alone are too near or run into each other; the cuts cost little
         assert measured(made.mitred)[1] < 0.139
@@ -140,10 +141,7 @@ def test_symbols_stand_on_what_the_cuts_leave(tmp_path, gap):
 def test_a_cube_loses_a_corner():
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
     solid = convex_hull(corners)
-    part = panels(solid, EMPTY, (), 0.2, FDM, numbers=False, gap_mm=0.01)
-    assert len(part.parts) == 6
-    facets = tuple(plain_facets(solid))
-    body = PlainBody(solid.vertices, facets)
+    body = plain_part(solid)
     normal = np.ones(3) / math.sqrt(3)
     offset = float(normal @ (1, 1, 0.5))
     (piece,) = beyond(body, normal, offset)
@@ -156,16 +154,15 @@ def test_a_cube_loses_a_corner():
     assert cut_off(body, normal, -1.0, np.ones(8, dtype=bool), "lid") is None
 
 
-def plain_facets(solid):
-    from generator.solid.part import Facet
-
-    return [Facet(face.name, face.loops) for face in solid.faces]
+def plain_part(solid):
+    facets = tuple(Facet(face.name, face.loops) for face in solid.faces)
+    return Part("solid", solid.vertices, facets, (), np.eye(4))
 
 
 def test_a_piece_of_a_fork_is_cut_alone():
     fork = np.array([(0, 0), (9, 0), (9, 9), (6, 9), (6, 3), (3, 3), (3, 9), (0, 9)], dtype=float)
     solid = extruded([fork], 2.0)
-    body = PlainBody(solid.vertices, tuple(plain_facets(solid)))
+    body = plain_part(solid)
     pieces = beyond(body, np.array([0.0, 1.0, 0.0]), 5.0)
     assert [int(piece.sum()) for piece in pieces] == [4, 4]
     cut = cut_off(body, np.array([0.0, 1.0, 0.0]), 5.0, pieces[0], "lid")

@@ -132,7 +132,7 @@ def test_collinear_edges_with_different_neighbours():
 
 def test_panels_of_a_cube_meet_but_do_not_overlap():
     solid = cube(60.0)
-    made = panels(solid, EMPTY, (), 3.0, FDM, numbers=False).parts
+    made = panels(solid, EMPTY, (), 3.0, FDM).parts
     for number, edge in enumerate(solid.edges):
         assert dihedral(solid, number) == pytest.approx(math.pi / 2)
         for part, other in ((edge.left, edge.right), (edge.right, edge.left)):

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pymeshlab
 import pytest
+from reference.expanded_solid import assert_expanded
 
 from generator.alphabet import SymbolStyle, alphabet_named, footprint_half_mm, outlines
 from generator.errors import SolidError
@@ -19,7 +20,6 @@ from generator.solid import (
     body_mesh,
     box,
     emboss_whole,
-    expand_part,
     panels,
     prove_closed,
     symbol_meshes,
@@ -111,28 +111,6 @@ def assert_one_solid(mesh, wanted_volume):
     assert checked.current_mesh().selected_face_number() == 0
 
 
-def assert_explicit(part):
-    """Check planarity to 1e-12, closure and volume of the expanded solid."""
-    solid = expand_part(part)
-    size = float(np.ptp(solid.vertices, axis=0).max())
-    loops = [loop for polygon in solid.polygons for loop in polygon.loops]
-    start = np.concatenate([np.array(loop) for loop in loops])
-    end = np.concatenate([np.roll(loop, -1) for loop in loops])
-    assert edges_once(start, end)
-    total = 0.0
-    for polygon in solid.polygons:
-        corners = [solid.vertices[list(loop)] for loop in polygon.loops]
-        points = np.concatenate(corners)
-        assert np.abs((points - points[0]) @ polygon.normal).max() <= 1e-12 * size
-        for ring in corners:
-            total += (
-                np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0)
-                @ ring[0]
-                / 6
-            )
-    assert total == pytest.approx(volume(part), rel=1e-11)
-
-
 @pytest.mark.parametrize(
     ("name", "turned"),
     [("cube", 0.0), ("cube", 0.3), ("tetrahedron", 0.3), ("ell", 0.0), ("ell", math.pi / 2)],
@@ -143,7 +121,7 @@ def test_whole_bodies_are_closed_and_do_not_meet_themselves(name, turned):
     layout = filled(solid, 7.0, half + 1.0, turned=turned, order=order)
     part = emboss_whole(solid, layout, tiers, name)
     prove_closed(part)
-    assert_explicit(part)
+    assert_expanded(part)
     count = np.bincount(np.concatenate([face.labels for face in layout.faces]), minlength=4)
     wanted = body_volume(solid) + sum(
         n * symbol_volume(t) for n, t in zip(count, tiers, strict=True)
@@ -167,7 +145,7 @@ def test_panels_are_closed_lie_flat_and_do_not_meet_themselves(name):
     assert [part.name for part in made.parts] == [f"{name}-{face.name}" for face in solid.faces]
     for part in made.parts:
         prove_closed(part)
-        assert_explicit(part)
+        assert_expanded(part)
         assert_one_solid(triangles(part), volume(part))
         low, high = box(part)
         symbols_on = any(embossing.face is not None for embossing in part.embossings)

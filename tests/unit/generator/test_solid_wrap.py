@@ -21,9 +21,8 @@ from generator.printers import printer_named
 from generator.solid import body_mesh, emboss_whole, prove_closed, symbol_meshes, triangles, volume
 from generator.solid.closed import edges_once
 from generator.solid.measure import symbol_volume
-from generator.solid.settings import EMBOSS
 from generator.solid.wrap import bend_problem
-from generator.solid.wrap.wrapped import cut_symbol, strip_of
+from generator.solid.wrap.wrapped import NUDGE_MM, cut_symbol, strip_of
 
 STYLE = SymbolStyle()
 TIERS = outlines(alphabet_named("dense-4"), STYLE)
@@ -114,7 +113,7 @@ def test_pieces_of_a_symbol_cover_it_wherever_it_stands(x, y, rotation, label):
         area = sum(signed_area(flat[list(loop)]) for _, loops in pieces for loop in loops)
         length = sum(float(np.hypot(*(ring - np.roll(ring, 1, 0)).T).sum()) for ring in tier)
         wanted = sum(signed_area(ring) for ring in tier)
-        assert area == pytest.approx(wanted, abs=2 * EMBOSS.nudge_mm * length)
+        assert area == pytest.approx(wanted, abs=2 * NUDGE_MM * length)
     for number, line in enumerate(cut.line):
         if line >= 0:
             assert abs(strip.beside(line, flat[number : number + 1])[0]) < 1e-9

@@ -15,11 +15,10 @@ from encoded_objects.base.output import write_json
 from probe.calibration import calibration_from, even_load, write_calibration
 from probe.circuit import QUIET, Electronics, fsr_of, read_sequence
 from probe.command import run
-from probe.command.calibrated import board_from
-from probe.command.loads import loads_given
+from probe.command.calibrated import board_from, loads_given
 from probe.errors import CalibrationError, CircuitError
 from probe.frame import frame_from, median_filter
-from probe.recording.read import Recording, read_frames
+from probe.recording.read import Recording
 from probe.recording.record import Recorder
 
 FORCES = (0, 40, 100, 200, 400)
@@ -262,7 +261,7 @@ def test_record_ends_by_frames_and_by_seconds(asked, tmp_path):
     assert (code, err) == (0, "")
     told = json.loads(text)
     assert (told["frames"], told["ended"], told["lost"]) == (40, "frames", 0)
-    frames = list(read_frames(out))
+    frames = list(Recording(out).frames())
     assert [f.seq - frames[0].seq for f in frames] == list(range(40))
     assert Recording(out).origin.sensor == "sim/0"
     code, text, _ = asked("record", "sim:?rate=500", "-o", out, "--seconds", "0.2", "--replace")
@@ -303,7 +302,7 @@ def test_a_calibration_of_another_sensor_is_refused(asked, bench, tmp_path):
 
 def test_replay_writes_every_frame_in_its_time(asked, bench):
     path = bench / "noise.h5"
-    held = list(read_frames(path))
+    held = list(Recording(path).frames())
     for speed in ("0", "2"):
         code, out, _ = asked("replay", path, "--speed", speed)
         rows = list(csv.reader(out.splitlines()))

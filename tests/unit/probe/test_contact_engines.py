@@ -9,6 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from manifold3d import Manifold
+from reference.indenters import Formula
 from scipy.optimize import brentq
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
@@ -20,6 +21,7 @@ from probe.errors import ContactError, ProbeError
 from probe.simulate.scene import bare_scene
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.sensor import LevelSensor
+from probe.surface.indenters import FlatPlate
 from probe.surface.mesh import mesh
 
 RIGID = WristStiffness(math.inf, math.inf)
@@ -121,21 +123,16 @@ def test_both_engines_feel_the_same_symbol():
     assert other.forces_n.sum() == pytest.approx(own.forces_n.sum(), rel=1e-3)
 
 
-class Heights:
-    """A surface of which nothing but its heights is known."""
-
-    def __init__(self, surface):
-        self.surface, self.top_mm = surface, surface.top_mm
-
-    def heights_mm(self, points_mm):
-        return self.surface.heights_mm(points_mm)
+def heights_alone(surface):
+    """Return a surface of which nothing but its heights is known."""
+    return Formula(lambda x, y: surface.heights_mm(np.stack([x, y], axis=1)), surface.top_mm)
 
 
 def test_only_what_lies_under_the_sensor_is_kept():
     part = mesh(block((-90, -90, -40), (90, 90, 0)))
     reach, deep = 12.7 + AROUND_MM, DEEP_MM
     # A body is cut; heights are closed by a floor deep enough for what is cut off.
-    for surface, under, count in ((part, deep, 12), (Heights(part), 2 * deep, 12)):
+    for surface, under, count in ((part, deep, 12), (heights_alone(part), 2 * deep, 12)):
         corners, faces = mesh_under(surface, SENSOR, Touch(50, 0, 0, 1.0))
         low, high = corners.min(axis=0), corners.max(axis=0)
         assert low == pytest.approx([50 - reach, -reach, -under], abs=1e-4)
@@ -146,32 +143,16 @@ def test_only_what_lies_under_the_sensor_is_kept():
 def test_heights_alone_feel_as_their_body_does(press):
     surface = mesh(plate_with_bars(wide=3.0))
     touch = Touch(0.4, -0.3, 0.5, 10.0, 0.01, -0.01)
-    body, heights = (press(s, SENSOR, touch, TIPS) for s in (surface, Heights(surface)))
+    body, heights = (press(s, SENSOR, touch, TIPS) for s in (surface, heights_alone(surface)))
     off = np.linalg.norm(heights.forces_n - body.forces_n) / np.linalg.norm(body.forces_n)
     assert off < 0.1
     assert heights.z_mm == pytest.approx(body.z_mm, abs=0.02)
 
 
-def test_no_force_is_no_contact(press):
-    plate = mesh(block((-30, -30, -5), (30, 30, 0)))
-    found = press(plate, SENSOR, Touch(0, 0, 0, 0.0), TIPS)
-    assert not found.forces_n.any()
-    assert found.z_mm == math.inf
-
-
-class Void:
-    """Heights without any matter."""
-
-    top_mm = 0.0
-
-    def heights_mm(self, points_mm):
-        return np.full(len(points_mm), -np.inf)
-
-
 @pytest.mark.parametrize(
     ("surface", "sensor", "touch", "says"),
     [
-        (Void(), SENSOR, Touch(0, 0, 0, 10.0), "nothing under the sensor"),
+        (FlatPlate(-math.inf), SENSOR, Touch(0, 0, 0, 10.0), "nothing under the sensor"),
         (None, SensorType(overlay=Overlay(kind="pad")), Touch(0, 0, 0, 10.0), "knows tabs"),
         (None, SENSOR, Touch(500, 0, 0, 10.0), "nothing under the sensor"),
         (None, SENSOR, Touch(0, 0, 0, -1.0), "must be finite"),
@@ -195,7 +176,7 @@ def test_a_third_engine_is_one_module_and_one_line(monkeypatch):
     monkeypatch.setitem(ENGINES, "third", EngineEntry("third_engine", "everything"))
     rng = np.random.default_rng(3)
     sensor = LevelSensor(SENSOR, LEVELS["sound"], "third")
-    reading = sensor.read(bare_scene(Void()), Touch(0, 0, 0, 128.0), rng)
+    reading = sensor.read(bare_scene(FlatPlate(-math.inf)), Touch(0, 0, 0, 128.0), rng)
     counts, contact = reading.counts, reading.contact
     assert (contact.level, contact.z_mm) == ("third", 0.25)
     assert np.ptp(counts.astype(int)) <= 2  # every tactel bears half a newton; the board rounds

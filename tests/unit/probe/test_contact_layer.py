@@ -4,27 +4,17 @@ import math
 
 import numpy as np
 import pytest
+from reference.indenters import Formula, half_plane, paraboloid, sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import STEEPEST_RAD, Touch, WristStiffness
-from probe.contact.layer import DEEPEST, layer, press_patch
+from probe.contact.layer import DEEPEST, layer
 from probe.contact.layer_equilibrium import deep_mm, descend, equilibrium, plate_of, springs_mm
 from probe.contact.layer_influence import influence
 from probe.contact.layer_patch import MOST_LEVELS, DepthWindow, levels_of, patch_under
 from probe.contact.plate import PlatePose
-from probe.contact.press import press
 from probe.errors import ContactError
-from probe.surface.indenters import (
-    Cross,
-    FlatPlate,
-    HalfPlane,
-    Paraboloid,
-    RaisedStrip,
-    RoughSurface,
-    Sphere,
-    TiltedPlane,
-    Washer,
-)
+from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, RoughSurface, TiltedPlane, Washer
 
 FREE, HELD = WristStiffness(0.0, 0.0), WristStiffness(math.inf, math.inf)
 
@@ -52,7 +42,7 @@ def posed(surface, sensor, touch, cells=2, plane=None, floor=-1.0):
 
 SCENES = {
     "washer": (Washer(6.0, 2.0), Touch(0.3, -0.2, 0.4, 6.0)),
-    "off the middle": (Sphere(20.0), Touch(1.0, 0.7, 0.0, 3.0, 0.02, -0.03)),
+    "off the middle": (sphere(20.0), Touch(1.0, 0.7, 0.0, 3.0, 0.02, -0.03)),
     "held fast": (Cross(1.3, 7.0), Touch(0.2, 0.1, 0.3, 5.0, 0.01, 0.0, HELD)),
     "free": (FlatPlate(), Touch(0.0, 0.0, 0.0, 10.0, wrist=FREE)),
     "rough": (RoughSurface(3, 0.05, 1.0), Touch(0.0, 0.0, 0.0, 4.0)),
@@ -145,11 +135,12 @@ def test_an_independent_solver_finds_the_same(scene, poisson):
     assert np.linalg.norm(images[0] - images[1]) <= 1e-5 * np.linalg.norm(images[1])
 
 
-SURFACES = (Washer(), RaisedStrip(1.3), Sphere(30.0), Cross(1.6, 15.0), TiltedPlane(0.05, -0.08),
-            RoughSurface(1, 0.1, 1.5), HalfPlane(), HalfPlane(-0.6), Paraboloid(200.0))  # fmt: skip
+SURFACES = (Washer(), RaisedStrip(1.3), sphere(30.0), Cross(1.6, 15.0), TiltedPlane(0.05, -0.08),
+            RoughSurface(1, 0.1, 1.5), half_plane(), half_plane(-0.6),
+            paraboloid(200.0))  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(36))
 def test_scenes_at_random_are_finite_and_balanced(seed):
     rng = np.random.default_rng([5, seed])
     height, young = 10 ** rng.uniform(math.log10(0.05), math.log10(20)), 10 ** rng.uniform(-1, 2)
@@ -173,7 +164,7 @@ def test_scenes_at_random_are_finite_and_balanced(seed):
 
 
 @pytest.mark.parametrize("height", [0.05, 0.3, 2.0, 20.0])
-@pytest.mark.parametrize("poisson", [0.0, 0.499, 0.5])
+@pytest.mark.parametrize("poisson", [0.0, 0.5])
 def test_pads_of_every_height(height, poisson):
     sensor = pad(height_mm=height, poisson=poisson)
     found = layer(Washer(), sensor, Touch(0.3, 0.1, 0.2, 1.0), cells_per_tactel=2)
@@ -183,7 +174,7 @@ def test_pads_of_every_height(height, poisson):
         assert found.forces_n[8, 8] <= 1e-3 * found.forces_n.max()
 
 
-@pytest.mark.parametrize("exponent", range(-9, 10))
+@pytest.mark.parametrize("exponent", range(-9, 10, 3))
 def test_forces_of_every_size_are_borne_or_refused(exponent):
     force, sensor = 10.0**exponent, pad()
     small = layer(Washer(), sensor, Touch(0.3, 0.1, 0.2, 1e-3, wrist=HELD), cells_per_tactel=2)
@@ -199,16 +190,9 @@ def test_forces_of_every_size_are_borne_or_refused(exponent):
     assert found.forces_n / force == pytest.approx(small.forces_n / 1e-3, rel=1e-3, abs=1e-5)
 
 
-def test_no_force_is_an_exactly_zero_image():
-    found = layer(Washer(), pad(), Touch(0.1, 0.2, 0.3, 0.0, 0.04, 0.05))
-    assert (found.forces_n == 0).all()
-    assert (found.z_mm, found.tilt_x_rad, found.tilt_y_rad) == (math.inf, 0.04, 0.05)
-    assert found.level == "layer"
-
-
 def test_edge_of_a_face_and_ten_degrees():
     sensor, ten = pad(), math.radians(10.0)
-    edge = layer(HalfPlane(), sensor, Touch(3.0, 0.0, 0.0, 30.0, wrist=WristStiffness(1e5, 1e5)))
+    edge = layer(half_plane(), sensor, Touch(3.0, 0.0, 0.0, 30.0, wrist=WristStiffness(1e5, 1e5)))
     assert edge.forces_n[:, :7].sum() > 0.97 * 30  # matter where x <= -3 mm: 6.1 columns
     assert edge.forces_n[:, 9:].sum() < 0.01 * 30
     tilted = layer(
@@ -220,7 +204,7 @@ def test_edge_of_a_face_and_ten_degrees():
     assert tilted.tilt_x_rad == pytest.approx(ten, rel=1e-4)
     assert tilted.forces_n[8:].sum() > 0.99 * 10  # the plate's lower side is at the bottom
     with pytest.raises(ContactError, match="tips"):
-        layer(HalfPlane(), sensor, Touch(3.0, 0.0, 0.0, 30.0, wrist=FREE))
+        layer(half_plane(), sensor, Touch(3.0, 0.0, 0.0, 30.0, wrist=FREE))
     with pytest.raises(ContactError, match="tips: its centre"):
         layer(Washer(4.0, 0.0), sensor, Touch(8.0, 0.0, 0.0, 30.0, wrist=FREE))
 
@@ -262,22 +246,8 @@ def test_what_is_refused():
             layer(Washer(), sensor, Touch(0, 0, 0, force))
     with pytest.raises(ContactError, match="nothing under"):
         layer(Washer(), sensor, Touch(80.0, 0, 0, 10.0))
-    with pytest.raises(ContactError, match="elsewhere"):
-        press_patch(patch_under(Washer(), sensor, touch), Touch(1, 0, 0, 10.0))
-
-
-class Hole:
-    """Heights that are no numbers at one side."""
-
-    top_mm = 0.0
-
-    def heights_mm(self, points_mm):
-        return np.where(points_mm[:, 0] > 0, math.nan, 0.0)
-
-
-def test_heights_that_are_no_numbers_are_refused():
     with pytest.raises(ContactError, match="no numbers"):
-        layer(Hole(), pad(), Touch(0, 0, 0, 10.0))
+        layer(Formula(lambda x, _y: np.where(x > 0, math.nan, 0.0)), sensor, touch)
 
 
 class Counted:
@@ -297,33 +267,15 @@ def test_cells_that_cannot_touch_are_never_sampled_in_full():
     assert surface.asked < 4096 * 4 + 800 * 16
 
 
-def test_a_patch_serves_touches_of_other_force_and_tilt():
-    sensor, touch = pad(), Touch(0.2, 0.1, 0.3, 20.0)
-    patch = patch_under(Sphere(30.0), sensor, touch)
-    for force, tilt in ((20.0, 0.0), (0.1, 0.03), (60.0, -0.02)):
-        other = Touch(0.2, 0.1, 0.3, force, tilt)
-        again, alone = press_patch(patch, other), layer(Sphere(30.0), sensor, other)
-        assert (again.forces_n == alone.forces_n).all()
-        assert again.z_mm == alone.z_mm
-
-
 def test_symmetry_and_repetition():
     sensor = pad()
     touch = Touch(0.37, -0.21, 0.0, 25.0, 0.01, 0.02)
-    one = layer(Sphere(25.0), sensor, touch)
-    assert (layer(Sphere(25.0), sensor, touch).forces_n == one.forces_n).all()
-    half = layer(Sphere(25.0), sensor, Touch(-0.37, 0.21, 0.0, 25.0, -0.01, -0.02))
+    one = layer(sphere(25.0), sensor, touch)
+    assert (layer(sphere(25.0), sensor, touch).forces_n == one.forces_n).all()
+    half = layer(sphere(25.0), sensor, Touch(-0.37, 0.21, 0.0, 25.0, -0.01, -0.02))
     assert half.forces_n == pytest.approx(one.forces_n[::-1, ::-1], abs=5e-3 * one.forces_n.max())
-    moved = layer(Sphere(25.0), sensor, Touch(0.37 - sensor.pitch_mm, -0.21, 0.0, 25.0, wrist=HELD))
-    still = layer(Sphere(25.0), sensor, Touch(0.37, -0.21, 0.0, 25.0, wrist=HELD))
+    moved = layer(sphere(25.0), sensor, Touch(0.37 - sensor.pitch_mm, -0.21, 0.0, 25.0, wrist=HELD))
+    still = layer(sphere(25.0), sensor, Touch(0.37, -0.21, 0.0, 25.0, wrist=HELD))
     assert moved.forces_n[:, 1:] == pytest.approx(
         still.forces_n[:, :-1], abs=2e-2 * still.forces_n.max()
     )
-
-
-def test_press_offers_the_layer():
-    touch = Touch(0.3, -0.1, 0.2, 40.0)
-    for name, cells in (("layer", 4), ("layer-2", 2), ("layer-8", 8)):
-        pressed = press(Washer(), pad(), touch, accuracy=name)
-        alone = layer(Washer(), pad(), touch, cells_per_tactel=cells)
-        assert (pressed.forces_n == alone.forces_n).all()

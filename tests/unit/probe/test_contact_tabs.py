@@ -1,28 +1,19 @@
 """Separate tabs: the law of a tip, balance, symmetry, leaving out, extremes and refusals."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from reference.indenters import Formula, half_plane, sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact import tabs as tabs_module
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.plate import Columns, PlatePose, load_of, rest
+from probe.contact.plate import Columns, PlatePose, rest
 from probe.contact.tabs import SKIN, heights_under, tabs, tabs_at_rest, tip_laws
 from probe.contact.tips import NUMBERS, Tips, rings, square, tip_points
 from probe.errors import ContactError
-from probe.surface.indenters import (
-    Cross,
-    FlatPlate,
-    HalfPlane,
-    RaisedStrip,
-    RoughSurface,
-    Sphere,
-    TiltedPlane,
-    Washer,
-)
+from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, RoughSurface, TiltedPlane, Washer
 
 SENSOR = SensorType()
 RIGID = WristStiffness(math.inf, math.inf)
@@ -30,23 +21,12 @@ ONE_TAB = SensorType(rows=1, columns=1)
 AREA = math.pi * 1.2666**2 / 4
 
 
-@dataclass(frozen=True)
-class Lambda:
-    """A surface by formula."""
-
-    height: object
-    top_mm: float = 0.0
-
-    def heights_mm(self, points_mm):
-        return self.height(*points_mm.T)
-
-
 def pressed(surface, force=80.0, sensor=SENSOR, tips=None, **where):
     at = {"x_mm": 0.0, "y_mm": 0.0, "theta_rad": 0.0, **where}
     return tabs(surface, sensor, Touch(force_n=force, **at), tips)
 
 
-@pytest.mark.parametrize("force", [1e-6, 1.0, 80.0, 300.0, 1e5])
+@pytest.mark.parametrize("force", [1e-6, 80.0, 1e5])
 def test_covered_wholly_a_tab_is_the_neo_hookean_column(force):
     found = pressed(FlatPlate(1.0), force)
     np.testing.assert_allclose(found.forces_n, force / 256, rtol=1e-5)
@@ -55,14 +35,7 @@ def test_covered_wholly_a_tab_is_the_neo_hookean_column(force):
     assert stress * AREA * 256 == pytest.approx(force, rel=1e-5)
 
 
-def test_a_cross_at_80_n_is_strained_by_about_half():
-    # By linear springs the strain would be 1.06, which no tab can do.
-    found = pressed(Cross(width_mm=2.0, length_mm=26.0))
-    assert 0.4 < -found.z_mm / 2.0 < 0.55
-
-
-@pytest.mark.parametrize("points", [37, 127])
-@pytest.mark.parametrize("edge_mm", [-0.5, -0.3, -0.1, 0.0, 0.2, 0.4])
+@pytest.mark.parametrize(("points", "edge_mm"), [(37, -0.5), (127, -0.3), (37, -0.1), (127, 0.2)])
 def test_a_tip_covered_in_part_bears_more_than_its_share(points, edge_mm):
     """Sinking by the same depth: F(c)/F(1) within .02 of c (1 + .59 (1 - c)). Numerics, L1."""
     tips = Tips(points)
@@ -70,27 +43,11 @@ def test_a_tip_covered_in_part_bears_more_than_its_share(points, edge_mm):
     share = float((at[0, :, 0] <= edge_mm).mean())
     tiny = 1e-6
     touch = Touch(-edge_mm, 0.0, 0.0, tiny, wrist=RIGID)
-    part = tabs(HalfPlane(), ONE_TAB, touch, tips)
+    part = tabs(half_plane(), ONE_TAB, touch, tips)
     whole = tabs(FlatPlate(), ONE_TAB, touch, tips)
     ratio = whole.z_mm / part.z_mm
     assert ratio == pytest.approx(share * (1 + SKIN) / (1 + SKIN * share), rel=1e-4)
     assert abs(ratio - share * (1 + 0.59 * (1 - share))) < 0.022
-
-
-def test_the_measured_cover_law_is_met_within_three_per_cent():
-    for share, measured in ((0.25, 0.34), (0.5, 0.65), (1.0, 1.0)):
-        assert abs(share * (1 + SKIN) / (1 + SKIN * share) - measured) < 0.03
-
-
-def test_no_point_of_a_tip_pulls_and_the_force_rises_with_depth():
-    rng = np.random.default_rng(1)
-    forces = []
-    heights = rng.random((1, 19)) * 0.8
-    for depth in np.linspace(0.05, 0.9, 12):
-        found, _ = level(heights, depth)
-        assert (found >= 0).all()
-        forces.append(found.sum())
-    assert (np.diff(forces) > 0).all()
 
 
 def level(heights, depth):
@@ -109,7 +66,7 @@ def level(heights, depth):
 
 def test_two_heights_under_one_tip_agree_with_the_column_solved_alone():
     touch = Touch(0.0, 0.0, 0.0, 1.5, wrist=RIGID)
-    surface = HalfPlane(floor_mm=-0.4)
+    surface = half_plane(floor_mm=-0.4)
     found = tabs(surface, ONE_TAB, touch, Tips(37))
     heights = heights_under(surface, touch, tip_points(ONE_TAB, Tips(37))[0])
     forces, _ = level(heights, -found.z_mm)
@@ -121,16 +78,16 @@ SCENES = {
     "washer": Washer(),
     "cross": Cross(),
     "strip": RaisedStrip(),
-    "sphere": Sphere(40.0),
-    "half": HalfPlane(),
-    "step": HalfPlane(floor_mm=-0.3),
+    "sphere": sphere(40.0),
+    "half": half_plane(),
+    "step": half_plane(floor_mm=-0.3),
     "rough": RoughSurface(seed=2, rms_mm=0.1),
     "plane": TiltedPlane(0.05, -0.03),
 }
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.03, -0.02), (0.1745, 0.0)])
+@pytest.mark.parametrize("tilt", [(0.03, -0.02), (0.1745, 0.0)])
 def test_forces_and_moments_balance(name, tilt):
     touch = Touch(0.7, -0.4, 0.3, 80.0, *tilt)
     found = tabs(SCENES[name], SENSOR, touch)
@@ -151,8 +108,8 @@ def test_what_is_left_out_changes_nothing(name):
     heights = heights_under(SCENES[name], touch, points) - drop
     skin, column = tip_laws(SENSOR.overlay, 19)
     columns = Columns(column, np.arange(256) * 19, np.arange(4864) // 19, np.zeros(256))
-    whole = rest(points.reshape(-1, 2), heights.ravel(), skin, load_of(touch), columns=columns)
-    found, forces = tabs_at_rest(points, heights, SENSOR.overlay, load_of(touch))
+    whole = rest(points.reshape(-1, 2), heights.ravel(), skin, touch, columns=columns)
+    found, forces = tabs_at_rest(points, heights, SENSOR.overlay, touch)
     assert found.pose.z_mm == pytest.approx(whole.pose.z_mm, abs=2e-6)
     assert found.pose.tilt_x_rad == pytest.approx(whole.pose.tilt_x_rad, abs=1e-6)
     np.testing.assert_allclose(forces, whole.forces_n.reshape(256, 19).sum(axis=1), atol=4e-5)
@@ -169,10 +126,10 @@ def test_points_that_were_not_foreseen_to_touch_are_taken_in(monkeypatch):
         return PlatePose(-1e-3, 0.0, 0.0), 1e-3
 
     touch = Touch(0.0, 0.0, 0.0, 200.0)
-    right = tabs(HalfPlane(floor_mm=-0.3), SENSOR, touch)
+    right = tabs(half_plane(floor_mm=-0.3), SENSOR, touch)
     monkeypatch.setattr(tabs_module, "rest", counted)
     monkeypatch.setattr(tabs_module, "predicted_pose", too_high)
-    found = tabs(HalfPlane(floor_mm=-0.3), SENSOR, touch)
+    found = tabs(half_plane(floor_mm=-0.3), SENSOR, touch)
     assert len(calls) > 1
     assert calls[-1] > calls[0]
     np.testing.assert_allclose(found.forces_n, right.forces_n, atol=1e-4)
@@ -184,20 +141,14 @@ def test_a_symmetric_scene_gives_a_symmetric_image_but_for_the_points():
         assert np.linalg.norm(image - image[:, ::-1]) < within * np.linalg.norm(image)
 
 
-def test_half_a_turn_about_a_symmetric_body_is_the_same_touch():
-    one = pressed(RaisedStrip(width_mm=3.3), theta_rad=0.2, x_mm=0.1)
-    other = pressed(RaisedStrip(width_mm=3.3), theta_rad=0.2 + math.pi, x_mm=-0.1)
-    np.testing.assert_allclose(other.forces_n, one.forces_n, rtol=1e-6, atol=1e-9)
-
-
 def test_frames_and_signs_of_a_touch():
     # The sensor stands with its right half over the face, so its right columns bear.
-    found = pressed(HalfPlane(), x_mm=0.0, theta_rad=math.pi)
+    found = pressed(half_plane(), x_mm=0.0, theta_rad=math.pi)
     right = found.forces_n[:, 8:].sum()
     assert right > 0.95 * 80
     # The face pushes up on the right, which lifts it: zeta = z - tilt_y x rises with x.
     assert found.tilt_y_rad < 0
-    top = pressed(HalfPlane(), x_mm=0.0, theta_rad=-math.pi / 2)
+    top = pressed(half_plane(), x_mm=0.0, theta_rad=-math.pi / 2)
     # theta = -90: the sensor's y is the surface's x, matter lies where the sensor's y <= 0.
     assert top.forces_n[8:].sum() > 0.95 * 80
     assert top.tilt_x_rad < 0
@@ -214,27 +165,20 @@ def test_pose_and_forces_are_continuous_in_the_arm_s_tilt():
         assert abs(after.z_mm - before.z_mm) < 2 * step + 1e-6
 
 
-def test_no_force_is_an_exactly_zero_image():
-    found = pressed(Cross(), 0.0, tilt_x_rad=0.01)
-    assert not found.forces_n.any()
-    assert found.z_mm == math.inf
-    assert (found.tilt_x_rad, found.iterations, found.level) == (0.01, 0, "tabs")
-
-
-@pytest.mark.parametrize("force", [1e-9, 1e-3, 1.0, 80.0, 1e4, 1e9])
+@pytest.mark.parametrize("force", [1e-9, 1.0, 1e4, 1e9])
 @pytest.mark.parametrize("scene", ["flat", "needle", "corner", "sphere", "step", "tilt", "edge"])
 def test_extreme_scenes_give_a_finite_image_or_a_clear_refusal(force, scene):
     surface, where = {
         "flat": (FlatPlate(), {}),
         "needle": (
-            Lambda(lambda x, y: np.where(np.hypot(x - 8.73, y - 0.79) < 0.3, 0, -np.inf)),
+            Formula(lambda x, y: np.where(np.hypot(x - 8.73, y - 0.79) < 0.3, 0, -np.inf)),
             {},
         ),
-        "corner": (Lambda(lambda x, y: -3 * np.hypot(x, y)), {"x_mm": 1.0}),
-        "sphere": (Sphere(2.0), {}),
-        "step": (HalfPlane(floor_mm=-1.0), {"x_mm": 5.0}),
+        "corner": (Formula(lambda x, y: -3 * np.hypot(x, y)), {"x_mm": 1.0}),
+        "sphere": (sphere(2.0), {}),
+        "step": (half_plane(floor_mm=-1.0), {"x_mm": 5.0}),
         "tilt": (Washer(floor_mm=-1.0), {"tilt_x_rad": math.radians(10)}),
-        "edge": (HalfPlane(), {"x_mm": 11.5}),
+        "edge": (half_plane(), {"x_mm": 11.5}),
     }[scene]
     if force > 1e3 and scene != "flat":
         try:
@@ -249,12 +193,12 @@ def test_extreme_scenes_give_a_finite_image_or_a_clear_refusal(force, scene):
 
 
 def test_a_needle_far_out_turns_the_plate_until_it_tips():
-    needle = Lambda(lambda x, y: np.where(np.hypot(x - 9, y) < 0.9, 0, -np.inf))
+    needle = Formula(lambda x, y: np.where(np.hypot(x - 9, y) < 0.9, 0, -np.inf))
     light = pressed(needle, 10.0)
     assert light.tilt_y_rad == pytest.approx(-10 * 9 / 3000, rel=0.1)
     with pytest.raises(ContactError, match=r"tips.*degrees"):
         pressed(needle, 200.0)
-    with pytest.raises(ContactError, match=r"tips.*centre of pressure"):
+    with pytest.raises(ContactError, match=r"tips.*its centre"):
         pressed(needle, 1.0, wrist=WristStiffness(0.0, 0.0))
 
 
@@ -285,29 +229,22 @@ def test_tabs_that_all_stand_off_by_the_same_are_a_sensor_moved():
 
 
 @pytest.mark.parametrize(
-    ("call", "message"),
+    ("surface", "given", "message"),
     [
-        (
-            lambda: pressed(FlatPlate(), sensor=SensorType(overlay=Overlay(kind="pad"))),
-            "overlay is a pad",
-        ),
-        (
-            lambda: pressed(FlatPlate(), sensor=SensorType(overlay=Overlay(young_mpa=0.0))),
-            "modulus 0",
-        ),
-        (lambda: pressed(FlatPlate(-math.inf)), "nothing under the sensor to bear 80 N"),
-        (lambda: pressed(FlatPlate(math.nan)), "no numbers"),
-        (lambda: pressed(FlatPlate(math.inf)), "no numbers"),
-        (lambda: pressed(FlatPlate(), -1.0), "force not negative"),
-        (lambda: pressed(FlatPlate(), math.nan), "finite"),
-        (lambda: pressed(FlatPlate(), math.inf), "finite"),
-        (lambda: pressed(FlatPlate(), tips=Tips(8)), "patterns have 7, 19"),
-        (lambda: pressed(FlatPlate(), tips=Tips(lengths_mm=np.zeros(3))), "lengths have shape"),
+        (FlatPlate(), {"sensor": SensorType(overlay=Overlay(kind="pad"))}, "overlay is a pad"),
+        (FlatPlate(), {"sensor": SensorType(overlay=Overlay(young_mpa=0.0))}, "modulus 0"),
+        (FlatPlate(-math.inf), {}, "nothing under the sensor to bear 80 N"),
+        (FlatPlate(math.nan), {}, "no numbers"),
+        (FlatPlate(math.inf), {}, "no numbers"),
+        (FlatPlate(), {"force": -1.0}, "force not negative"),
+        (FlatPlate(), {"force": math.inf}, "finite"),
+        (FlatPlate(), {"tips": Tips(8)}, "patterns have 7, 19"),
+        (FlatPlate(), {"tips": Tips(lengths_mm=np.zeros(3))}, "lengths have shape"),
     ],
 )
-def test_what_gives_no_touch_is_refused(call, message):
+def test_what_gives_no_touch_is_refused(surface, given, message):
     with pytest.raises(ContactError, match=message):
-        call()
+        pressed(surface, **given)
 
 
 @pytest.mark.parametrize("n", NUMBERS)

@@ -10,12 +10,12 @@ from probe.calibration import calibration_from, even_load, expected_counts
 from probe.calibration.load import BIAS_FRAMES
 from probe.circuit import Electronics, fsr_of, read_sequence
 from probe.client import ClientStatistics
+from probe.command.live import KEYS, SHADES, heat_map, line_of, render_frame
 from probe.command.live_state import LiveState
-from probe.command.live_view import KEYS, SHADES, heat_map, line_of, render_frame
 from probe.frame import frame_from
 from probe.protocol import IdentPacket
 from probe.recording.files import next_free
-from probe.recording.read import Recording, read_frames
+from probe.recording.read import Recording
 
 COUNTS = ClientStatistics(frames=120, rate=99.9, lost=3, failed=1, reopenings=1)
 IDENT = IdentPacket(seq=0, t_us=0, settling_us=10.0, baud=1_000_000, sensor=2, name="FSR-uno")
@@ -115,7 +115,7 @@ def test_recordings_and_images_get_the_next_free_name(state, tmp_path):
         state.toggle_recording("sim/0")
         assert state.notice == f"live-00{number}.h5: 2 frames"
     assert Recording(tmp_path / "live-002.h5").origin.sensor == "sim/0"
-    assert [int(f.counts[0, 0]) for f in read_frames(tmp_path / "live-001.h5")] == [5, 6]
+    assert [int(f.counts[0, 0]) for f in Recording(tmp_path / "live-001.h5").frames()] == [5, 6]
     state.save()
     assert (np.load(tmp_path / "image-001.npy") == 6).all()
     assert (tmp_path / "image-001.png").read_bytes().startswith(b"\x89PNG")

@@ -6,11 +6,11 @@ from itertools import islice
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.frame import Frame, frame_from
 from probe.port import open_port
-from probe.port.recorded import endless_frames
 from probe.port.simulated import moving_pattern
-from probe.port.software import SoftwareProbe
+from probe.port.software import SoftwareProbe, endless_frames
 from probe.protocol import FramePacket, IdentPacket, Splitter, StatisticsPacket, decode
 
 IDENT = IdentPacket(0, 0, name="test")
@@ -129,7 +129,7 @@ def test_a_recording_repeats_with_rising_numbers_and_times():
 
 
 def test_the_pattern_moves_and_tells_up_from_down():
-    shown = list(islice(moving_pattern(100.0), 400))
+    shown = list(islice(moving_pattern(100.0, SensorType()), 400))
     assert [f.seq for f in shown] == list(range(400))
     assert shown[250].t_ns == 2_500_000_000
     images = np.array([f.counts for f in shown])

@@ -1,4 +1,4 @@
-"""Frames -> files -> frames: what is written, what the files are called, what is read."""
+"""Frames -> files -> frames: names, series, files of others, damaged ones and their repair."""
 
 from __future__ import annotations
 
@@ -9,61 +9,35 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from recorded import frames, pose_at, record, same
 
 from probe.errors import RecordingError
-from probe.frame import Frame, frame_from
-from probe.recording.read import Recording, read_frames
+from probe.frame import Frame
+from probe.recording.guard import superblock_of
+from probe.recording.read import Recording
 from probe.recording.record import Recorder
+from probe.recording.repair import repair
+from probe.recording.table import export_csv
 
-HZ = 220
-
-
-def pose_at(x):
-    pose = np.eye(4)
-    pose[0, 3] = x
-    return pose
-
-
-def frames(count, *, first=0, pose=None):
-    rng = np.random.default_rng([count, first])
-    return [
-        frame_from(
-            rng.integers(0, 1024, (16, 16)),
-            t_ns=i * 1_000_000_000 // HZ,
-            seq=i,
-            wrist=rng.integers(0, 1024, 4),
-            pose=pose,
-        )
-        for i in range(first, first + count)
-    ]
-
-
-def record(path, given, **options):
-    with Recorder(path, **options) as recorder:
-        for frame in given:
-            recorder.append(frame)
-    return recorder
-
-
-def same(a: Frame, b: Frame) -> bool:
-    poses = (a.pose is None) == (b.pose is None) and (a.pose is None or (a.pose == b.pose).all())
-    numbers = (a.t_ns, a.seq) == (b.t_ns, b.seq)
-    return bool(numbers and poses and (a.counts == b.counts).all() and (a.wrist == b.wrist).all())
+COUNTS = np.random.default_rng(3).integers(0, 1024, (600, 16, 16)).astype(np.uint16)
 
 
 def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_frames_come_back_as_they_were(tmp_path):
-    given = frames(200)
-    recorder = record(tmp_path / "touch.h5", given)
-    assert recorder.files == [tmp_path / "touch.h5"]
-    assert names(tmp_path) == ["touch.h5"]
-    read = list(read_frames(tmp_path / "touch.h5"))
-    assert len(read) == 200
-    assert all(map(same, read, given))
-    assert not read[0].counts.flags.writeable
+def foreign(path: Path, **datasets) -> Path:
+    with h5py.File(path, "w") as file:
+        for name, values in datasets.items():
+            file[name] = values
+    return path
+
+
+def refused(path: Path, match: str) -> None:
+    with pytest.raises(RecordingError, match=match) as caught:
+        list(Recording(path).frames())
+    assert caught.value.fix
+    assert str(path) in str(caught.value)
 
 
 def test_the_file_is_plain_hdf5_with_its_origin(tmp_path):
@@ -72,25 +46,15 @@ def test_the_file_is_plain_hdf5_with_its_origin(tmp_path):
     record(path, given, sensor="bench 1", calibration="ab12", attributes={"force_n": 80.0})
     with h5py.File(path) as file:
         assert sorted(file) == ["frames", "seq", "t_ns", "wrist"]
-        assert file["frames"].dtype == np.uint16
-        assert file["frames"].shape == (70, 16, 16)
+        assert (file["frames"].dtype, file["frames"].shape) == (np.uint16, (70, 16, 16))
         assert file["frames"].compression == "gzip"
         assert (file["frames"][69] == given[69].counts).all()
         said = dict(file.attrs)
     assert said.pop("tool_version")
     assert said == {
-        "format": "tactile recording",
-        "format_version": 1,
-        "sensor": "bench 1",
-        "calibration": "ab12",
-        "units": "counts",
-        "piece": 1,
-        "force_n": 80.0,
-    }
-    recording = Recording(path)
-    assert len(recording) == 70
-    assert (recording.origin.sensor, recording.origin.calibration) == ("bench 1", "ab12")
-    assert dict(recording.origin.more) == {"force_n": 80.0}
+        "format": "tactile recording", "format_version": 1, "sensor": "bench 1",
+        "calibration": "ab12", "units": "counts", "piece": 1, "force_n": 80.0,
+    }  # fmt: skip
 
 
 def test_the_same_frames_give_the_same_bytes(tmp_path):
@@ -99,51 +63,27 @@ def test_the_same_frames_give_the_same_bytes(tmp_path):
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
-def test_a_recording_without_frames_is_one(tmp_path):
-    record(tmp_path / "touch.h5", [])
-    assert list(read_frames(tmp_path / "touch.h5")) == []
-    assert len(Recording(tmp_path / "touch.h5").block()) == 0
-
-
-def test_any_slice_of_a_series(tmp_path):
-    given = frames(1000)
-    recorder = record(tmp_path / "touch.h5", given, roll_over_s=1.0)
-    expected = [f"touch-{number:04d}.h5" for number in range(1, 6)]
+def test_a_series_has_a_file_a_second(tmp_path):
+    recorder = record(tmp_path / "touch.h5", frames(500), roll_over_s=1.0)
+    expected = [f"touch-{number:04d}.h5" for number in range(1, 4)]
     assert [file.name for file in recorder.files] == names(tmp_path) == expected
     recording = Recording(tmp_path / "touch.h5")
-    assert [file.frames for file in recording.files] == [220, 220, 220, 220, 120]
-    for start, stop in ((0, 1000), (219, 221), (100, 100), (430, 900), (999, 2000), (1200, 1300)):
-        assert all(map(same, recording.frames(start, stop), given[start:stop]))
-        block = recording.block(start, stop)
-        assert block.seq.tolist() == [frame.seq for frame in given[start:stop]]
-    only = list(read_frames(tmp_path / "touch-0003.h5"))
-    assert (len(only), only[0].seq) == (220, 440)
+    assert [file.frames for file in recording.files] == [220, 220, 60]
+    assert recording.block(219, 441).seq.tolist() == list(range(219, 441))
+    only = Recording(tmp_path / "touch-0003.h5").block()
+    assert (len(only), only.seq[0]) == (60, 440)
+    assert not only.counts.flags.writeable
 
 
-def test_poses_may_come_and_go(tmp_path):
-    given = frames(10) + frames(60, first=10, pose=pose_at(2)) + frames(10, first=70)
-    record(tmp_path / "a.h5", given)
-    assert all(map(same, read_frames(tmp_path / "a.h5"), given))
-    late = frames(300) + frames(300, first=300, pose=pose_at(3))
-    recorder = record(tmp_path / "b.h5", late)
-    assert recorder.files == [tmp_path / "b.h5"]
-    recording = Recording(tmp_path / "b.h5")
-    assert all(map(same, recording.frames(), late))
-    joined = recording.block()
-    assert np.isnan(joined.pose[:256]).all()
-    assert (joined.pose[-1] == pose_at(3)).all()
-
-
-def test_a_probe_whose_clock_begins_anew_neither_rolls_over_nor_stalls(tmp_path):
-    given = frames(500) + [
-        Frame(f.counts, f.t_ns, f.seq + 500, f.wrist) for f in frames(100)
-    ]  # restarted
+def test_a_probe_whose_clock_restarts_neither_rolls_over_nor_stalls(tmp_path):
+    again = [Frame(f.counts, f.t_ns, f.seq + 500, f.wrist) for f in frames(100)]
+    given = frames(500) + again
     recorder = record(tmp_path / "touch.h5", given, roll_over_s=2.0)
     assert [len(Recording(file)) for file in recorder.files] == [440, 160]
-    assert all(map(same, read_frames(tmp_path / "touch.h5"), given))
+    assert all(map(same, Recording(tmp_path / "touch.h5").frames(), given))
 
 
-def test_what_was_flushed_is_read_while_it_is_written(tmp_path):
+def test_flushed_frames_are_read_while_others_are_written(tmp_path):
     path = tmp_path / "touch.h5"
     with Recorder(path) as recorder:
         for frame in frames(100):
@@ -154,9 +94,8 @@ def test_what_was_flushed_is_read_while_it_is_written(tmp_path):
                 Recording(name)
             assert len(Recording(name, live=True)) == 64
         recorder.flush()
-        read = list(read_frames(path, live=True))
-        assert all(map(same, read, frames(100)))
-        assert len(read) == 100
+        assert all(map(same, Recording(path, live=True).frames(), frames(100)))
+        assert len(Recording(path, live=True)) == 100
     assert len(Recording(path, live=True)) == 100
 
 
@@ -168,13 +107,12 @@ def test_a_series_is_read_while_its_next_file_is_blank(tmp_path):
             recorder.append(frame)
         assert names(tmp_path) == ["touch-0001.h5", "touch.part.h5"]
         assert len(Recording(path, live=True)) == 220
-        with pytest.raises(RecordingError, match="nothing in it has reached the disk yet; wait"):
-            Recording(path)
-        with pytest.raises(RecordingError, match="nothing in it has reached the disk yet; wait"):
-            Recording(tmp_path / "touch.part.h5", live=True)
+        for name, live in ((path, False), (tmp_path / "touch.part.h5", True)):
+            with pytest.raises(RecordingError, match="nothing in it has reached the disk yet; w"):
+                Recording(name, live=live)
         recorder.flush()
-        assert all(map(same, read_frames(path, live=True), given))
-    assert all(map(same, read_frames(path), given))
+        assert all(map(same, Recording(path, live=True).frames(), given))
+    assert all(map(same, Recording(path).frames(), given))
 
 
 def test_a_slow_stream_is_flushed_by_time(tmp_path):
@@ -190,12 +128,11 @@ def test_a_recording_is_replaced_only_when_asked(tmp_path):
     record(path, frames(10))
     with pytest.raises(RecordingError, match="exists; take another name"):
         Recorder(path)
-    record(path, frames(500), roll_over_s=1.0, replace=True)
-    assert names(tmp_path) == ["touch-0001.h5", "touch-0002.h5", "touch-0003.h5"]
-    with pytest.raises(RecordingError, match="exists"):
-        Recorder(path)
-    record(path, frames(300), roll_over_s=1.0, replace=True)
-    assert names(tmp_path) == ["touch-0001.h5", "touch-0002.h5"]
+    for count, left in ((500, 3), (300, 2)):
+        record(path, frames(count), roll_over_s=1.0, replace=True)
+        assert names(tmp_path) == [f"touch-{n:04d}.h5" for n in range(1, left + 1)]
+        with pytest.raises(RecordingError, match="exists"):
+            Recorder(path)
     record(path, frames(7), replace=True)
     assert names(tmp_path) == ["touch.h5"]
     assert len(Recording(path)) == 7
@@ -212,29 +149,12 @@ def test_a_name_that_was_taken_meanwhile_loses_nothing(tmp_path):
     assert len(Recording(tmp_path / "touch.part.h5")) == 1
 
 
-@pytest.mark.parametrize("name", ["touch", "touch.csv", "touch.part.h5"])
-def test_other_names_are_refused(tmp_path, name):
-    with pytest.raises(RecordingError, match="is no name for a recording"):
-        Recorder(tmp_path / name)
-    assert names(tmp_path) == []
-
-
-def test_a_folder_that_is_not_there(tmp_path):
-    with pytest.raises(RecordingError, match="make the folder first"):
-        Recorder(tmp_path / "no" / "touch.h5")
-
-
-def test_two_recorders_cannot_write_one_file(tmp_path):
+def test_two_recorders_cannot_write_one_file_and_a_closed_one_takes_no_frames(tmp_path):
     with Recorder(tmp_path / "touch.h5") as recorder:
         with pytest.raises(RecordingError, match="another process is writing it"):
             Recorder(tmp_path / "touch.h5")
         recorder.append(frames(1)[0])
     assert len(Recording(tmp_path / "touch.h5")) == 1
-
-
-def test_a_closed_recorder_takes_no_frames(tmp_path):
-    recorder = record(tmp_path / "touch.h5", frames(1))
-    recorder.close()
     with pytest.raises(RecordingError, match="is closed"):
         recorder.append(frames(1)[0])
 
@@ -258,3 +178,85 @@ def test_hdf5_is_not_loaded_before_a_file_is_opened():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert answer.stdout == "[]\n"
+
+
+def test_others_files_that_are_no_recording_are_told_apart(tmp_path):
+    refused(tmp_path, "Is a directory; this is a folder")
+    refused(foreign(tmp_path / "b.h5", data=COUNTS, more=1), "/frames, but data, more; import")
+    refused(foreign(tmp_path / "d.h5", frames=["a"]), "must hold numbers")
+    refused(foreign(tmp_path / "e.h5", frames=COUNTS, t_ns=np.zeros((3, 3))), "/t_ns must hold")
+    with h5py.File(tmp_path / "f.h5", "w") as file:
+        file.create_group("frames")
+    refused(tmp_path / "f.h5", "it is no array")
+
+
+@pytest.mark.parametrize("bad", [65536.0, np.nan, np.inf])
+def test_values_that_are_no_counts_are_refused_and_where(tmp_path, bad):
+    values = COUNTS.astype(float)
+    values[300, 2, 3] = bad
+    path = foreign(tmp_path / "a.h5", frames=values)
+    refused(path, "other things than counts 0 ... 65535 in frames 256 ... 511; import")
+    assert len(list(Recording(path).frames(0, 256))) == 256
+
+
+def test_attributes_of_others_are_kept_and_a_user_block_does_not_matter(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w", userblock_size=1024) as file:
+        file["frames"] = COUNTS
+        file.attrs.update({"sensor": np.bytes_(b"mat 3"), "piece": np.array([4]), "format": "own"})
+    recording = Recording(path)
+    assert len(recording) == 600
+    assert superblock_of(path).whole
+    assert recording.origin.sensor == "mat 3"
+    assert dict(recording.origin.more) == {"piece": 4, "format": "own"}
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
+def test_a_truncated_recording_gives_the_frames_that_are_there(tmp_path, share):
+    path = tmp_path / "touch.h5"
+    given = frames(600)
+    record(path, given)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    refused(path, rf"truncated: {int(share * len(whole))} of {len(whole)} bytes")
+    result = repair(path)
+    assert result.path == path
+    assert result.frames + result.lost == 600
+    assert result.frames >= share * 600 - 2 * 64
+    left = list(Recording(path).frames())
+    assert len(left) == result.frames
+    assert all(same(frame, given[frame.seq]) for frame in left)
+    assert Recording(path).origin.more["frames_lost"] == result.lost
+    assert (tmp_path / "touch.damaged.h5").read_bytes() == whole[: int(share * len(whole))]
+    assert names(tmp_path) == ["touch.damaged.h5", "touch.h5"]
+
+
+def test_a_recording_of_which_nothing_is_left(tmp_path):
+    path = record(tmp_path / "touch.h5", frames(600)).files[0]
+    for size in (2000, 40):
+        path.write_bytes(path.read_bytes()[:size])
+        with pytest.raises(RecordingError, match=r"damaged|no frame in it can be read"):
+            repair(path)
+        assert names(tmp_path) == ["touch.h5"]
+
+
+def test_others_files_stay_beside_the_repaired_one(tmp_path):
+    path = foreign(tmp_path / "a.h5", frames=COUNTS, seq=np.arange(500), notes="keep me")
+    assert repair(path).frames == 500
+    with h5py.File(tmp_path / "a.damaged.h5") as file:
+        assert file["notes"][()] == b"keep me"
+
+
+def test_a_table_that_cannot_be_made_leaves_nothing(tmp_path):
+    path = record(tmp_path / "touch.h5", frames(10)).files[0]
+    (tmp_path / "old.csv").write_text("old")
+    with pytest.raises(RecordingError, match="make the folder first"):
+        export_csv(path, tmp_path / "no" / "touch.csv")
+    content = bytearray(path.read_bytes())
+    with h5py.File(path) as file:
+        content[file["frames"].id.get_chunk_info(0).byte_offset + 100] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match="damaged"):
+        export_csv(path, tmp_path / "old.csv")
+    assert (tmp_path / "old.csv").read_text() == "old"
+    assert names(tmp_path) == ["old.csv", "touch.h5"]

@@ -9,7 +9,6 @@ from scipy.io import savemat
 
 from probe.errors import RecordingError
 from probe.recording.imported import import_array
-from probe.recording.read import Recording
 
 COUNTS = np.random.default_rng(5).integers(0, 1024, (70, 16, 16)).astype(np.uint16)
 
@@ -61,12 +60,6 @@ def test_every_format_gives_the_same_frames(tmp_path, kind, axes):
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([path.name, "out.h5"])
 
 
-def test_one_image_is_a_recording_of_one_frame(tmp_path):
-    np.save(tmp_path / "a.npy", COUNTS[3])
-    block = import_array(tmp_path / "a.npy", tmp_path / "out.h5").block()
-    assert (block.counts == COUNTS[3:4]).all()
-
-
 def test_sixteen_images_have_time_first(tmp_path):
     np.save(tmp_path / "a.npy", COUNTS[:16])
     assert (
@@ -91,34 +84,6 @@ def test_an_array_named_frames_is_meant(tmp_path):
     assert recording.origin.more["imported_array"] == "frames"
 
 
-@pytest.mark.parametrize("offset", [0.0, -0.25])
-def test_forces_are_scaled_and_say_so(tmp_path, offset):
-    forces = np.random.default_rng(1).gamma(0.3, 2.0, (200, 16, 16)) + offset
-    np.save(tmp_path / "forces.npy", forces)
-    recording = import_array(tmp_path / "forces.npy", tmp_path / "out.h5")
-    said = recording.origin.more
-    assert recording.origin.units == "scaled"
-    counts = recording.block().counts
-    back = said["scale_offset"] + said["scale"] * counts
-    assert np.abs(back - forces).max() <= 0.5001 * said["scale"]
-    assert counts.max() == 65535
-    assert said["scale_offset"] == min(0.0, forces.min())
-
-
-def test_signed_and_large_whole_numbers_are_scaled_too(tmp_path):
-    for number, values in enumerate((COUNTS.astype(np.int32) - 5, COUNTS.astype(np.int64) * 1000)):
-        np.save(tmp_path / f"{number}.npy", values)
-        recording = import_array(tmp_path / f"{number}.npy", tmp_path / f"{number}.h5")
-        said = recording.origin.more
-        back = said["scale_offset"] + said["scale"] * recording.block().counts
-        assert np.abs(back - values).max() <= 0.5001 * said["scale"]
-
-
-def test_booleans_are_counts(tmp_path):
-    np.save(tmp_path / "a.npy", COUNTS > 500)
-    assert import_array(tmp_path / "a.npy", tmp_path / "out.h5").block().counts.max() == 1
-
-
 def test_values_that_are_no_numbers_are_refused(tmp_path):
     for bad in (np.nan, np.inf):
         values = COUNTS.astype(np.float32)
@@ -131,35 +96,42 @@ def test_values_that_are_no_numbers_are_refused(tmp_path):
     assert import_array(tmp_path / "c.npy", tmp_path / "c.h5").block().counts.max() == 65535
 
 
-def test_what_holds_no_images_is_refused(tmp_path):
+FORCES = np.random.default_rng(1).gamma(0.3, 2.0, (200, 16, 16))
+
+
+@pytest.mark.parametrize(
+    "values", [FORCES, FORCES - 0.25, COUNTS.astype(np.int32) - 5, COUNTS.astype(np.int64) * 1000]
+)
+def test_values_that_are_no_counts_are_scaled_and_say_so(tmp_path, values):
+    np.save(tmp_path / "a.npy", values)
+    recording = import_array(tmp_path / "a.npy", tmp_path / "out.h5")
+    said, counts = recording.origin.more, recording.block().counts
+    assert recording.origin.units == "scaled"
+    back = said["scale_offset"] + said["scale"] * counts
+    assert np.abs(back - values).max() <= 0.5001 * said["scale"]
+    assert counts.max() == 65535
+    assert said["scale_offset"] == min(0.0, values.min())
+
+
+def test_files_without_images_are_refused(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((70, 32, 32)))
     refused(tmp_path / "a.npy", r"no array of images \(N, 16, 16\) in it, but a \(70, 32, 32\)")
     refused(tmp_path / "a.npy", "give the --sensor-type mat-32x32, or reshape it")
-    np.save(tmp_path / "f.npy", np.zeros((70, 5, 7)))
-    refused(tmp_path / "f.npy", "give the --sensor-type whose images they are, or")
     np.save(tmp_path / "b.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     refused(tmp_path / "b.npy", "it holds objects")
     np.save(tmp_path / "c.npy", COUNTS + 1j)
     refused(tmp_path / "c.npy", "no array of images")
     (tmp_path / "d.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:500])
-    refused(tmp_path / "d.npy", "damaged")
-    for name, content in (("e.mat", b"x" * 300), ("f.mat", b""), ("g.bin", b"x" * 300)):
-        (tmp_path / name).write_bytes(content)
-        refused(tmp_path / name, "damaged|no HDF5 file|empty")
     savemat(tmp_path / "h.mat", {"images": COUNTS})
     whole = (tmp_path / "h.mat").read_bytes()
     (tmp_path / "h.mat").write_bytes(whole[: len(whole) // 2])
-    refused(tmp_path / "h.mat", "damaged")
-    refused(tmp_path / "none.npy", "no such recording")
+    for name, content in (("e.mat", b"x" * 300), ("f.mat", b""), ("g.bin", b"x" * 300)):
+        (tmp_path / name).write_bytes(content)
+    for name in ("d.npy", "h.mat", "e.mat", "f.mat", "g.bin"):
+        refused(tmp_path / name, "damaged|no HDF5 file|empty")
 
 
-def test_rates_and_names_are_checked(tmp_path):
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.inf, np.nan])
+def test_rates_are_above_0(tmp_path, rate):
     np.save(tmp_path / "a.npy", COUNTS)
-    for rate in (0.0, -1.0, np.inf, np.nan):
-        refused(tmp_path / "a.npy", "frames per second above 0", rate_hz=rate)
-    import_array(tmp_path / "a.npy", tmp_path / "b.h5")
-    with pytest.raises(RecordingError, match="exists"):
-        import_array(tmp_path / "a.npy", tmp_path / "b.h5")
-    np.save(tmp_path / "a.npy", COUNTS[:5])
-    assert len(import_array(tmp_path / "a.npy", tmp_path / "b.h5", replace=True)) == 5
-    assert len(Recording(tmp_path / "b.h5")) == 5
+    refused(tmp_path / "a.npy", "frames per second above 0", rate_hz=rate)

@@ -13,7 +13,7 @@ import pytest
 from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.recording import record
-from probe.recording.read import Recording, read_frames
+from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.recording.repair import repair
 
@@ -63,7 +63,7 @@ def test_it_is_read_as_it_is_under_both_names(journal):
     for name in (journal, journal.with_name("touch.h5")):
         recording = Recording(name)
         check(recording.frames(), 200)
-        check(read_frames(name, live=True), 200)
+        check(Recording(name, live=True).frames(), 200)
         assert recording.shape == (6, 5)
         assert recording.origin.sensor == "bench 1"
         assert dict(recording.origin.more) == {"force_n": 80.0, "of": "a"}
@@ -74,18 +74,18 @@ def test_it_is_read_as_it_is_under_both_names(journal):
 def test_a_torn_record_ends_it(journal, cut):
     start, size = size_of(journal)
     journal.write_bytes(journal.read_bytes()[: start + 150 * size + cut])
-    check(read_frames(journal), 150)
+    check(Recording(journal).frames(), 150)
     content = bytearray(journal.read_bytes())
     content[-1 - cut] ^= 1  # of the last whole record
     journal.write_bytes(content)
-    check(read_frames(journal), 149)
+    check(Recording(journal).frames(), 149)
 
 
 def test_repair_makes_hdf5_of_it(journal):
     result = repair(journal.with_name("touch.h5"))
     assert (result.path.name, result.frames, result.lost) == ("touch.h5", 200, 0)
     assert not journal.exists()
-    check(read_frames(result.path), 200)
+    check(Recording(result.path).frames(), 200)
     with h5py.File(result.path) as file:
         assert file["frames"].shape == (200, 6, 5)
         assert (file.attrs["force_n"], file.attrs["sensor"]) == (80.0, "bench 1")
@@ -97,7 +97,7 @@ def test_a_damaged_record_costs_its_block(journal):
     content[start + 70 * size + 5] ^= 8
     journal.write_bytes(content)
     with pytest.raises(RecordingError, match=r"damaged: cannot read it; .*`repair`"):
-        list(read_frames(journal))
+        list(Recording(journal).frames())
     result = repair(journal)
     assert (result.frames, result.lost) == (136, 64)
     kept = journal.with_name("touch.damaged.h5")
@@ -111,10 +111,7 @@ def test_a_damaged_record_costs_its_block(journal):
         HEAD | {"version": 2},
         HEAD | {"shape": [1 << 20, 1 << 20]},
         HEAD | {"shape": [-6, 5]},
-        HEAD | {"shape": [6]},
-        HEAD | {"piece": None},
         HEAD | {"more": 3},
-        {},
         [],
         "[" * 100_000,
     ],

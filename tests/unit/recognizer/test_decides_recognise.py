@@ -24,6 +24,7 @@ from recognizer.touch.recognition import (
     OUTSIDE,
     TOO_FEW,
     Cause,
+    RunnerUp,
 )
 from recognizer.touch.signal import Signal
 from recognizer.touch.verdict import MANY_INLIERS, Evidence
@@ -76,6 +77,11 @@ class Found:
     @property
     def evidence(self):
         return self.speaks
+
+    @property
+    def runner_up(self):
+        face = self.embossed.face(self.face)
+        return RunnerUp(face.object, face.face, self.index)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.touch.hypothesis import Hypothesis
+from recognizer.touch.hypothesis import Hypothesis, PlaceHypothesis
 from recognizer.touch.lab import EncodedFace
 from recognizer.touch.next_touch import FORCE_N, EarlierTouch, propose_next
 from recognizer.touch.options import ReaderOptions
@@ -112,9 +112,7 @@ def known_face(small, x_mm, y_mm):
         centres_mm=np.stack([i, j], axis=-1).reshape(-1, 2) * 7.0 + 3.5,
     )  # fmt: skip
     fit = small.fit_of([(0, 0)], [[0.0] * 5], x_mm=x_mm, y_mm=y_mm)
-    return SimpleNamespace(
-        embossed=embossed, hypothesis=Hypothesis(0, 6, 2, 0, 0.0), fit=fit, score=0.0
-    )
+    return PlaceHypothesis(embossed, Hypothesis(0, 6, 2, 0, 0.0), fit, 0.0)
 
 
 @pytest.mark.parametrize(("x", "sign"), [(8.0, 1), (34.0, -1)])

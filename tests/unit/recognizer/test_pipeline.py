@@ -38,7 +38,7 @@ from recognizer.touch.symbols.template import psi, template_of
 from recognizer.touch.verdict import MANY_INLIERS, NAMED, is_encoded
 from recognizer.touch.verify import TouchImages, verify_hypotheses
 from recognizer.validation.draw import FOREIGN, INSIDE_MM, draw_touch
-from recognizer.validation.touch_plan import TouchPlan, sensor_of
+from recognizer.validation.touch_plan import TouchPlan
 from recognizer.validation.trial import trial
 
 
@@ -70,7 +70,7 @@ def coarse_url(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def pad_reader(coarse_url):
-    return Reader(open_lab(coarse_url), sensor_of("", "pad"))
+    return Reader(open_lab(coarse_url), SensorType().with_overlay("pad"))
 
 
 def felt(url, name, face, touch):
@@ -387,7 +387,7 @@ def test_a_point_in_a_face(reader):
 @pytest.mark.parametrize("overlay", ["tab", "pad"])
 def test_a_template_is_the_derivative_of_itself(reader, overlay):
     encoding = reader.lab.arrays[0]
-    template = template_of(encoding.alphabet, encoding.style, sensor_of("", overlay))
+    template = template_of(encoding.alphabet, encoding.style, SensorType().with_overlay(overlay))
     at = np.array([[-1.2, 0.4], [0.3, -1.7], [1.6, 1.1]])
     by = 0.1
     aside = np.array([by, 0.0])

@@ -16,10 +16,9 @@ from probe.simulate.scene import Scene
 from probe.simulate.world.levels import MISMATCH, TYPICAL
 from probe.simulate.world.sensor import LevelSensor
 from probe.surface.polygon import polygon
-from recognizer.scan.belief import begin_scan, extend_scan, read_scan
-from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
+from recognizer.scan.belief import begin_scan, extend_scan
+from recognizer.scan.mosaic.planar import BY_HAND_SD, PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces
-from recognizer.scan.views import ScanSettings
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
@@ -95,20 +94,6 @@ def test_a_scan_identifies_what_one_touch_cannot(lab, reader, level):
             turn = math.atan2(T[1, 0], T[0, 0]) - theta
             assert abs(math.degrees(math.remainder(turn, math.tau))) < 2
     assert [answer.seq for answer in answers] == list(range(len(touches)))
-    assert read_scan(reader, touches).as_json() == answers[-1].as_json()
-
-
-def test_a_touch_in_the_air_says_so_and_changes_nothing(lab, reader):
-    surface = registered_surface(lab.url, "Cube", "F3").surface
-    touches, _ = scanned(surface, PLACES[:3], 0.0, TYPICAL, 2)
-    scan = begin_scan(reader)
-    for touch in touches:
-        scan = extend_scan(scan, touch)
-    air = PlacedTouch(signal_of(np.full((16, 16), 8.0)), touches[0].believed, seq=9)
-    lifted = extend_scan(scan, air)
-    assert lifted.recognition.reason == NO_CONTACT
-    assert len(lifted.touches) == 3
-    assert lifted.best is scan.best
 
 
 def test_touches_of_another_thing_do_not_make_an_answer(lab, reader):
@@ -224,9 +209,9 @@ def test_a_session_keeps_its_answer_in_the_air(lab, reader, felt):
 
 
 def test_places_follow_from_poses_steps_or_a_hand(felt):
-    signal, settings = felt[0][0].signal, ScanSettings()
+    signal = felt[0][0].signal
     poses = [true_pose(10, 20, 0.1), true_pose(16, 20, 0.1), true_pose(16, 27, 0.2)]
-    known = TouchPlaces(settings)
+    known = TouchPlaces()
     for pose in poses:
         touch = known.place(signal, pose, 0)
         known.keep(pose)
@@ -235,8 +220,8 @@ def test_places_follow_from_poses_steps_or_a_hand(felt):
     assert touch.stepped is None
     loose = known.place(signal, None, 0)
     assert loose.believed is None
-    assert np.sqrt(np.diag(loose.stepped.covariance)) == pytest.approx(settings.by_hand)
-    late = TouchPlaces(settings)  # the first touch had no pose
+    assert np.sqrt(np.diag(loose.stepped.covariance)) == pytest.approx(BY_HAND_SD)
+    late = TouchPlaces()  # the first touch had no pose
     late.keep(None)
     assert late.place(signal, poses[0], 0).stepped.pose == pytest.approx([0, 0, 0])
     late.keep(poses[0])

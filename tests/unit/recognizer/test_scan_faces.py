@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from recognizer.scan.answer import ScanHypothesis
-from recognizer.scan.session import _Face, _hypotheses_of, contradict, join_faces
+from recognizer.scan.session import TouchPlaces, _Face, _hypotheses_of, contradict, join_faces
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, refusal
@@ -37,7 +37,7 @@ def touched(small, lab):
         for face, score, x in places:
             fit = small.fit_of([(0, 0)], [[0.0] * 5], x_mm=x, y_mm=20.0)
             place = Hypothesis(0, 6, 2, face, score)
-            found.append(ScanHypothesis(lab, None, place, fit, score))
+            found.append(ScanHypothesis(lab, place, fit, score, None))
         belief = SimpleNamespace(
             reader=SimpleNamespace(options=ReaderOptions()),
             places=tuple(found), recognition=refusal(4, reason),
@@ -46,7 +46,7 @@ def touched(small, lab):
         if at is not None:
             pose = np.eye(4)
             pose[:3, 3] = at
-        return _Face(belief, None, pose)
+        return _Face(belief, TouchPlaces(before=pose))
 
     return one
 

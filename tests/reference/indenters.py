@@ -1,0 +1,42 @@
+"""Bodies of simple shape that tests press: their highest point is the origin, mm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A surface z = height(x, y) of arrays (n,)."""
+
+    height: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    top_mm: float = 0.0
+
+    def heights_mm(self, points_mm: np.ndarray) -> np.ndarray:
+        return self.height(*points_mm.T)
+
+
+def sphere(radius_mm: float = 20.0) -> Formula:
+    """Return the upper half of a ball; sqrt(R^2 - r^2) - R without its cancellation."""
+
+    def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        square = x * x + y * y
+        rest = radius_mm**2 - square
+        depth = square / (radius_mm + np.sqrt(np.maximum(rest, 0.0)))
+        return np.where(rest >= 0, -depth, -math.inf)
+
+    return Formula(height)
+
+
+def paraboloid(radius_mm: float) -> Formula:
+    """Return z = -r^2 / 2R: the body of the closed formulas of contact."""
+    return Formula(lambda x, y: -(x * x + y * y) / (2 * radius_mm))
+
+
+def half_plane(floor_mm: float = -math.inf) -> Formula:
+    """Return a flat face that ends at a straight edge: matter where x <= 0."""
+    return Formula(lambda x, y: np.where(x <= 0, 0.0, floor_mm))
