@@ -183,7 +183,7 @@ def test_a_type_is_pressed_as_hard_for_its_area_and_a_gel_as_deep():
 def test_a_simulated_probe_presses_as_hard_as_its_type_takes(name, newtons):
     one = next(SimulatedProbe("washer", sensor_type=name).touches())
     assert one.touch.force_n == pytest.approx(newtons, rel=1e-3)
-    assert options_of({"sensor_type": name}).numbers["force"] == one.touch.force_n
+    assert options_of({"sensor_type": name})[0]["force"] == one.touch.force_n
     told = TouchOptions(touches=20)
     drawn = [
         one.touch.force_n for one in SimulatedProbe("washer", told, sensor_type=name).touches()
