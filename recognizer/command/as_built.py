@@ -21,12 +21,7 @@ part's file. With [bold]--store[/] the database keeps it, and every later pose o
 on parts of the same printer that nobody has touched so, is corrected by it.
 """
 
-app = console.application()
-
-
-@app.callback()
-def _commands() -> None:
-    """Say what a print is like."""
+app = console.application(named=True)
 
 
 @command(app, "as-built", help=HELP)
