@@ -6,7 +6,7 @@
 
 ::
 
-    app           options
+    app, options  the command and its options
     recognize     touches -> answers, printed and drawn as they come
     scanning      several touches as one belief; how the probe moved
     port          a port -> touches, the sensor, its calibration
