@@ -1,9 +1,10 @@
 """Run the project's commands by their entry points in `pyproject.toml`, many of them quickly.
 
 Arguments, folder and environment -> exit code, stdout, stderr. A clean process loads the large
-libraries once, and each module of the project once a command has used it, and forks a child for each
-command: the child's state is as fresh as that of a process of its own, without the start-up. What a
-command sees of the machine is fixed: width, colour, language, time zone, home and cache folder.
+libraries once, and each module of the project once a command has used it, and forks a child for
+each command: the child's state is as fresh as that of a process of its own, without the start-up.
+What a command sees of the machine is fixed: width, colour, language, time zone, home and cache
+folder.
 """
 
 from __future__ import annotations
@@ -197,8 +198,8 @@ def _serve() -> None:
     questions = os.fdopen(os.dup(0))
     while line := questions.readline():
         asked = json.loads(line)
-        files = (tempfile.TemporaryFile() for _ in range(3))
-        with next(files) as out, next(files) as error, next(files) as used:
+        temporary = tempfile.TemporaryFile
+        with temporary() as out, temporary() as error, temporary() as used:
             child = os.fork()
             if not child:
                 _become(scripts, asked, out.fileno(), error.fileno(), used.fileno())
