@@ -23,7 +23,7 @@ from recognizer.touch.symbols.template import psi, template_of
 from recognizer.touch.verdict import is_encoded
 from recognizer.touch.verify import TouchImages, verify_hypotheses
 from recognizer.validation.draw import FOREIGN, draw_touch
-from recognizer.validation.touch_plan import TouchPlan, sensor_of
+from recognizer.validation.touch_plan import TouchPlan
 from recognizer.validation.trial import trial
 
 
@@ -159,7 +159,7 @@ def test_a_print_keeps_the_middle_of_its_symbols(reader):
 @pytest.mark.parametrize("overlay", ["tab", "pad"])
 def test_a_template_is_the_derivative_of_itself(reader, overlay):
     encoding = reader.lab.arrays[0]
-    template = template_of(encoding.alphabet, encoding.style, sensor_of("", overlay))
+    template = template_of(encoding.alphabet, encoding.style, SensorType().with_overlay(overlay))
     at = np.array([[-1.2, 0.4], [0.3, -1.7], [1.6, 1.1]])
     by = 0.1
     aside = np.array([by, 0.0])
