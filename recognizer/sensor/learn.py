@@ -63,7 +63,6 @@ def learn_sensor(
     *,
     calibration: Calibration | None = None,
     name: str = "",
-    rounds: int = ROUNDS,
     done: Callable[[float], None] | None = None,
 ) -> SensorState:
     """Return the state of a sensor by its touches and the reader's earlier state.
@@ -83,7 +82,7 @@ def learn_sensor(
     floating = not newtons and (known.floating or _floats(reader, readings))
     inverted = [invert_floating(one) for one in readings] if floating else readings
     before = state = replace(known, floating=False)
-    for turn in range(rounds):
+    for turn in range(ROUNDS):
         if len(inverted) >= LEAST_TOUCHES:
             found = answering_of(_forces(reader, state, inverted, calibration))
             state = replace(state, dead=found.dead, hot=found.hot, offset=found.offset)
@@ -96,7 +95,7 @@ def learn_sensor(
             if answer and verified is not None and (answer.margin or 0.0) > MARGIN:
                 evidence.append(evidence_of(verified))
             if done is not None:
-                done((turn + (number + 1) / len(inverted)) / rounds)
+                done((turn + (number + 1) / len(inverted)) / ROUNDS)
         state = refine_tactels(state, evidence, before)
     return replace(
         state, floating=floating, touches=known.touches + len(images), drift=_drift(readings)
