@@ -1,22 +1,21 @@
 """Polygon of a face -> places to press, left to right and top to bottom. Thesis 4.3, figure 4.11.
 
 Neighbours overlap by three quarters of the sensor. The step is 4.25 tactels, not 4: steps of
-whole tactels see every edge at the same place between two tactels, and more touches then tell
-nothing new about it. Places stand on a lattice that may be turned; it is as wide as the face,
-so that its outer touches reach the face's edge or a little beyond. mm, surface frame.
+whole tactels see every edge at the same place between two tactels. Places stand on a lattice that
+may be turned; it is as wide as the face, so that its outer touches reach the face's edge or a
+little beyond. mm, surface frame.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import Touch, WristStiffness
 from probe.errors import SurfaceError
 
 STEP_TACTELS = 4.25  #: between neighbours, which then share three quarters
@@ -37,16 +36,11 @@ class RasterPlan:
     def there_and_back(self, least_cover: float = 0.0) -> NDArray[np.float64]:
         """Return the places (n, 2) line by line, every other line back.
 
-        Those that cover less of the face than so much of what the best one covers are left out.
+        Those that cover less than `least_cover` of what the best one covers are left out.
         """
         kept = self.cover >= least_cover * self.cover.max(initial=0.0)
         lines = [self.places_mm[kept & (self.lines == line)] for line in np.unique(self.lines)]
         return np.concatenate([line[:: (-1) ** n] for n, line in enumerate(lines)])
-
-    def touches(self, force_n: float, wrist: WristStiffness | None = None) -> Iterator[Touch]:
-        """Yield what the contact models take, for a level sensor."""
-        for x, y in self.places_mm.tolist():
-            yield Touch(x, y, self.theta_rad, force_n, wrist=wrist or WristStiffness())
 
 
 def raster(
@@ -63,8 +57,6 @@ def raster(
     ----------
     loops
         (n, 2) corners of the face, and of its holes after it, mm, either way round.
-    sensor
-        The sensor; `fsr-16` if not given.
     step_tactels
         Between neighbours, both ways.
     theta_rad

@@ -10,5 +10,5 @@
     simulation  target + options -> touches with their frames and their truth
     source      frames of `sim:` ports: a probe that keeps touching
     printed     what PrusaSlicer's G-code leaves of a registered part
-    world       how sensors, prints and surfaces are off: levels, wear, foreign surfaces
+    world       sensors, prints and surfaces as they are: levels, wear, foreign surfaces
 """

@@ -1,7 +1,6 @@
-"""Touches at random, and where a touched sensor stands.
+"""Touches at random, and where a touched sensor stands. Thesis 4.2.
 
-A `Touch` is its own truth: where the sensor stands, how it is turned and pressed. Nothing of
-it is in the frame, whose pose stays unknown. Thesis 4.2.
+A `Touch` is its own truth: where the sensor stands, how it is turned and pressed.
 """
 
 from __future__ import annotations

@@ -78,12 +78,7 @@ class FaceRegion:
 
 
 def polygon(loops_mm: Sequence[ArrayLike]) -> FaceRegion:
-    """Return the region inside the first loop and outside the others.
-
-    Parameters
-    ----------
-    loops_mm
-        Each (k, 2), k >= 3, mm; any sense of turning.
+    """Return the region inside the first loop and outside the others; each (k, 2), k >= 3, mm.
 
     Raises
     ------

@@ -154,9 +154,9 @@ def scanned(surface, loops, sensor, level):
     follow_poses(Arm(), stands, JointErrors((3e-4,) * 5, (1e-3,) * 5), rng)
     times = [time.process_time() - start, 0.0, 0.0]
     fsr, electronics, state, frames = fsr_of(), Electronics(), None, []
-    for seq, touch in enumerate(plan.touches(80.0)):
+    for seq, (x, y) in enumerate(plan.places_mm.tolist()):
         start = time.process_time()
-        forces = press(surface, sensor, touch, accuracy=level).forces_n
+        forces = press(surface, sensor, Touch(x, y, 0.0, 80.0), accuracy=level).forces_n
         middle = time.process_time()
         counts, state = read_counts(forces, electronics, fsr, state, rng)
         frames.append(frame_from(counts, t_ns=0, seq=seq))
