@@ -33,9 +33,8 @@ from probe.contact.contract import Touch
 from probe.errors import ContactError, SurfaceError
 from probe.simulate.printed import printed_scene
 from probe.simulate.registered import registered_object, registered_objects
-from probe.simulate.scene import Scene
+from probe.simulate.scene import Scene, TouchRanges, random_touches
 from probe.simulate.target import part_surface
-from probe.simulate.touch import TouchRanges, random_touches
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.sensor import LevelSensor
 from probe.simulate.written import written_triangles
