@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, NoReturn
 from encoded_objects.base import console
 
 if TYPE_CHECKING:
-    from typer import Typer
+    from encoded_objects.base.options import Application
 
 NAME = "encode-object"
 TOOLS = ("init", "schema", "printers")
@@ -38,7 +38,7 @@ def run(arguments: list[str]) -> int:
     return console.run(NAME, _application, arguments)
 
 
-def _application(arguments: list[str]) -> Typer:
+def _application(arguments: list[str]) -> Application:
     """Return the command that is meant; a spec file needs no command's name."""
     if arguments[:1] and arguments[0] in TOOLS:
         from generator.command.tools import app

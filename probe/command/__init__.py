@@ -23,23 +23,22 @@ from typing import TYPE_CHECKING, NoReturn
 from encoded_objects.base import console
 
 if TYPE_CHECKING:
-    from typer import Typer
+    from encoded_objects.base.options import Application
 
 NAME = "probe-sensor"
-GROUPS = ("calibrate",)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `probe-sensor` and leave with its exit code."""
-    console.main(NAME, application, arguments, groups=GROUPS)
+    console.main(NAME, application, arguments)
 
 
 def run(arguments: list[str]) -> int:
     """Run one command; returns its exit code. Errors are reported, not raised."""
-    return console.run(NAME, application, arguments, groups=GROUPS)
+    return console.run(NAME, application, arguments)
 
 
-def application(_arguments: list[str]) -> Typer:
+def application(_arguments: list[str]) -> Application:
     """Return the application that reads the arguments."""
     from probe.command.app import app
 

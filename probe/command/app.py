@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from encoded_objects.base.console import application
 from encoded_objects.base.errors import UsageError
 from encoded_objects.base.options import Argument, Json, Option, Replace, command
@@ -33,24 +31,10 @@ Try it without one: [bold]probe-sensor live sim:[/]
 EPILOG = """Exit codes: 0 done, 1 ran but failed, 2 bad input, 3 device, 4 database, 130 \
 interrupted.
 """
-app = application(help=HELP, epilog=EPILOG)
+app = application(help=HELP, epilog=EPILOG, version_of=NAME)
 calibrate = application(
     help="Find out what a sensor's counts mean: bias, unsound tactels, force law of each."
 )
-
-
-@app.callback(invoke_without_command=True)
-def _head(
-    version: bool = typer.Option(False, "--version", help="Say which version this is."),
-    as_json: bool = typer.Option(
-        False, "--json", help="One JSON object on stdout, also for errors."
-    ),
-) -> None:
-    from encoded_objects.base import output
-
-    if version:
-        output.version(NAME, as_json=as_json)
-        raise typer.Exit
 
 
 @command(app, "list")
@@ -192,7 +176,7 @@ def repair(recording: Recording, as_json: Json = False) -> int:
     return 0
 
 
-app.add_typer(calibrate, name="calibrate")
+app.groups["calibrate"] = calibrate
 
 
 @command(calibrate)

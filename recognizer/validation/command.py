@@ -27,8 +27,7 @@ from probe.contact.engines import ENGINES
 from probe.simulate.world.levels import LEVELS
 
 if TYPE_CHECKING:
-    from typer import Typer
-
+    from encoded_objects.base.options import Application
     from recognizer.validation.pipeline import ValidationResult
 
 NAME = "validate-set"
@@ -68,7 +67,7 @@ def run(arguments: list[str]) -> int:
     return console.run(NAME, _application, arguments)
 
 
-def _application(arguments: list[str]) -> Typer:
+def _application(arguments: list[str]) -> Application:
     return tools if arguments[:1] and arguments[0] in TOOLS else app
 
 
