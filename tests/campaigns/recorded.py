@@ -107,17 +107,8 @@ def main() -> None:
         gel = ("--force", "15", "--x", "30", "--y", "30") if "gel" in name else ()
         run(*words, f"{name}.h5", *many, name, *gel, folder=folder)
         print(row(name, folder / f"{name}.h5"), flush=True)
-    run(
-        *words,
-        "scan.h5",
-        "--scan",
-        "kinesthetic",
-        "--touches",
-        "12",
-        "--frames",
-        "40",
-        folder=folder,
-    )
+    scan = ("--scan", "kinesthetic", "--touches", "12", "--frames", "40")
+    run(*words, "scan.h5", *scan, folder=folder)
     print(row("scan", folder / "scan.h5"))
 
 
