@@ -112,8 +112,7 @@ installed; pip install 'encoded-objects[report]'
             absent = isinstance(error, ModuleNotFoundError)
             why = "is not installed" if absent else f"cannot be loaded ({error})"
             raise MissingExtraError(
-                f"{purpose} needs {module.partition('.')[0]}, which {why}",
-                fix=install_line(extra),
+                f"{purpose} needs {module.partition('.')[0]}, which {why}", fix=install_line(extra)
             ) from error
 
 

@@ -15,13 +15,7 @@ from typing import Any
 
 import yaml
 
-from encoded_objects.base.document import (
-    DocumentKind,
-    Problem,
-    SourceMark,
-    TextSource,
-    read_text,
-)
+from encoded_objects.base.document import DocumentKind, Problem, SourceMark, TextSource, read_text
 
 DEPTH_MAX = 16
 

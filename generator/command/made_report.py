@@ -156,11 +156,7 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
         ],
         "set_files": [str(file) for file in result.set_files],
         "database": without_password(result.database),
-        "array": {
-            "rows": result.rows,
-            "columns": result.columns,
-            "used_cells": result.used_cells,
-        },
+        "array": {"rows": result.rows, "columns": result.columns, "used_cells": result.used_cells},
         "dry_run": dry_run,
         "seconds": round(result.seconds, 3),
     }

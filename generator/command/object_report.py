@@ -268,10 +268,7 @@ def _face_values(face: _Face) -> dict[str, Any]:
         "places": on.places,
         "promise": None
         if face.promise is None
-        else {
-            "at_once": face.promise.at_once,
-            "within_three": face.promise.within_three,
-        },
+        else {"at_once": face.promise.at_once, "within_three": face.promise.within_three},
         "placement": None
         if place is None
         else {

@@ -96,9 +96,7 @@ def faces_at(
         # together, and each is one step in the primary key, unlike a search for pairs.
         for row, column, object_id, face_id in connection.execute(
             select(cells.row, cells.column, cells.object_id, cells.face_id).where(
-                cells.array_id == array_id,
-                cells.row.in_(near_rows),
-                cells.column.in_(near_columns),
+                cells.array_id == array_id, cells.row.in_(near_rows), cells.column.in_(near_columns)
             )
         ):
             held[row, column] = (object_id, face_id)

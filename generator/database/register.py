@@ -138,9 +138,7 @@ def record_parts(connection: Connection, object_id: int, written: Sequence[Regis
     for part in written:
         connection.execute(
             delete(tables.parts).where(
-                parts.object_id == object_id,
-                parts.name == part.name,
-                parts.format == part.format,
+                parts.object_id == object_id, parts.name == part.name, parts.format == part.format
             )
         )
     last = connection.execute(

@@ -128,11 +128,7 @@ _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
         "other programs keep the database locked",
         "wait until they have ended, then run the same command again",
     ),
-    (
-        ("SQLITE_NOTADB",),
-        "this file is not a database",
-        "name another file, or move this one away",
-    ),
+    (("SQLITE_NOTADB",), "this file is not a database", "name another file, or move this one away"),
     (
         ("SQLITE_CORRUPT",),
         "the database file is damaged",

@@ -25,12 +25,7 @@ from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
 from generator.pipeline.made import Encoded, MadeObject, describe_object
 from generator.pipeline.make import MakeJob, make_under_lock
-from generator.pipeline.place import (
-    PlacedObject,
-    occupancy_of,
-    occupancy_with,
-    place_object,
-)
+from generator.pipeline.place import PlacedObject, occupancy_of, occupancy_with, place_object
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.polyhedron import Polyhedron

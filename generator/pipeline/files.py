@@ -28,13 +28,7 @@ from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.pipeline.sheet import SheetPlate, build_sheet
 from generator.polyhedron import Polyhedron, face_polygon
-from generator.solid import (
-    Part,
-    emboss_whole,
-    panels,
-    prove_closed,
-    triangles,
-)
+from generator.solid import Part, emboss_whole, panels, prove_closed, triangles
 from generator.spec.problem import error_location
 
 if TYPE_CHECKING:

@@ -231,9 +231,7 @@ def _check_order(alphabet: Alphabet, array: SymbolArray) -> None:
 
 
 def _cut_corners(
-    polyhedron: Polyhedron,
-    spec: ObjectSpec,
-    covered: Mapping[int, tuple[Loop, ...]],
+    polyhedron: Polyhedron, spec: ObjectSpec, covered: Mapping[int, tuple[Loop, ...]]
 ) -> dict[int, tuple[Loop, ...]]:
     """Return what is cut off the tops of panels, and what other faces cover of these faces."""
     if spec.parts != "panels":

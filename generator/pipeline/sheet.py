@@ -104,11 +104,7 @@ def material_text(volume_mm3: float, *, resin: bool) -> str:
 
 
 def _facts(
-    plan: ObjectPlan,
-    layout: Layout,
-    code: str,
-    parts: Sequence[Part],
-    plates: Sequence[SheetPlate],
+    plan: ObjectPlan, layout: Layout, code: str, parts: Sequence[Part], plates: Sequence[SheetPlate]
 ) -> Rows:
     spec, printer = plan.spec, plan.printer
     rows = [

@@ -220,8 +220,7 @@ Polynomial = Annotated[
     ),
 ]
 Window = Annotated[
-    tuple[Side, Side],
-    BeforeValidator(window, json_schema_input_type=tuple[Side, Side] | str),
+    tuple[Side, Side], BeforeValidator(window, json_schema_input_type=tuple[Side, Side] | str)
 ]
 
 
@@ -301,8 +300,7 @@ class PrinterSettings(Block):
 
 
 PrinterChoice = Annotated[
-    PrinterSettings,
-    BeforeValidator(printer_block, json_schema_input_type=PrinterSettings | str),
+    PrinterSettings, BeforeValidator(printer_block, json_schema_input_type=PrinterSettings | str)
 ]
 
 

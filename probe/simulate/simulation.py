@@ -32,10 +32,9 @@ from probe.frame import Frame, frame_from
 from probe.recording.files import check_name
 from probe.recording.record import Recorder
 from probe.simulate.scan import ScanKind, ScanPath, scan_path
-from probe.simulate.scene import Scene
+from probe.simulate.scene import Scene, TouchRanges, pose_of, random_touches
 from probe.simulate.sensor import simulated_sensor
 from probe.simulate.target import surface_of
-from probe.simulate.touch import TouchRanges, pose_of, random_touches
 
 _WAY = 1 << 32  # of the generator that draws a scan's path: no touch has that number
 

@@ -57,9 +57,7 @@ class ScanHypothesis(PlaceHypothesis):
 
 
 def locate_evidence(
-    embossed: EmbossedArray,
-    found: Sequence[LatticeEvidence],
-    path: RegisteredPath | None,
+    embossed: EmbossedArray, found: Sequence[LatticeEvidence], path: RegisteredPath | None
 ) -> list[ScanHypothesis]:
     """Return the likeliest places of the evidence of one array, best evidence first."""
     places: list[ScanHypothesis] = []

@@ -311,10 +311,7 @@ def _evidence_along(
 
 
 def _evidence_of(
-    views: LatticeViews,
-    touch_poses: TouchPoses,
-    before: Sequence[PlaneLattice],
-    pitch_mm: float,
+    views: LatticeViews, touch_poses: TouchPoses, before: Sequence[PlaneLattice], pitch_mm: float
 ) -> list[LatticeEvidence]:
     """Return the evidence of the followed lattices and of those of the last touch, best first."""
     last = len(touch_poses.poses) - 1

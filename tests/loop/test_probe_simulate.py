@@ -18,10 +18,10 @@ from probe.contact.press import press
 from probe.errors import SurfaceError
 from probe.recording.read import Recording
 from probe.simulate.registered import DatabaseUnreadableError, registered_object, registered_surface
+from probe.simulate.scene import TouchRanges, pose_of, random_touches
 from probe.simulate.sensor import simulated_sensor
 from probe.simulate.source import frames_of, options_of
 from probe.simulate.target import part_surface, surface_of
-from probe.simulate.touch import TouchRanges, pose_of, random_touches
 from probe.simulate.written import part_mesh
 
 SET = """
@@ -91,10 +91,7 @@ def test_panel_is_the_registered_face(lab, face):
     assert_same(ours, written, 40.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "face"),
-    [("Whole", "F4"), ("Ball", "F2"), ("Step", "F2")],
-)
+@pytest.mark.parametrize(("name", "face"), [("Whole", "F4"), ("Ball", "F2"), ("Step", "F2")])
 def test_whole_part_is_the_registered_face_with_all_that_lies_around_it(lab, name, face):
     scene = surface_of(f"{lab / 'lab.db'}#{name}/{face}")
     part = part_surface(file_of(lab, name), database=str(lab / "lab.db"), face=face)

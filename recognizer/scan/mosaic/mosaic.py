@@ -324,10 +324,7 @@ def _overlapping_neighbours(
 
 
 def _search_mosaic(
-    mosaic: Mosaic,
-    patch: TouchPatch,
-    predicted: PlanarBelief,
-    near: Sequence[int],
+    mosaic: Mosaic, patch: TouchPatch, predicted: PlanarBelief, near: Sequence[int]
 ) -> tuple[str, Array]:
     """Return the pose of a touch on the mean of the others, and a reason or ""."""
     pitch = mosaic.sensor.pitch_mm

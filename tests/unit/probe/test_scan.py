@@ -177,18 +177,16 @@ def test_cover_is_the_area_under_the_sensor(theta):
         assert inside.mean() == pytest.approx(cover, abs=0.01)
 
 
-def test_faces_that_are_none():
-    for bad in (
-        [(0, 0), (1, 1)],
-        [(0, 0), (1, 1), (2, 2)],
-        [(0, 0), (1, 0), (math.nan, 1)],
-        [1, 2],
+def test_faces_and_steps_that_are_none():
+    for loops in (
+        [],
+        [[(0, 0), (1, 1)]],
+        [[(0, 0), (1, 1), (2, 2)]],
+        [[(0, 0), (1, 0), (math.nan, 1)]],
     ):
-        with pytest.raises(SurfaceError):
-            raster([bad])
-    with pytest.raises(SurfaceError, match="without a loop"):
-        raster([])
-    for step in (0, -1, 17, math.nan):
+        with pytest.raises(SurfaceError, match="outline"):
+            raster(loops)
+    for step in (0, 17, math.nan):
         with pytest.raises(SurfaceError, match="tactels; take more than 0 and at most 16"):
             raster([SQUARE], step_tactels=step)
 

@@ -15,13 +15,7 @@ from probe.contact.tips import Tips
 from probe.errors import CircuitError
 from probe.simulate.scene import Scene, bare_scene
 from probe.simulate.world.levels import LEVELS, SOUND, TYPICAL
-from probe.simulate.world.sensor import (
-    COUNTS_PER_N,
-    MOUNTINGS,
-    LevelSensor,
-    mount,
-    sample_sensor,
-)
+from probe.simulate.world.sensor import COUNTS_PER_N, MOUNTINGS, LevelSensor, mount, sample_sensor
 from probe.surface.indenters import FlatPlate, RaisedStrip
 from probe.surface.polygon import polygon
 
