@@ -12,8 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.plane.polygon import points_inside, signed_area
-from generator.plane.rings import edges_cross, keeps_edges
+from generator.plane.polygon import edges_cross, keeps_edges, points_inside, signed_area
 
 Ring = NDArray[np.float64]  #: (k, 2) mm
 Insets = NDArray[np.float64]  #: (k,) mm, of edge i from corner i to i + 1

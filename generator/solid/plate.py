@@ -14,7 +14,7 @@ from manifold3d import CrossSection, FillRule
 from numpy.typing import NDArray
 
 from generator.errors import SolidError
-from generator.plane.rings import distance
+from generator.plane.polygon import distance
 from generator.polyhedron.frame import dihedral, face_frame, face_polygon
 from generator.polyhedron.winged import Polyhedron
 from generator.printers import Printer

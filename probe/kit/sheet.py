@@ -81,11 +81,7 @@ class PrintedPart:
 
 
 def sheet_html(
-    k: KitSizes,
-    parts: Sequence[PrintedPart],
-    items: Sequence[Item],
-    coupon: Coupon,
-    wiring: str,
+    k: KitSizes, parts: Sequence[PrintedPart], items: Sequence[Item], coupon: Coupon, wiring: str
 ) -> str:
     """Return the page; `wiring` is the picture of the board, empty without one."""
     files = [

@@ -42,27 +42,21 @@ class ArmPath:
 
 
 def follow_poses(
-    arm: Arm,
-    commanded: Sequence[ArrayLike],
-    errors: JointErrors,
-    rng: np.random.Generator,
-    *,
-    wrist: Wrist | None = None,
-    hanging: WristPose | None = None,
+    arm: Arm, commanded: Sequence[ArrayLike], errors: JointErrors, rng: np.random.Generator
 ) -> ArmPath:
     """Follow commanded poses (n, 4, 4) T_base_sensor, mm, with an arm that is not perfect.
 
     They are in the order of the scan; lifts between touches may be among them, they decide on which
     side of its play a joint arrives. `rng` draws the noise, and where in their play the joints
-    start. The probe hangs level and half way by default.
+    start. The probe hangs level and half way.
 
     Raises
     ------
     PoseError
         A pose that the arm cannot reach.
     """
-    wrist = wrist or Wrist()
-    hanging = hanging or WristPose(sum(wrist.travel_mm) / 2, 0.0, 0.0, np.zeros((3, 3)))
+    wrist = Wrist()
+    hanging = WristPose(sum(wrist.travel_mm) / 2, 0.0, 0.0, np.zeros((3, 3)))
     T_gripper_sensor = gripper_to_plate(wrist, hanging) @ plate_to_sensor(wrist)
     back = np.linalg.inv(T_gripper_sensor)
     angles = joint_path(arm, [np.asarray(T, np.float64) @ back for T in commanded])

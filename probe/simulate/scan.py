@@ -23,8 +23,7 @@ from probe.scan.approach import ApproachLimits, guarded_approach
 from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
-from probe.simulate.scene import Scene
-from probe.simulate.touch import pose_of
+from probe.simulate.scene import Scene, pose_of
 from probe.wrist import Wrist, counts_of, distances_at, stiffness, travel_under_load
 
 Array = NDArray[np.float64]

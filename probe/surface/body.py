@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from probe.errors import SurfaceError
 from probe.surface.contract import HeightMap
+from probe.surface.polygon import signed_area
 from probe.surface.symbols import SymbolReliefs
 
 Array = NDArray[np.float64]
@@ -189,8 +190,8 @@ def triangulate(loops_mm: Sequence[Array]) -> NDArray[np.int64]:
 
     points = np.concatenate(list(loops_mm))
     found = np.asarray(triangulate(list(loops_mm), allow_convex=False), dtype=np.int64)
-    areas = [_area(triangle) for triangle in points[found.reshape(-1, 3)]]
-    covered, wanted = sum(areas), sum(map(_area, loops_mm))
+    areas = [signed_area(triangle) for triangle in points[found.reshape(-1, 3)]]
+    covered, wanted = sum(areas), sum(map(signed_area, loops_mm))
     eps = 1e-9 * float(np.ptp(points, axis=0).max()) ** 2
     if abs(covered - wanted) > eps or min(areas, default=0.0) < -eps:
         raise SurfaceError(
@@ -198,8 +199,3 @@ def triangulate(loops_mm: Sequence[Array]) -> NDArray[np.int64]:
             fix="give loops that do not cross, the outer one counter-clockwise, holes clockwise",
         )
     return found
-
-
-def _area(loop: Array) -> float:
-    x, y = (loop - loop[0]).T
-    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2

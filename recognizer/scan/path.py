@@ -63,9 +63,7 @@ class RegisteredPath:
 
 
 def follow_path(
-    embossed: EmbossedArray,
-    views: Sequence[Sequence[LatticeView]],
-    steps: Sequence[PlanarBelief],
+    embossed: EmbossedArray, views: Sequence[Sequence[LatticeView]], steps: Sequence[PlanarBelief]
 ) -> RegisteredPath:
     """Return the likeliest path; without placed touches where no touch has a place.
 

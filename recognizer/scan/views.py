@@ -119,11 +119,7 @@ def predicted_view(image: Image, effort: Effort, near: Array) -> tuple[LatticeVi
 
 
 def flat_views(
-    image: Image,
-    bank: Bank,
-    effort: Effort,
-    near: Array,
-    alone: Sequence[Fit],
+    image: Image, bank: Bank, effort: Effort, near: Array, alone: Sequence[Fit]
 ) -> tuple[LatticeView, ...]:
     """Return the likeliest lattices of an image, and those near predicted poses.
 
@@ -145,11 +141,7 @@ def flat_views(
 
 
 def round_views(
-    image: Image,
-    bank: Bank,
-    reader: Reader,
-    embossed: EmbossedArray,
-    near: Array,
+    image: Image, bank: Bank, reader: Reader, embossed: EmbossedArray, near: Array
 ) -> tuple[LatticeView, ...]:
     """Return the likeliest lattices of an image of a round face, and those near predicted poses.
 
@@ -194,10 +186,7 @@ def is_definite(covariance: Array) -> bool:
 
 
 def _refine_near(
-    image: Image,
-    effort: Effort,
-    near: Array,
-    found: Sequence[Fit],
+    image: Image, effort: Effort, near: Array, found: Sequence[Fit]
 ) -> tuple[Fit, ...]:
     """Return the fits reached from predicted poses (k, 3) that no found fit has."""
     pitch = image.template.pitch_mm

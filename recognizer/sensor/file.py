@@ -16,7 +16,7 @@ import numpy as np
 from encoded_objects.base.files import staged_file
 from recognizer.errors import SensorStateError
 from recognizer.sensor.learn import LEAST_TOUCHES
-from recognizer.touch.sensor_state import PRIOR, SensorState
+from recognizer.touch.sensor_state import ASIDE_SD_MM, SensorState
 
 FORMAT = "tactile sensor state"
 VERSION = 1
@@ -55,12 +55,7 @@ def write_state(state: SensorState, path: str | os.PathLike[str]) -> None:
 
 
 def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -> SensorState:
-    """Read a state.
-
-    Parameters
-    ----------
-    sensors
-        Names of the sensor that it shall serve, its own and its type's; not compared if none.
+    """Read a state; `sensors` are names that it may have: the sensor's and its type's; none: any.
 
     Raises
     ------
@@ -113,7 +108,7 @@ def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -
 def state_entry(state: SensorState) -> dict[str, Any]:
     """Return a state for `--json`: tactels, spreads, and the number of touches."""
     sound = ~state.masked
-    known = sound & (state.aside_deviation_mm.max(axis=-1) < PRIOR.aside_mm / 2)
+    known = sound & (state.aside_deviation_mm.max(axis=-1) < ASIDE_SD_MM / 2)
     return {
         "sensor": state.sensor,
         "touches": state.touches,

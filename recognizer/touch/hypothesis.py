@@ -97,16 +97,17 @@ def find_hypotheses(
     """Return the likeliest places over all fits, best first, at most `kept` of each fit."""
     found: list[Hypothesis] = []
     for number, fit in enumerate(fits):
-        found += _hypotheses_of(embossed, fit, number, kept)
+        scores = bounded_scores(fit)
+        places = _window_candidates(embossed, fit)
+        if places is None:
+            symbol = scores[:, :-1].max(axis=1) - scores[:, -1]  # a symbol rather than none
+            places = _anchor_candidates(embossed, fit, scores, symbol, ANCHORS)
+        found += _rank_candidates(embossed, fit, number, scores, places, kept)
     return sorted(found, key=lambda hypothesis: -hypothesis.score)
 
 
 def find_rivals(
-    embossed: EmbossedArray,
-    fit: Fit,
-    best: Hypothesis,
-    number: int,
-    kept: int = KEPT,
+    embossed: EmbossedArray, fit: Fit, best: Hypothesis, number: int, kept: int = KEPT
 ) -> list[Hypothesis]:
     """Return the likeliest other places of the whole database under a fit, best first.
 
@@ -125,22 +126,8 @@ def find_rivals(
     ]
 
 
-def _hypotheses_of(embossed: EmbossedArray, fit: Fit, number: int, kept: int) -> list[Hypothesis]:
-    scores = bounded_scores(fit)
-    found = _window_candidates(embossed, fit)
-    if found is None:
-        symbol = scores[:, :-1].max(axis=1) - scores[:, -1]  # a symbol rather than none
-        found = _anchor_candidates(embossed, fit, scores, symbol, ANCHORS)
-    return _rank_candidates(embossed, fit, number, scores, found, kept)
-
-
 def _rank_candidates(
-    embossed: EmbossedArray,
-    fit: Fit,
-    number: int,
-    scores: Array,
-    found: Places,
-    kept: int,
+    embossed: EmbossedArray, fit: Fit, number: int, scores: Array, found: Places, kept: int
 ) -> list[Hypothesis]:
     rows, columns, owners = found
     if len(rows) == 0:
@@ -197,11 +184,7 @@ def _window_candidates(embossed: EmbossedArray, fit: Fit) -> Places | None:
 
 
 def _anchor_candidates(
-    embossed: EmbossedArray,
-    fit: Fit,
-    scores: Array,
-    symbol: Array,
-    anchors: int,
+    embossed: EmbossedArray, fit: Fit, scores: Array, symbol: Array, anchors: int
 ) -> Places:
     """Return where (0, 0) can lie if one of a few cells is a registered one; none in a large lab.
 
@@ -217,10 +200,7 @@ def _anchor_candidates(
 
 
 def _origins(
-    embossed: EmbossedArray,
-    fit: Fit,
-    found: Sequence[NDArray[np.integer[Any]]],
-    numbers: list[int],
+    embossed: EmbossedArray, fit: Fit, found: Sequence[NDArray[np.integer[Any]]], numbers: list[int]
 ) -> Places:
     """Return where (0, 0) lies, each place once.
 

@@ -24,13 +24,7 @@ from recognizer.touch.hypothesis import Hypothesis, under_centre
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.next_touch import propose_next
 from recognizer.touch.options import ReaderOptions
-from recognizer.touch.pose import (
-    face_covariance,
-    face_pose,
-    felt_scale,
-    inside_mm,
-    pose_on_object,
-)
+from recognizer.touch.pose import face_covariance, face_pose, felt_scale, inside_mm, pose_on_object
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import (
     AMBIGUOUS,
@@ -47,12 +41,7 @@ from recognizer.touch.search_gate import is_nearly_chance, may_find_more
 from recognizer.touch.signal import Signal, mean_of_strongest, swap_halves
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import STROKE_UNIT_MM
-from recognizer.touch.verdict import (
-    may_count_border,
-    reject_chance,
-    reject_few,
-    reject_reason,
-)
+from recognizer.touch.verdict import may_count_border, reject_chance, reject_few, reject_reason
 from recognizer.touch.verify import TouchImages, verify_hypotheses
 
 #: Doubt up to which a wide search confirms an answer that chance nearly allows. A wrong soft one of
@@ -218,9 +207,7 @@ def _swapped_halves(touch: TouchImages, best: VerifiedHypothesis) -> Cause | Non
         return None
     for axis in (0, 1):
         swapped = replace(
-            signal,
-            forces=swap_halves(signal.forces, axis),
-            trust=swap_halves(signal.trust, axis),
+            signal, forces=swap_halves(signal.forces, axis), trust=swap_halves(signal.trust, axis)
         )
         found = verify_hypotheses(TouchImages(reader, swapped), reader.options.first)
         answer = _judge(reader, found, _best_answer(found, reader.options, 0))

@@ -19,8 +19,7 @@ from generator.alphabet import alphabet_named
 from generator.array import profile
 from probe.contact.contract import Touch
 from probe.errors import ContactError
-from probe.simulate.scene import Scene, bare_scene
-from probe.simulate.touch import TouchRanges, random_touches
+from probe.simulate.scene import Scene, TouchRanges, bare_scene, random_touches
 from probe.simulate.world.sensor import LevelSensor, SensorInstance, sample_sensor
 from probe.simulate.world.surfaces import (
     AdjacentParts,

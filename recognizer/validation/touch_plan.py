@@ -26,8 +26,7 @@ from probe.simulate.registered import (
     scene_of_face,
     scene_of_part,
 )
-from probe.simulate.scene import Scene
-from probe.simulate.touch import TouchRanges
+from probe.simulate.scene import Scene, TouchRanges
 from probe.simulate.world.levels import LEVELS, Level
 from recognizer.touch.lab import EmbossedArray
 from recognizer.validation.encoded_set import SIDE, is_extra

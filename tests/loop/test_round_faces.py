@@ -22,14 +22,12 @@ from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
 from generator.pipeline import encode
-from generator.plane.polygon import points_inside
-from generator.plane.rings import distance
+from generator.plane.polygon import distance, points_inside
 from generator.polyhedron.development import development
 from generator.polyhedron.winged import developable_from
 from generator.spec import read_specs
 from probe.simulate.registered import registered_object
-from probe.simulate.scene import bare_scene
-from probe.simulate.touch import TouchRanges, random_touches
+from probe.simulate.scene import TouchRanges, bare_scene, random_touches
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.sensor import LevelSensor
 from probe.simulate.written import round_part

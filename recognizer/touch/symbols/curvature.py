@@ -10,7 +10,9 @@ errors. Sensor frame, mm, rad.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +20,15 @@ from numpy.typing import NDArray
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend
 from recognizer.touch.symbols.image import Image, bounded_gain
-from recognizer.touch.symbols.linearize import ascend, damped_step
+from recognizer.touch.symbols.kernels import DAMPING, EASIER
 
 Array = NDArray[np.float64]
+Smooth = Callable[[Array], Array]  #: values (b, n) -> means (b, n)
 
 DIRECTIONS = 18  #: of lines, over half a turn
 STEPS = 6  #: of damped least squares
 HARDER = 6.0  #: multiplies the damping after a step that does not help
+MOST_DAMPING = 1e6
 AROUND = 5  #: tactels, side of the square over which forces are averaged
 APART_RAD = 0.35  #: by which two curvatures of one radius differ
 FIRST, LEAST, MOST = 0.45, 0.08, 0.8  #: depth, heights of the overlay: to begin with, bounds
@@ -54,8 +58,8 @@ def guess_bends(
     symbol = image.pressing.symbol * height
     points = sensor.centres_mm().reshape(-1, 2)
     falls = np.array([bend.raised(symbol).falls_mm(points) / height for bend in bends])
-    smooth = _Average(image)
-    seen = np.sqrt(np.maximum(smooth.of(image.forces[None])[0], 0.0))
+    smooth = _average(image)
+    seen = np.sqrt(np.maximum(smooth(image.forces[None])[0], 0.0))
     whole = float(seen @ seen)
     if not whole > 0:
         return []
@@ -67,8 +71,7 @@ def guess_bends(
         if any(_same_bend(bends[b], one.bend, APART_RAD) for one in found):
             continue
         scale = 2.0 * math.log(max(float(fitted.scale[b]), 1e-9))
-        gain = np.array([[scale, *fitted.plane[b]]])
-        gain = bounded_gain(gain)[0]
+        gain = bounded_gain(np.array([[scale, *fitted.plane[b]]]))[0]
         found.append(BendGuess(bends[b], gain, -float(fitted.value[b]) / whole))
     return found
 
@@ -78,28 +81,20 @@ def _same_bend(a: Bend, b: Bend, apart: float) -> bool:
     return a.radius_mm == b.radius_mm and abs(turn) < apart
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Average:
-    """Means over the neighbourhood of each tactel, of trusted ones."""
+def _average(image: Image) -> Smooth:
+    """Return the means (b, n) of values (b, n) over the trusted tactels about each one."""
+    from scipy.ndimage import uniform_filter
 
-    image: Image
-
-    def of(self, values: Array) -> Array:
-        """Return the means (b, n) of values (b, n)."""
-        return self._sum(values * self.image.trust) / np.maximum(
-            self._sum(self.image.trust[None]), 1e-9
-        )
-
-    def _sum(self, values: Array) -> Array:
-        from scipy.ndimage import uniform_filter
-
-        square = values.reshape(-1, *self.image.shape)
+    def summed(values: Array) -> Array:
+        square = values.reshape(-1, *image.shape)
         sums = uniform_filter(square, (0, AROUND, AROUND), mode="constant")
         return np.asarray(sums.reshape(values.shape))
 
+    known = np.maximum(summed(image.trust[None]), 1e-9)
+    return lambda values: summed(values * image.trust) / known
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Strips:
+
+class _Strips(NamedTuple):
     """Planes under b bends, and how well they explain an image."""
 
     plane: Array  # (b, 3) depths
@@ -109,7 +104,7 @@ class _Strips:
     right: Array  # (b, 4)
 
 
-def _fit_gains(image: Image, falls: Array, smooth: _Average, seen: Array) -> _Strips:
+def _fit_gains(image: Image, falls: Array, smooth: Smooth, seen: Array) -> _Strips:
     """Return the planes under which bends explain an image best."""
     pressing, basis, ink = image.pressing, image.plane, image.template.ink
 
@@ -119,26 +114,32 @@ def _fit_gains(image: Image, falls: Array, smooth: _Average, seen: Array) -> _St
         force += (1.0 - ink) * pressing.force(depth - pressing.symbol)
         slope = ink * pressing.slope(depth)
         slope += (1.0 - ink) * pressing.slope(depth - pressing.symbol)
-        root = np.sqrt(np.maximum(smooth.of(force), 1e-9))
+        root = np.sqrt(np.maximum(smooth(force), 1e-9))
         scale = (root @ seen) / (root * root).sum(axis=1)
         away = seen - scale[:, None] * root
         half = 0.5 * scale[:, None] / np.maximum(root, FAINT)
-        columns = [half * smooth.of(slope * one) for one in basis.T]
+        columns = [half * smooth(slope * one) for one in basis.T]
         jacobian = np.stack([*columns, root], axis=-1)
-        return _Strips(
-            plane=plane,
-            scale=scale,
-            value=-(away * away).sum(axis=1),
-            normal=jacobian.swapaxes(1, 2) @ jacobian,
-            right=(jacobian * away[..., None]).sum(axis=1),
-        )
-
-    def moved(at: _Strips, damping: Array) -> _Strips:
-        step = damped_step(at, damping, 1e-9)[:, :3]
-        plane = at.plane + np.clip(step, -LARGEST_STEP, LARGEST_STEP)
-        plane[:, 0] = np.clip(plane[:, 0], LEAST, MOST)
-        return pressed(plane)
+        normal = jacobian.swapaxes(1, 2) @ jacobian
+        right = (jacobian * away[..., None]).sum(axis=1)
+        return _Strips(plane, scale, -(away * away).sum(axis=1), normal, right)
 
     start = np.zeros((len(falls), 3))
     start[:, 0] = FIRST
-    return ascend(pressed(start), moved, STEPS, harder=HARDER)
+    best, damping = pressed(start), np.full(len(falls), DAMPING)
+    for _ in range(STEPS):
+        diagonal = np.einsum("bii->bi", best.normal) * damping[:, None] + 1e-9
+        system = best.normal + diagonal[:, :, None] * np.eye(4)
+        step = np.linalg.solve(system, best.right[..., None])[:, :3, 0]
+        plane = best.plane + np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+        plane[:, 0] = np.clip(plane[:, 0], LEAST, MOST)
+        tried = pressed(plane)
+        better = tried.value > best.value
+        best = _Strips(
+            *(
+                np.where(better.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+                for new, old in zip(tried, best, strict=True)
+            )
+        )
+        damping = np.where(better, damping / EASIER, np.minimum(damping * HARDER, MOST_DAMPING))
+    return best

@@ -90,11 +90,7 @@ class ResponseTemplate:
 
 
 @lru_cache(maxsize=16)
-def template_of(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-) -> ResponseTemplate:
+def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> ResponseTemplate:
     """Return the template of an alphabet, as embossed and on a sensor."""
     step, (low, high) = STEP_MM, EXPONENTS
     pad = sensor.overlay.kind == "pad"
@@ -108,28 +104,26 @@ def template_of(
     )
     rimmed = np.zeros((len(axis) + 2, len(axis) + 2, alphabet.order, 6), np.float32)
     values = rimmed[1:-1, 1:-1]
+
+    def heard(response: Array, share: float) -> Array:
+        return _with_cross_talk(response, share, sensor, step)
+
     for label in range(alphabet.order):
-        middle = _with_cross_talk(usual[label], CROSS_TALK, sensor, step)
-        values[..., label, 0] = psi(middle)
-        values[..., label, 1] = np.gradient(values[..., label, 0], step, axis=1)
-        values[..., label, 2] = np.gradient(values[..., label, 0], step, axis=0)
-        values[..., label, 3] = psi(_with_cross_talk(wide[label], CROSS_TALK, sensor, step)) - psi(
-            middle
-        )
-        values[..., label, 4] = psi(
-            _with_cross_talk(usual[label], 2 * CROSS_TALK, sensor, step)
-        ) - psi(usual[label])
-        values[..., label, 5] = (psi(middle**high) - psi(middle**low)) / (high - low)
+        middle = heard(usual[label], CROSS_TALK)
+        own = values[..., label, :]
+        own[..., 0] = psi(middle)
+        own[..., 1] = np.gradient(own[..., 0], step, axis=1)
+        own[..., 2] = np.gradient(own[..., 0], step, axis=0)
+        own[..., 3] = psi(heard(wide[label], CROSS_TALK)) - psi(middle)
+        own[..., 4] = psi(heard(usual[label], 2 * CROSS_TALK)) - psi(usual[label])
+        own[..., 5] = (psi(middle**high) - psi(middle**low)) / (high - low)
     ink = float(usual.sum() * step**2 / style.pitch_mm**2) / alphabet.order
     rimmed.setflags(write=False)
     return ResponseTemplate(style.pitch_mm, alphabet.order, steps * step, rimmed, ink, step)
 
 
 def _tab_responses(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-    axis: Array,
+    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array
 ) -> Array:
     """Return the responses (order, n, n) of tabs."""
     x, y = np.meshgrid(axis, axis)
@@ -145,10 +139,7 @@ def _tab_responses(
 
 
 def _pad_responses(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-    axis: Array,
+    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array
 ) -> Array:
     """Return the responses (order, n, n) of a pad, 1 where they are highest."""
     from scipy.ndimage import correlate1d
@@ -164,12 +155,7 @@ def _pad_responses(
     return np.asarray(tactels / np.percentile(tactels, PAD_PEAK))
 
 
-def _pressures(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-    axis_mm: Array,
-) -> Array:
+def _pressures(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis_mm: Array) -> Array:
     """Return the pressure under a pad (order, n, n) over a cell, 1 where it is highest.
 
     A pad passes a load on farther than a cell and bridges symbols that stand close together: its
@@ -219,10 +205,7 @@ def _pressures(
 
 
 def _gel_responses(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-    axis: Array,
+    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array
 ) -> Array:
     """Return the responses (order, n, n) of the pixels of a gel."""
     from scipy.ndimage import correlate1d, gaussian_filter

@@ -7,8 +7,7 @@ import pytest
 
 from generator.errors import SolidError
 from generator.layout.placement import Layout
-from generator.plane.polygon import points_inside, signed_area
-from generator.plane.rings import edges_cross
+from generator.plane.polygon import edges_cross, points_inside, signed_area
 from generator.polyhedron.frame import dihedral
 from generator.polyhedron.shapes import box as solid_box
 from generator.polyhedron.shapes import cube, pyramid
