@@ -122,7 +122,7 @@ def shares(conductance_s: Image, electronics: Electronics) -> Image:
 
 
 def scan_shares(share: Image, electronics: Electronics) -> Image:
-    """Add what the scan leaves from tactel to tactel, and what columns couple."""
+    """Add the residue of the tactel scanned before, and the coupling of columns."""
     k = electronics.coupling
     settled = _cyclic(share, electronics.residue, inverse=False)
     coupled: Image = settled + k * (settled.sum(axis=-2, keepdims=True) - settled)
