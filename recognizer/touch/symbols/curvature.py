@@ -1,8 +1,8 @@
 """Along which line, and under which radius, a round face lies under the sensor: from forces alone.
 
-Image -> a few curvatures with a gain each, likeliest first. A plate on a cylinder presses a strip along
-the cylinder's lines; its width gives depth and radius. Forces averaged over about a symbol are
-compared with those of a face with the mean response of symbols all over; every direction under
+Image -> a few curvatures with a gain each, likeliest first. A plate on a cylinder presses a strip
+along the cylinder's lines; its width gives depth and radius. Forces averaged over about a symbol
+are compared with those of a face with the mean response of symbols all over; every direction under
 every registered radius is fitted by depth and slopes at once. Roots of forces have nearly even
 errors. Sensor frame, mm, rad.
 """
