@@ -21,8 +21,7 @@ from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
 from generator.errors import SolidError
-from generator.export.formats import EXPORTERS
-from generator.export.robot import mjcf, sdf, urdf, usd
+from generator.export.robot import usd, xml_files
 from generator.pipeline import encode
 from generator.spec import SpecError, read_specs
 
@@ -65,9 +64,11 @@ def read_models(part):
     """Yield what every program reads: mass, centre, inertia, frames."""
     frames = tuple(SimpleNamespace(face=name, name=f"Part-{name}") for name in part.faces)
     named = SimpleNamespace(name="Part", frames=frames)
-    for kind in (mjcf, urdf, sdf, usd):
-        suffix = EXPORTERS[kind.__name__.rpartition(".")[2]].suffix
-        yield suffix, kind.read(named, part.folder / f"Part{suffix}")
+    for suffix, read in (
+        (".xml", xml_files.read_mjcf), (".urdf", xml_files.read_urdf),
+        (".sdf", xml_files.read_sdf), (".usda", usd.read),
+    ):  # fmt: skip
+        yield suffix, read(named, part.folder / f"Part{suffix}")
 
 
 def test_mass_centre_and_inertia_are_the_kernels(part):
@@ -213,10 +214,14 @@ def test_the_same_input_gives_the_same_bytes(part, tmp_path):
 
 
 def test_another_file_than_was_meant_is_refused(tmp_path, monkeypatch):
-    right = mjcf.mjcf_bytes
-    monkeypatch.setattr(
-        mjcf, "mjcf_bytes", lambda model: right(model).replace(b' mass="0.', b' mass="1.', 3)
-    )
+    right = xml_files.write_mjcf
+
+    def wrong(exported):
+        for name, content in right(exported):
+            changed = name == "Part.xml"
+            yield name, content.replace(b' mass="0.', b' mass="1.', 3) if changed else content
+
+    monkeypatch.setattr(xml_files, "write_mjcf", wrong)
     with pytest.raises(SolidError, match=r"'Part.xml' has a mass of 1\.\d+ kg where 0\."):
         make(tmp_path, TEXTS["panels"], verify=True)
     assert not (tmp_path / "out").exists()

@@ -22,9 +22,9 @@ def boxes(plate: Plate, sizes: list[Size]) -> list[tuple[float, float, float, fl
     return out
 
 
-@given(st.lists(st.tuples(sides, sides), max_size=25), st.sampled_from([0.0, 2.5, 5.0]))
-def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size], gap: float) -> None:
-    plates = arrange_plates(sizes, BED, gap)
+@given(st.lists(st.tuples(sides, sides), max_size=25))
+def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size]) -> None:
+    plates = arrange_plates(sizes, BED)
     assert sorted(p.part for plate in plates for p in plate.places) == list(range(len(sizes)))
     for plate in plates:
         assert plate.fits
@@ -36,7 +36,7 @@ def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size], gap: f
             assert back <= BED[1] + 1e-6
         for a, b in combinations(found, 2):
             apart = max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3])
-            assert apart >= gap - 1e-6
+            assert apart >= 5.0 - 1e-6
 
 
 def test_six_cube_panels_share_a_plate_and_twenty_need_two() -> None:

@@ -87,9 +87,10 @@ def test_entities_share_directions_and_keep_one_width() -> None:
     assert len(str(first)) == len(str(entities.next)) == entities.width
 
 
-def test_long_lists_break_into_lines() -> None:
+def test_long_lists_break_into_lines(monkeypatch) -> None:
+    monkeypatch.setattr("generator.export.step.entities._BLOCK", 12)
     numbers = np.arange(10000, 10030)
-    joined = b"".join(numbers_listed(numbers, 5, block=12)).decode("ascii")
+    joined = b"".join(numbers_listed(numbers, 5)).decode("ascii")
     assert joined == reference_list(f"#{number}" for number in numbers.tolist())
     assert joined.count("\n") == 2
 

@@ -15,11 +15,10 @@ from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import profile
 from generator.errors import WriteError
-from generator.export import zip_package as package_module
+from generator.export import threemf as package_module
 from generator.export.bed import BedPlace, Plate
 from generator.export.fixed_text import number_lines
-from generator.export.threemf import PrintFile, print_file
-from generator.export.zip_package import deflate_text, zip_package
+from generator.export.threemf import PrintFile, deflate_text, print_file, zip_package
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import cube
 from generator.solid import Part, emboss_whole

@@ -18,7 +18,7 @@ from generator.errors import PrintError
 from generator.pipeline import printed_check
 from generator.printed import slicer
 from generator.printed.check import PrintedCheck
-from generator.printed.profiles import PrintProfile
+from generator.printed.slicer import PrintProfile
 from generator.printed.survey import SymbolCheck, SymbolTile
 
 

@@ -11,9 +11,8 @@ import pytest
 from generator.errors import PrintError
 from generator.printed.deposit import deposit, seam_blobs, strings
 from generator.printed.faults import NAMED, PrintFaults, faulty_path, print_faults
-from generator.printed.gcode import toolpath_of
+from generator.printed.gcode import Toolpath, toolpath_of
 from generator.printed.slicer import SlicedPart
-from generator.printed.toolpath import Toolpath
 
 #: Two layers, each a square of 10 mm and a line of 5 mm in its middle.
 TEXT = "M83\nF3000\n" + "".join(

@@ -26,7 +26,6 @@ from generator.printed.prints import (
 from generator.printed.slicer import SlicedPart
 from generator.printed.surface import (
     UNIT_MM,
-    Coverage,
     PrintedSurface,
     is_written,
     read_surface,
@@ -43,7 +42,7 @@ def rough_surface(rng: np.random.Generator) -> PrintedSurface:
     T = np.eye(4)
     T[:2, :2] = [[0.0, -1.0], [1.0, 0.0]]
     T[:2, 3] = (3.0, -1.0)
-    return PrintedSurface(heights, (-0.5, 0.25), 0.05, T, np.eye(4), Coverage(0, 0, 0))
+    return PrintedSurface(heights, (-0.5, 0.25), 0.05, T)
 
 
 def test_a_surface_reads_as_it_was_to_half_a_unit(tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from generator.errors import PrintError
-from generator.printed import profiles, slicer
-from generator.printed.profiles import (
+from generator.printed import slicer
+from generator.printed.slicer import (
     PROFILES,
     PrintProfile,
     print_profile,
@@ -46,7 +46,7 @@ def test_every_profile_lays_the_layers_that_its_name_says() -> None:
 def test_without_the_vendors_file_nozzle_and_layer_are_enough(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(profiles, "VENDOR_FOLDERS", ())
+    monkeypatch.setattr(slicer, "VENDOR_FOLDERS", ())
     settings = settings_of(PROFILES["fdm-0.6-0.3"])
     assert settings["nozzle_diameter"] == "0.6"
     assert settings["layer_height"] == "0.3"
@@ -59,7 +59,7 @@ def test_vendor_settings_are_inherited(monkeypatch: pytest.MonkeyPatch, tmp_path
         "[filament:Prusament PLA]\ntemperature = 215\n[printer:P]\nnozzle_diameter = 0.4\n"
         "gcode = G1 X = Y\n"
     )
-    monkeypatch.setattr(profiles, "VENDOR_FOLDERS", (tmp_path,))
+    monkeypatch.setattr(slicer, "VENDOR_FOLDERS", (tmp_path,))
     found = settings_of(PrintProfile("mine", 0.4, 0.1, "mine", "P"))
     assert found == {
         "layer_height": "0.1", "perimeters": "2", "fill_density": "15%", "temperature": "215",

@@ -12,8 +12,7 @@ from generator.polyhedron.development import development
 from generator.polyhedron.shapes import cone, cylinder
 from generator.polyhedron.winged import Face
 from generator.solid import emboss_whole, round_volume, volume
-from generator.solid.wrap import analytic_faces
-from generator.solid.wrap.analytic import BEND_ERROR_MM, RoundSurfaceMap, bend_lines
+from generator.solid.analytic import BEND_ERROR_MM, RoundSurfaceMap, analytic_faces, bend_lines
 from tests.unit.generator.test_solid_wrap import STYLE, TIERS, layout_on
 
 SOLIDS = {

@@ -20,9 +20,8 @@ from generator.polyhedron.shapes import cube, dodecahedron, pyramid
 from generator.polyhedron.winged import polyhedron
 from generator.printers import PRINTERS
 from generator.solid import panels, plain_panels, prove_closed, triangles, volume
-from generator.solid.emboss import turn
 from generator.solid.fit import beyond, body_volume, cut_off, shortest_edge_mm
-from generator.solid.part import Facet, Part
+from generator.solid.part import Facet, Part, turn
 from generator.spec import read_specs
 
 FDM = PRINTERS["fdm-0.4"]

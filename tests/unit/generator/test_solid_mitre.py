@@ -22,10 +22,8 @@ from generator.solid import (
     top_insets_mm,
     triangulate,
 )
-from generator.solid.emboss import turn
-from generator.solid.inset import inset, regular, shared_insets
-from generator.solid.mitre import mitre
-from generator.solid.part import in_frame
+from generator.solid.part import in_frame, turn
+from generator.solid.plate import inset, mitre, regular, shared_insets
 from generator.solid.triangulate import triangulate_rings
 
 FDM = PRINTERS["fdm-0.4"]

@@ -27,8 +27,8 @@ from generator.solid import (
     volume,
 )
 from generator.solid.closed import edges_once
-from generator.solid.emboss import turn
 from generator.solid.measure import symbol_volume
+from generator.solid.part import turn
 
 FDM = PRINTERS["fdm-0.4"]
 

@@ -19,10 +19,10 @@ from generator.polyhedron.development import development
 from generator.polyhedron.shapes import cone, cylinder
 from generator.printers import printer_named
 from generator.solid import body_mesh, emboss_whole, prove_closed, symbol_meshes, triangles, volume
+from generator.solid.analytic import bend_problem
 from generator.solid.closed import edges_once
 from generator.solid.measure import symbol_volume
-from generator.solid.wrap import bend_problem
-from generator.solid.wrap.wrapped import NUDGE_MM, cut_symbol, strip_of
+from generator.solid.wrapped import NUDGE_MM, cut_symbol, strip_of
 
 STYLE = SymbolStyle()
 TIERS = outlines(alphabet_named("dense-4"), STYLE)
