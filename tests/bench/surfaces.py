@@ -1,6 +1,6 @@
 """What asking a surface costs, and what a simulated touch costs with it.
 
-    OPENBLAS_NUM_THREADS=1 python tests/bench/surfaces.py [--touches 200] [--frames 2000]
+    python tests/bench/surfaces.py [--touches 200] [--frames 2000]
 
 Makes a 60 mm cube (panels and whole) in a folder of its own, then prints: the time to make
 each kind of surface; of a first touch and of the ones after it, 4,864 points (19 on each tab);
@@ -10,9 +10,9 @@ by one; what leaving out saves. CPU times, medians.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import statistics
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -35,6 +35,9 @@ from probe.simulate.target import part_surface
 from probe.simulate.touch import TouchRanges, random_touches
 from probe.surface.face import endless_face
 from probe.surface.indenters import RoughSurface, Washer
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
 
 SPEC = """
 objects:
@@ -77,13 +80,9 @@ def touched(name, surface, sensor, touches, accuracy):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--touches", type=int, default=200)
+    parser = runner.arguments(__doc__, touches=200, seed=1)
     parser.add_argument("--frames", type=int, default=2000)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    given = runner.parse(parser)
     with tempfile.TemporaryDirectory() as folder:
         report(Path(folder), given)
 
@@ -92,12 +91,8 @@ def report(folder, given):
     database, other = str(folder / "lab.db"), str(folder / "large.db")
     for text, url in ((SPEC, database), (LARGE, other)):
         (folder / "set.yaml").write_text(text)
-        encode(
-            read_specs([folder / "set.yaml"]),
-            folder=folder / "out",
-            database=f"sqlite:///{url}",
-            formats=("stl",),
-        )
+        specs = read_specs([folder / "set.yaml"])
+        encode(specs, folder=folder / "out", database=f"sqlite:///{url}", formats=("stl",))
     panel = next((folder / "out").rglob("Cube-F1.stl"))
     whole = next((folder / "out").rglob("Whole.stl"))
     large = next((folder / "out").rglob("Large.stl"))
@@ -142,18 +137,17 @@ def report(folder, given):
         "frames in a second of CPU"
     )
 
+    def median(action):
+        return statistics.median(cpu(action)[1] for _ in range(20))
+
     print("\nleaving out:")
     at = places[0].on_surface(points)
     lattice = face.lattice
     symbols, pitch = lattice.template.symbols, lattice.template.pitch_mm
-    cells = np.floor(at / pitch)
-    within = at - (cells + 0.5) * pitch
+    within = at - (np.floor(at / pitch) + 0.5) * pitch
     labels = np.zeros(len(at), dtype=np.int64)
-    repeat = range(20)
-    by_table = statistics.median(cpu(lambda: lattice.heights_mm(at))[1] for _ in repeat)
-    exact = statistics.median(
-        cpu(lambda: symbols.heights_mm(labels, within[:, 0], within[:, 1]))[1] for _ in repeat
-    )
+    by_table = median(lambda: lattice.heights_mm(at))
+    exact = median(lambda: symbols.heights_mm(labels, within[:, 0], within[:, 1]))
     print(f"  table of pieces {by_table:.3f} ms, every edge for every point {exact:.3f} ms: "
           f"{exact / by_table:.0f}x")  # fmt: skip
     patch, everything = cpu(lambda: mesh.heights_mm(at))[1], mesh.corners
@@ -161,13 +155,9 @@ def report(folder, given):
     all_pairs = cpu(lambda: brute(everything, some_points))[1] * len(at) / len(some_points)
     print(f"  bins of triangles {patch:.2f} ms, all {len(everything):,} triangles {all_pairs:.0f} "
           f"ms: {all_pairs / patch:.0f}x")  # fmt: skip
-    middle = Touch(30.0, 30.0, 0.4, 60.0)
-    inner = statistics.median(
-        cpu(lambda: face.heights_mm(middle.on_surface(points)))[1] for _ in repeat
-    )
-    border = Touch(30.0, 0.0, 0.4, 60.0)
-    outer = statistics.median(
-        cpu(lambda: face.heights_mm(border.on_surface(points)))[1] for _ in repeat
+    inner, outer = (
+        median(lambda y=y: face.heights_mm(Touch(30.0, y, 0.4, 60.0).on_surface(points)))
+        for y in (30.0, 0.0)
     )
     print(f"  neighbouring faces: {inner:.3f} ms inside the face, {outer:.3f} ms over its edge")
 

@@ -31,12 +31,6 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(5)
 
 
-def test_a_perfect_machine_changes_nothing(path: Toolpath) -> None:
-    same = faulty_path(path, PrintFaults(), rng())
-    assert (same.end_mm == path.end_mm).all()
-    assert (same.volume_mm3 == path.volume_mm3).all()
-
-
 def test_scale_and_skew_act_about_the_datum(path: Toolpath) -> None:
     faults = PrintFaults(scale_x=0.99, scale_y=1.01, skew_deg=math.degrees(math.atan(0.02)))
     moved = faulty_path(path, faults, rng(), datum_mm=(10.0, 0.0))
@@ -90,12 +84,6 @@ def test_flow_has_the_mean_and_the_spread_that_are_asked() -> None:
     assert share.mean() == pytest.approx(1.1, abs=0.01)
     assert share.std() == pytest.approx(0.055, abs=0.008)
     assert np.abs(np.diff(share)).mean() < 1.5 * share.std()  # it drifts, it does not jump
-
-
-def test_the_same_seed_prints_the_same_again(path: Toolpath) -> None:
-    a, b = (faulty_path(path, NAMED["bad"], rng()) for _ in range(2))
-    assert (a.end_mm == b.end_mm).all()
-    assert (a.volume_mm3 == b.volume_mm3).all()
 
 
 def test_blobs_stand_where_loops_begin(path: Toolpath) -> None:

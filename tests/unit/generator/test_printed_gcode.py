@@ -123,11 +123,9 @@ def test_skirts_supports_and_the_machines_own_lines_are_no_part() -> None:
 @pytest.mark.parametrize(
     ("feature", "role"),
     [
-        ("Overhang perimeter", "overhang"), ("Overhang wall", "overhang"),
-        ("Top surface", "top"), ("Top solid infill", "top"), ("Internal solid infill", "solid"),
-        ("Bottom surface", "solid"), ("SKIN", "solid"), ("FILL", "infill"),
-        ("Sparse infill", "infill"), ("Internal Bridge", "bridge"), ("Gap infill", "gap fill"),
-        ("WALL-INNER", "inner wall"), ("SUPPORT-INTERFACE", "support"), ("PRIME-TOWER", "support"),
+        ("Overhang perimeter", "overhang"), ("Top solid infill", "top"), ("SKIN", "solid"),
+        ("FILL", "infill"), ("Internal Bridge", "bridge"), ("Gap infill", "gap fill"),
+        ("WALL-INNER", "inner wall"), ("PRIME-TOWER", "support"),
         ("Floating vertical shell", "unknown"),
     ],
 )  # fmt: skip

@@ -72,15 +72,6 @@ def test_a_print_that_stands_aside_is_moved_back(tmp_path: Path) -> None:
     assert held.moved_mm == (0.3, -0.2)
 
 
-def test_without_plastic_nothing_is_read(tmp_path: Path) -> None:
-    bare = replace(rough_surface(np.random.default_rng(2)),
-                   heights=np.full((3, 3), -np.inf, np.float32))  # fmt: skip
-    write_surface(bare, tmp_path / "a")
-    held = read_surface(tmp_path / "a")
-    assert np.isneginf(held.top_mm)
-    assert np.isneginf(held.heights_mm(np.zeros((1, 2)))).all()
-
-
 def test_what_is_damaged_or_of_another_format_is_no_surface(tmp_path: Path) -> None:
     path = tmp_path / "a"
     assert not is_written(path)

@@ -100,11 +100,6 @@ def test_no_symbol_is_lost() -> None:
     assert checks[1].height_mm == 0
 
 
-def test_no_plastic_at_all() -> None:
-    nothing = surface([0, 1, 2, 3], base=-np.inf)
-    assert {tile.check.verdict for tile in survey(nothing)} == {LOST}
-
-
 def test_a_string_across_the_cell_moves_nothing() -> None:
     strung = surface([0, 1, 2, 3])
     line = np.arange(341) * 0.05

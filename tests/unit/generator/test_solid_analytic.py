@@ -83,16 +83,6 @@ def test_symbols_on_the_face_stand_where_those_of_the_mesh_do():
                 assert np.linalg.norm(vertices - corner, axis=1).min() < 0.03  # chord error
 
 
-def test_walls_have_one_degree_below_and_above():
-    solid, _ = SOLIDS["pointed"]
-    part = emboss_whole(solid, layout_on(solid, [(40.0, 66.0)], [2]), TIERS, "part")
-    (symbol,) = part.analytic[0].symbols
-    below, above = symbol.rings
-    degrees = [[len(edge) for edge in ring] for ring in below]
-    assert degrees == [[len(edge) for edge in ring] for ring in above]
-    assert max(max(ring) for ring in degrees) > 2  # near the tip a parabola does not do
-
-
 def test_a_rim_on_several_faces_keeps_its_facets():
     solid = cylinder(60, 80)
     top = solid.faces[-1].loops[0]
