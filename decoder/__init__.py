@@ -20,23 +20,15 @@ if TYPE_CHECKING:
     from decoder.likelihood import Likelihood, decode_likelihood
     from decoder.view import Strength, strength, strength_of_window
 
-#: name: the module that holds it, loaded when it is first used
+#: modules, loaded when one of their names is first used
 _HOMES = {
-    "Candidate": "decoder.decoded",
-    "Decoded": "decoder.decoded",
-    "DecoderError": "decoder.errors",
-    "Decodings": "decoder.decoded",
-    "Likelihood": "decoder.likelihood",
-    "MethodError": "decoder.errors",
-    "Reason": "decoder.decoded",
-    "Strength": "decoder.view",
-    "WindowError": "decoder.errors",
-    "decode": "decoder.any_method",
-    "decode_exact": "decoder.exact",
-    "decode_good_tuple": "decoder.good_tuple",
-    "decode_likelihood": "decoder.likelihood",
-    "strength": "decoder.view",
-    "strength_of_window": "decoder.view",
+    "decoder.any_method": ["decode"],
+    "decoder.decoded": ["Candidate", "Decoded", "Decodings", "Reason"],
+    "decoder.errors": ["DecoderError", "MethodError", "WindowError"],
+    "decoder.exact": ["decode_exact"],
+    "decoder.good_tuple": ["decode_good_tuple"],
+    "decoder.likelihood": ["Likelihood", "decode_likelihood"],
+    "decoder.view": ["Strength", "strength", "strength_of_window"],
 }
 
 __all__ = [
@@ -59,6 +51,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(home), name)
     raise AttributeError(f"module 'decoder' has no attribute '{name}'")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -18,7 +19,7 @@ from encoded_objects.base.errors import UsageError
 from encoded_objects.base.options import Argument, Option, command
 
 if TYPE_CHECKING:
-    from decoder.decoded import Candidate, Decoded
+    from decoder.decoded import Decoded
     from decoder.registered import Registered
     from generator.array import FoldedArray, ProductArray
     from generator.array.contract import Labels
@@ -110,7 +111,7 @@ def decode(
 
         draw(chosen, window, found, plot)
         known["plot"] = str(plot)
-    _print(known, as_json=as_json)
+    _print(known, found, as_json=as_json)
     return console.DONE if found else console.FAILED
 
 
@@ -171,39 +172,26 @@ def _answer_values(
         "doubt": found.doubt,
         "rotation": found.rotation,
         "reason": found.reason,
-        "runner_up": None if found.runner_up is None else _place(found.runner_up),
-        "candidates": [_place(place) for place in found.candidates[: top or None]],
+        "runner_up": found.runner_up and asdict(found.runner_up),
+        "candidates": [asdict(place) for place in found.candidates[: top or None]],
         "method": method,
         "array": {"rows": array.rows, "columns": array.columns, "symbols": array.order},
         "seen": seen,
     }
 
 
-def _place(candidate: Candidate) -> dict[str, Any]:
-    return {
-        "row": candidate.row,
-        "column": candidate.column,
-        "rotation": candidate.rotation,
-        "score": candidate.score,
-    }
-
-
-def _print(known: dict[str, Any], *, as_json: bool) -> None:
+def _print(known: dict[str, Any], found: Decoded, *, as_json: bool) -> None:
     if as_json:
         output.write_json(known, line=True)
         return
-    if known["row"] is None:
-        output.write(f"not decoded: {known['reason']}")
-    else:
-        turned = f", turned by {90 * known['rotation']} degrees" if known["rotation"] else ""
-        output.write(f"row {known['row']}, column {known['column']} (t = {known['t']}){turned}")
-        if known.get("object"):
-            output.write(f"{known['object']}, face {known['face']}")
-        elif "object" in known:
-            output.write("no object is registered there")
-    if known["doubt"] is not None:
-        margin = "none" if known["margin"] is None else f"{known['margin']:.1f} nats"
-        output.write(f"margin {margin}, doubt {known['doubt']:.2g}")
+    output.write(str(found))
+    if found.object:
+        output.write(f"{found.object}, face {found.face}")
+    elif found and "object" in known:
+        output.write("no object is registered there")
+    if found.doubt is not None:
+        margin = "none" if found.margin is None else f"{found.margin:.1f} nats"
+        output.write(f"margin {margin}, doubt {found.doubt:.2g}")
     seen = known["seen"]
     line = f"{seen['cells']} symbols seen, rank {seen['rank']} of {seen['full_rank']}"
     if seen["errors_corrected"] is not None:

@@ -3,15 +3,15 @@
 A window of an m-sequence is a field element x^t, so shifting the register of thesis 5.1 is
 a multiplication by x. Characteristic 2: an element is one 64-bit word, digit k at bit k;
 products and linear maps go through tables of bytes. Odd characteristic: the last axis holds
-the D digits, as float64 integers, and BLAS does the work. `Elements` hides which it is: it
-indexes elements by their leading axes alone.
+the D digits, as float64 integers, and BLAS does the work. Who takes `Elements` indexes by their
+leading axes alone.
 """
 
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
 from math import log
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,38 +19,7 @@ from numpy.typing import NDArray
 from generator.array.residue import Digits, Residues, pack_words
 
 Element = NDArray[Any]  #: (...) uint64 words, or (..., D) float64 digits
-Map = NDArray[Any]  #: a linear map, as `Elements.map_of` prepares it
-
-
-class Elements(Protocol):
-    """Arithmetic in GF(p)[x]/H on arrays of elements."""
-
-    ring: Residues
-    one: Element  #: (1,) elements
-
-    def of_digits(self, digits: Digits) -> Element:
-        """Return elements from (..., D) digits."""
-        ...
-
-    def keys(self, a: Element) -> NDArray[np.uint64]:
-        """Return one integer per element, sum of digit_k p^k."""
-        ...
-
-    def of_keys(self, keys: NDArray[np.uint64]) -> Element:
-        """Return elements from their keys."""
-        ...
-
-    def product(self, a: Element, b: Element) -> Element:
-        """Return a b, broadcast together."""
-        ...
-
-    def map_of(self, matrix: Digits) -> Map:
-        """Prepare the linear map digits -> digits @ matrix."""
-        ...
-
-    def apply(self, prepared: Map, a: Element) -> Element:
-        """Return the images of elements under a prepared map."""
-        ...
+Map = NDArray[Any]  #: a linear map digits -> digits @ matrix, as `map_of` prepares it
 
 
 class BinaryElements:
@@ -149,6 +118,9 @@ class OddElements:
         return self.ring.reduced(self.ring.reduced(convolved[..., 0]) @ rows)
 
 
+Elements = BinaryElements | OddElements
+
+
 @lru_cache(maxsize=64)
 def elements_of(ring: Residues) -> Elements:
     """Return the arithmetic of a ring, the same object for the same ring."""
@@ -236,11 +208,6 @@ class Keys:
         self._shift = np.uint64(64 - bits)
         self._known = np.zeros(1 << bits, dtype=np.bool_)
         self._known[self._slots(keys)] = True
-
-    @property
-    def nbytes(self) -> int:
-        """Memory, bytes."""
-        return self._order.nbytes + self._sorted.nbytes + self._known.nbytes
 
     def _slots(self, keys: NDArray[np.uint64]) -> NDArray[np.intp]:
         return np.asarray((keys * _SPREAD) >> self._shift).astype(np.intp)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,19 +30,7 @@ from generator.array.sequence import Sequence
 _FEW_MASKS = 4  # sets of visible cells for which a linear map each is prepared
 
 
-class Conversion(Protocol):
-    """A method: field elements -> indices."""
-
-    @property
-    def nbytes(self) -> int:
-        """Memory of its tables, bytes."""
-        ...
-
-    def convert(self, states: Element) -> NDArray[np.uint64]:
-        """Return the index of each element (none of them 0); (N,)."""
-        ...
-
-
+Conversion = Table | Milestones | Logarithm  #: a method: field elements (N,) -> indices (N,)
 METHODS: dict[str, Callable[[Sequence], Conversion]] = {
     "table": Table,
     "serial": serial,
@@ -184,9 +171,8 @@ def decode_exact(
     labels = checked_labels(windows, array.order)
     if isinstance(array, ProductArray):
         return _of_product(array, labels, method)
-    number, a, b = labels.shape
-    offsets = _offsets(array, a, b)
-    seen = array.terms_of(labels).reshape(number, a * b)
+    offsets = array.offsets(*np.indices(labels.shape[1:]))
+    seen = array.terms_of(labels).reshape(len(labels), len(offsets))
     terms = convert_terms(array.sequence, offsets, seen, method)
     rows, columns = np.uint64(array.rows), np.uint64(array.columns)
     listed = {
@@ -201,13 +187,6 @@ def decode_exact(
         terms.reasons,
         candidates=listed,
     )
-
-
-def _offsets(array: FoldedArray, a: int, b: int) -> list[int]:
-    period = array.sequence.period
-    return [
-        (r * array.row_step + c * array.column_step) % period for r in range(a) for c in range(b)
-    ]
 
 
 def _of_product(array: ProductArray, labels: Labels, method: str) -> Decodings:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from decoder.decoded import Candidate, Decodings, Reason
 from decoder.errors import WindowError
-from decoder.ranking import Places, Ranked, Ranking, best_of_all, ranking_of
+from decoder.ranking import Places, Ranked, Ranking, best_of_all, concatenate, ranking_of
 from decoder.window import (
     SYMBOL_ERROR,
     Scores,
@@ -33,6 +33,8 @@ _LISTED = 16  #: candidates listed where nothing is answered
 _FAR = 7.0  #: nats below the best: no candidate (odds of 1 to 1,100)
 _VALUES = 1 << 18  #: log-likelihoods held at a time
 _WINDOWS = 1 << 10  #: windows weighed at a time
+
+Weighed = tuple[Ranked, NDArray[np.uint8], NDArray[np.float64]]
 
 
 class Likelihood:
@@ -116,9 +118,6 @@ class Likelihood:
         return _answers(self, scores, weighed, top)
 
 
-_Weighed = tuple[Ranked, NDArray[np.uint8], NDArray[np.float64]]
-
-
 def decode_likelihood(
     array: FoldedArray | ProductArray,
     windows: ArrayLike,
@@ -137,7 +136,7 @@ def decode_likelihood(
     return decoder.decode(windows, top)
 
 
-def _weigh(decoder: Likelihood, scores: Scores, number: int) -> _Weighed:
+def _weigh(decoder: Likelihood, scores: Scores, number: int) -> Weighed:
     """Return the best places, their rotation (N, K), and the doubt (N,)."""
     parts, places = [], 0
     for turn in decoder.rotations:
@@ -147,7 +146,7 @@ def _weigh(decoder: Likelihood, scores: Scores, number: int) -> _Weighed:
         block = max(1, min(_WINDOWS, _VALUES // ranking.work))
         starts = range(0, max(1, len(scores)), block)
         chunks = [ranking.rank(flat[start : start + block], number) for start in starts]
-        parts.append(_concatenate(chunks))
+        parts.append(chunks[0] if len(chunks) == 1 else concatenate(chunks))
         places += ranking.size
     best, source = best_of_all(parts, number) if len(parts) > 1 else (parts[0], None)
     rotations = np.array(decoder.rotations, dtype=np.uint8)
@@ -159,18 +158,7 @@ def _weigh(decoder: Likelihood, scores: Scores, number: int) -> _Weighed:
     return best, turns, others / (1 + others)
 
 
-def _concatenate(chunks: list[Ranked]) -> Ranked:
-    if len(chunks) == 1:
-        return chunks[0]
-    return Ranked(
-        np.concatenate([chunk.rows for chunk in chunks]),
-        np.concatenate([chunk.columns for chunk in chunks]),
-        np.concatenate([chunk.values for chunk in chunks]),
-        np.concatenate([chunk.rest for chunk in chunks]),
-    )
-
-
-def _answers(decoder: Likelihood, scores: Scores, weighed: _Weighed, top: int) -> Decodings:
+def _answers(decoder: Likelihood, scores: Scores, weighed: Weighed, top: int) -> Decodings:
     best, turns, doubts = weighed
     array = decoder.array
     reasons = np.where(doubts > decoder.doubt, Reason.AMBIGUOUS, Reason.NONE).astype(np.uint8)
@@ -204,15 +192,15 @@ def _answers(decoder: Likelihood, scores: Scores, weighed: _Weighed, top: int) -
 
 
 def _why(
-    decoder: Likelihood, scores: Scores, weighed: _Weighed, refused: NDArray[np.intp]
+    decoder: Likelihood, scores: Scores, weighed: Weighed, refused: NDArray[np.intp]
 ) -> NDArray[np.uint8]:
     """Tell too few symbols from a tie, and a tie from a surface without code."""
     best = weighed[0]
     flat = scores.reshape(len(scores), -1, scores.shape[3])
     likely = best.values[refused, 0] + np.log1p(best.rest[refused])
-    places = sum(
-        decoder.ranking(_turned_place(scores.shape, turn)).size for turn in decoder.rotations
-    )
+    a, b = scores.shape[1:3]
+    shapes = [(b, a) if turn % 2 else (a, b) for turn in decoder.rotations]
+    places = sum(decoder.ranking(shape).size for shape in shapes)
     odds = decoder.blank / (1 - decoder.blank) * places
     without = likely < unrelated_score(flat) + np.log(max(odds, np.finfo(float).tiny))
     reasons = np.where(without, Reason.NOT_ENCODED, Reason.AMBIGUOUS)
@@ -225,10 +213,6 @@ def _why(
         if not known[key]:
             reasons[i] = Reason.TOO_FEW
     return reasons.astype(np.uint8)
-
-
-def _turned_place(shape: tuple[int, ...], turn: int) -> tuple[int, int]:
-    return (shape[2], shape[1]) if turn % 2 else (shape[1], shape[2])
 
 
 def _candidates(

@@ -54,26 +54,16 @@ class Logarithm:
         ]
         self._remainders = _Remainders(sequence.period, self.orders)
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of all tables, bytes."""
-        maps = sum(prepared.nbytes for prepared in self._frobenius)
-        return maps + self._remainders.nbytes + sum(s.nbytes for s in self._subgroups)
-
     def convert(self, states: Element) -> Indices:
         """Return the index of each element (none of them 0); (N,)."""
         at_once = max(1, _TERMS // (len(self._digits) * max(self._radix, len(self.orders))))
         starts = range(0, len(states), at_once)
-        parts = [self._convert(states[start : start + at_once]) for start in starts]
-        return np.concatenate(parts) if parts else np.zeros(0, dtype=np.uint64)
-
-    def _convert(self, states: Element) -> Indices:
-        powers = self._powers(states)
-        found = [
-            subgroup.logarithm(power)
-            for subgroup, power in zip(self._subgroups, powers, strict=True)
-        ]
-        return self._remainders.joined(found)
+        parts = [np.zeros(0, dtype=np.uint64)]
+        for start in starts:
+            powers = self._powers(states[start : start + at_once])
+            found = [sub.logarithm(p) for sub, p in zip(self._subgroups, powers, strict=True)]
+            parts.append(self._remainders.joined(found))
+        return np.concatenate(parts)
 
     def _powers(self, states: Element) -> Element:
         """Return states^(N/m) for every subgroup order m, (K, N)."""
@@ -112,10 +102,6 @@ class _Subgroup:
         giant = Shifts(self.elements, ring.power_of_x(back))
         self._giants = giant.run(self.elements.one[0], self.giants)
 
-    @property
-    def nbytes(self) -> int:
-        return self._keys.nbytes + self._giants.nbytes
-
     def logarithm(self, powers: Element) -> Indices:
         """Return k with powers = generator^k; (N,)."""
         result = np.zeros(len(powers), dtype=np.uint64)
@@ -147,10 +133,6 @@ class _Remainders:
                 number = min(1 << _CHUNK, ((order - 1) >> shift) + 1)
                 multiples = [(i << shift) * unit % period for i in range(number)]
                 self._tables.append((k, shift, np.array(multiples, dtype=np.uint64)))
-
-    @property
-    def nbytes(self) -> int:
-        return sum(multiples.nbytes for _, _, multiples in self._tables)
 
     def joined(self, remainders: list[Indices]) -> Indices:
         """Return t with t = remainders[k] modulo orders[k]."""

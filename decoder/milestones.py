@@ -45,11 +45,6 @@ class Table:
             if start + block < sequence.period:
                 run = self.elements.apply(forward.map(16), run)
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of the table, bytes."""
-        return self.index.nbytes
-
     def convert(self, states: Element) -> NDArray[np.uint64]:
         """Return the index of each element (none of them 0); (N,)."""
         places = self.elements.keys(states).astype(np.intp)
@@ -68,18 +63,6 @@ def optimal_distance(period: int, k1: float = 1.0, k4: float = 1.0) -> int:
     (128, 512)
     """
     return max(1, round(sqrt(k1 / k4 * period)))
-
-
-def conversion_cost(
-    period: int, distance: float, k1: float = 1.0, k2: float = 0.0, k3: float = 0.0, k4: float = 1.0
-) -> float:
-    """Return the total cost of figure 5.4: equipment k1 N/t + k2, and time k3 + k4 t."""
-    return k1 * period / distance + k2 + k3 + k4 * distance
-
-
-def requested_milestones(period: int, k1: float = 1.0, k4: float = 1.0) -> int:
-    """Return the number of milestones at t_opt: an entry of table 5.2."""
-    return round(period / sqrt(k1 / k4 * period))
 
 
 class Milestones:
@@ -109,18 +92,13 @@ class Milestones:
         self._keys = Keys(self.elements.keys(stride.run(self.elements.one[0], number)))
         self._back = Shifts(self.elements, sequence.ring.power_of_x(period - 1))
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of the milestones, bytes."""
-        return self._keys.nbytes
-
     def convert(self, states: Element) -> NDArray[np.uint64]:
         """Return the index of each element (none of them 0); (N,)."""
         result = np.zeros(len(states), dtype=np.uint64)
         open_ = np.arange(len(states))
         done = 0
         while open_.size:
-            block = _block(open_.size, self.distance - done)
+            block = max(1, min(self.distance - done, _BLOCK // open_.size))
             run = self._back.run(states, block)
             found = self._keys.find(self.elements.keys(run))
             hit = found >= 0
@@ -133,10 +111,6 @@ class Milestones:
             open_, states = open_[~reached], run[-1][~reached]
             states = self.elements.apply(self._back.map(0), states)
         return result
-
-
-def _block(windows: int, shifts: int) -> int:
-    return max(1, min(shifts, _BLOCK // windows))
 
 
 def serial(sequence: Sequence) -> Milestones:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +34,12 @@ class Ranked:
     columns: NDArray[np.uint64]  #: (N, K)
     values: NDArray[np.float64]  #: (N, K) log-likelihood, nats; -inf where there is none
     rest: NDArray[np.float64]  #: (N,) likelihood of all but the best, relative to it
+
+
+def concatenate(parts: list[Ranked]) -> Ranked:
+    """Return the windows of several batches as one."""
+    fields = ("rows", "columns", "values", "rest")
+    return Ranked(*(np.concatenate([getattr(part, f) for part in parts]) for f in fields))
 
 
 def best_of(
@@ -185,6 +190,7 @@ class Joint:
         self.size = array.rows * array.columns
         self.work = min(self.size, _PAIRS)
         self._law = array.law
+        self._columns = array.columns
         self._shape = shape
         self._in_rows = _terms(array.row_sequence, shape[0])  # (a qr, rows)
         self._in_columns = _terms(array.column_sequence, shape[1])  # (b qc, columns)
@@ -192,9 +198,7 @@ class Joint:
     def rank(self, scores: Scores, number: int) -> Ranked:
         """Return the best places of scores (N, k, q)."""
         if self.size > _PAIRS:
-            parts = [self._searched(window, number) for window in scores]
-            fields = ("rows", "columns", "values", "rest")
-            return Ranked(*(np.concatenate([getattr(p, f) for p in parts]) for f in fields))
+            return concatenate([self._searched(window, number) for window in scores])
         by_row = self._by_row(scores)
         values = np.matmul(by_row, self._in_columns).reshape(len(scores), -1)
         return self._ranked(*best_of(values, number))
@@ -210,7 +214,7 @@ class Joint:
         by_row = self._by_row(window[None])[0]
         bounds = by_row.reshape(len(by_row), self._shape[1], -1).max(axis=2).sum(axis=1)
         order = np.argsort(-bounds, kind="stable")
-        block = max(1, _PAIRS // self._in_columns.shape[1])
+        block = max(1, _PAIRS // self._columns)
         best: Ranked | None = None
         for start in range(0, len(order), block):
             rows = order[start : start + block]
@@ -226,10 +230,6 @@ class Joint:
         assert best is not None
         return best
 
-    @property
-    def _columns(self) -> int:
-        return int(self._in_columns.shape[1])
-
     def _ranked(
         self, places: NDArray[np.intp], chosen: NDArray[np.float64], rest: NDArray[np.float64]
     ) -> Ranked:
@@ -243,24 +243,6 @@ def _terms(sequence: Sequence, length: int) -> NDArray[np.float32]:
     windows = np.lib.stride_tricks.sliding_window_view(terms, length)[: sequence.period]
     every = windows[..., None] == np.arange(sequence.field.order)
     return np.asarray(every.reshape(sequence.period, -1).T, dtype=np.float32)
-
-
-class Ranking(Protocol):
-    """Weighs places for windows of one shape."""
-
-    @property
-    def size(self) -> int:
-        """Number of places weighed."""
-        ...
-
-    @property
-    def work(self) -> int:
-        """Numbers held for each window."""
-        ...
-
-    def rank(self, scores: Scores, number: int) -> Ranked:
-        """Return the best places of scores (N, k, q)."""
-        ...
 
 
 class AllPlaces:
@@ -293,6 +275,9 @@ class AllPlaces:
         return Ranked(
             t % np.uint64(self._array.rows), t % np.uint64(self._array.columns), values, rest
         )
+
+
+Ranking = Places | Joint | AllPlaces
 
 
 @lru_cache(maxsize=32)

@@ -17,8 +17,7 @@
     >>> print(decode("01 11 01 01 00 01", profile="thesis"))
     row 1, column 61 (t = 2206)
 
-A name is loaded from its package when it is first used; importing this module loads nothing
-else. What all packages stand on lies in `encoded_objects.base`.
+A name is loaded from its package when it is first used.
 """
 
 from __future__ import annotations

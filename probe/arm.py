@@ -14,19 +14,16 @@ axes; columns are the joints. Singular where the arm is stretched or folded (elb
 gripper stands over the base's axis (shoulder).
 
 Pose of the sensor: T_base_sensor = T_base_gripper(q) T_gripper_plate(wrist) T_plate_sensor. The
-wrist's three freedoms follow the arm's five like further joints, so that errors of all eight
-propagate the same way. The covariance is (6, 6) of (x, y, z, rx, ry, rz): displacement of the
-sensor's origin (mm) and small turn about it (rad), both in base axes:
-T_true = [exp(r) R | p + (x, y, z)].
+wrist's three freedoms follow the arm's five like further joints. The covariance is (6, 6) of
+(x, y, z, rx, ry, rz): displacement of the sensor's origin (mm) and small turn about it (rad), both
+in base axes: T_true = [exp(r) R | p + (x, y, z)].
 
 Where the thesis is wrong as printed: element (2, 1) of the arm matrix must end in -C1 S5, not
 -C1 C5; element (1, 4) must be C1 (a2 C2 + a3 C23 + a4 C234 - d5 S234), its plus signs are lost
 and C2 reads C5; and the lengths are millimetres, not centimetres.
 
-References
-----------
-Y. Nakamura, H. Hanafusa, "Inverse kinematic solutions with singularity robustness", 1986;
-A. A. Maciejewski, C. A. Klein, "Numerical filtering for the operation of robotic manipulators
+References: Y. Nakamura, H. Hanafusa, "Inverse kinematic solutions with singularity robustness",
+1986; A. A. Maciejewski, C. A. Klein, "Numerical filtering for the operation of robotic manipulators
 through kinematically singular configurations", 1988: damping by singular direction.
 """
 
@@ -61,28 +58,15 @@ class Arm:
     low_rad: tuple[float, ...] = (-math.pi,) * AXES  #: joint ranges; the thesis gives none
     high_rad: tuple[float, ...] = (math.pi,) * AXES
 
-    def inside(self, q: ArrayLike, slack: float = 1e-9) -> bool:
-        """Tell whether all joints are in their ranges."""
+    def inside(self, q: ArrayLike) -> bool:
+        """Tell whether all joints are in their ranges, but for rounding."""
         angles = np.asarray(q, np.float64)
-        above = angles >= np.asarray(self.low_rad) - slack
-        return bool((above & (angles <= np.asarray(self.high_rad) + slack)).all())
+        above = angles >= np.asarray(self.low_rad) - 1e-9
+        return bool((above & (angles <= np.asarray(self.high_rad) + 1e-9)).all())
 
 
 def joint_frames(arm: Arm, q: ArrayLike) -> NDArray[np.float64]:
-    """Return the frames of base and links, (6, 4, 4), T_base_link.
-
-    Parameters
-    ----------
-    arm
-        The arm.
-    q
-        (5,) joint angles, rad.
-
-    Raises
-    ------
-    PoseError
-        Not five finite angles.
-    """
+    """Return T_base_link (6, 4, 4) of base and links at joint angles q (5,), rad."""
     angles = np.asarray(q, np.float64)
     if angles.shape != (AXES,) or not np.isfinite(angles).all():
         raise PoseError(f"joint angles {angles.tolist()}", fix=f"give {AXES} angles in rad")
@@ -124,17 +108,8 @@ def _exact(value: float) -> float:
 
 
 def inverse(arm: Arm, pose: ArrayLike) -> list[NDArray[np.float64]]:
-    """Return all joint angles (5,), in their ranges, that bring the gripper to a pose.
+    """Return all joint angles (5,), in their ranges, that bring the gripper to T_base_gripper, mm.
 
-    Parameters
-    ----------
-    arm
-        The arm.
-    pose
-        (4, 4) T_base_gripper, mm.
-
-    Returns
-    -------
     One to four solutions in (-pi, pi]: base forwards before backwards, q3 > 0 before q3 < 0.
     Over the base axis with a vertical approach the first angle is free, and 0 is taken.
 
@@ -173,7 +148,7 @@ def inverse(arm: Arm, pose: ArrayLike) -> list[NDArray[np.float64]]:
 def _plane_angle(pose: NDArray[np.float64], length: float) -> float:
     """Return the angle q1 of the vertical plane that holds approach direction and gripper.
 
-    Found from both at once, as the main axis of their horizontal parts: one of them may vanish.
+    It is the main axis of the horizontal parts of both: one of them may vanish.
     """
     parts = np.array([pose[:2, 3] / length, pose[:2, 2]])
     xx, yy, xy = parts[:, 0] @ parts[:, 0], parts[:, 1] @ parts[:, 1], parts[:, 0] @ parts[:, 1]
@@ -237,20 +212,9 @@ def _check(arm: Arm, pose: NDArray[np.float64]) -> None:
 
 
 def jacobian(arm: Arm, q: ArrayLike, point_mm: ArrayLike | None = None) -> NDArray[np.float64]:
-    """Return the geometric Jacobian, (6, 5).
+    """Return the geometric Jacobian (6, 5): rows v (mm/s per rad/s) and omega, base axes.
 
-    Parameters
-    ----------
-    arm
-        The arm.
-    q
-        (5,) joint angles, rad.
-    point_mm
-        (3,) the point that moves, base frame; the gripper's origin if not given.
-
-    Returns
-    -------
-    Rows v (mm/s per rad/s) and omega, base axes.
+    The point that moves (3,) is in the base frame; the gripper's origin if not given.
     """
     frames = joint_frames(arm, q)
     point = frames[AXES, :3, 3] if point_mm is None else np.asarray(point_mm, np.float64)
@@ -268,19 +232,11 @@ def condition(arm: Arm, q: ArrayLike) -> float:
 def joint_speeds(arm: Arm, q: ArrayLike, twist: ArrayLike) -> NDArray[np.float64]:
     """Return joint speeds (5,), rad/s, that follow a twist as well as bounded speeds can.
 
-    Least squares by singular directions. One that is weaker than `LEAST_SINGULAR` is
+    The twist (6,) is the velocity of the gripper's origin (mm/s) and the angular velocity (rad/s),
+    base axes. Least squares by singular directions. One that is weaker than `LEAST_SINGULAR` is
     damped, the more the weaker it is, so that nothing jumps on the way into a singularity, the
     other directions are followed exactly, and no unit of speed (a link's length per second) asks
     for more than GAIN over that value, 58 rad/s.
-
-    Parameters
-    ----------
-    arm
-        The arm.
-    q
-        (5,) joint angles, rad.
-    twist
-        (6,) velocity of the gripper's origin (mm/s) and angular velocity (rad/s), base axes.
 
     Raises
     ------
@@ -318,16 +274,7 @@ def sensor_pose(
 ) -> SensorPose:
     """Return the pose of the sensor with its covariance.
 
-    Parameters
-    ----------
-    arm
-        The arm.
-    q
-        (5,) joint angles, rad.
-    joint_covariance
-        (5, 5) of their errors, rad^2; or (5,) standard deviations, rad.
-    wrist, hanging
-        The wrist, and how its plate hangs.
+    `joint_covariance` is (5, 5) of the joints' errors, rad^2; or (5,) standard deviations, rad.
 
     Raises
     ------

@@ -129,10 +129,7 @@ LONGEST = frame_bytes((LINES_MAX, LINES_MAX))  #: bytes of a packet, at most
 def encode(packet: Packet) -> bytes:
     """Return the bytes of a packet on the wire, with its delimiter.
 
-    Raises
-    ------
-    FrameError
-        When a number does not fit its field.
+    Raises FrameError: a number does not fit its field.
     """
     try:
         kind, body = _body(packet)
@@ -146,12 +143,7 @@ def encode(packet: Packet) -> bytes:
 def decode(block: bytes, bits: int = 10) -> Packet | Damage:
     """Return the packet of a block between two delimiters, or what is wrong with it.
 
-    Parameters
-    ----------
-    block
-        Bytes without the delimiter.
-    bits
-        Of the readings of two bytes: larger ones are refused.
+    Readings of two bytes that need more than `bits` are refused.
     """
     try:
         payload: bytes = cobs.decode(block)
@@ -200,7 +192,6 @@ def _body(packet: Packet) -> tuple[int, bytes]:
 def _decode_frame(
     seq: int, t_us: int, payload: bytes, bits: int, *, first: bool, byte_wide: bool
 ) -> FramePacket | Damage:
-    """Return a frame; `first`: of version 1."""
     start = _HEADER.size if first else _HEADER.size + _SHAPE.size
     if len(payload) < start + _CRC.size:
         return Damage.LENGTH
@@ -229,19 +220,9 @@ def _decode_ident(seq: int, t_us: int, payload: bytes) -> IdentPacket | Damage:
     if not sane or not name.isascii() or not name.decode("ascii").isprintable():
         return Damage.VALUE
     return IdentPacket(
-        seq,
-        t_us,
-        bits=bits,
-        sensor=sensor,
-        sensors=sensors,
-        firmware=(major, minor),
-        settling_us=settling / 4,
-        baud=kbaud * 1000,
-        boot=boot,
-        rows=rows,
-        columns=columns,
-        name=name.decode("ascii").rstrip(),
-    )
+        seq, t_us, bits, sensor, sensors, (major, minor), settling / 4, kbaud * 1000, boot,
+        name.decode("ascii").rstrip(), rows, columns,
+    )  # fmt: skip
 
 
 SENSORS = 8  #: sensors among which a probe selects, thesis 4.2
@@ -258,13 +239,7 @@ class Command:
 
 
 def sensor_command(sensor: int) -> bytes:
-    """Return the command that selects a sensor, 0 ... 7.
-
-    Raises
-    ------
-    PortError
-        When there is no such sensor.
-    """
+    """Return the command that selects a sensor, 0 ... 7; PortError for others."""
     if sensor not in range(SENSORS):
         raise PortError(
             f"there is no sensor {sensor}, a probe has sensors 0 ... {SENSORS - 1}",
@@ -274,13 +249,7 @@ def sensor_command(sensor: int) -> bytes:
 
 
 def bits_command(bits: int) -> bytes:
-    """Return the command for readings of 8 or 10 bits.
-
-    Raises
-    ------
-    PortError
-        When the probe has no such readings.
-    """
+    """Return the command for readings of 8 or 10 bits; PortError for others."""
     if bits not in (8, 10):
         raise PortError(f"readings of {bits} bits, a probe reads 8 or 10", fix="take 8 or 10")
     return b"b" if bits == 8 else b"a"

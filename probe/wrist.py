@@ -90,10 +90,6 @@ class WristPose:
     theta_x_rad: float
     theta_y_rad: float
     covariance: NDArray[np.float64]  #: (3, 3) of (z, theta_x, theta_y), mm and rad
-    twist_mm: float = (
-        0.0  #: (AA' - BB' + CC' - DD') / 4, 0 but for errors: four readings, three freedoms
-    )
-    stops: tuple[str, ...] = ()  #: which end stops are reached: "z", "theta_x", "theta_y"
 
 
 def tilt_error_rad(error_mm: float, ab_mm: float, gamma_rad: float) -> float:
@@ -146,14 +142,7 @@ def counts_of(wrist: Wrist, distances: ArrayLike) -> NDArray[np.uint16]:
 
 
 def wrist_pose(wrist: Wrist, distances: ArrayLike) -> WristPose:
-    """Tell from four distances where the lower plate hangs.
-
-    Parameters
-    ----------
-    wrist
-        The wrist.
-    distances
-        (4,) AA', BB', CC', DD', mm.
+    """Return where the lower plate hangs by four distances AA', BB', CC', DD' (mm).
 
     Raises
     ------
@@ -177,7 +166,6 @@ def wrist_pose(wrist: Wrist, distances: ArrayLike) -> WristPose:
             f"the four distances {np.round(d, 3).tolist()} mm lie {abs(twist):.3g} mm off a plane",
             fix="check the transducers: two opposite ones must have the sum of the other two",
         )
-    stops = []
     for name, value, (low, high), error in zip(
         FREEDOMS, (z, theta_x, theta_y), wrist.ranges(), sd, strict=True
     ):
@@ -186,9 +174,7 @@ def wrist_pose(wrist: Wrist, distances: ArrayLike) -> WristPose:
                 f"{name} is {value:.4g}, the end stops are at {low:.4g} and {high:.4g}",
                 fix="check the transducers and their zero",
             )
-        if not low + error < value < high - error:
-            stops.append(name)
-    return WristPose(z, theta_x, theta_y, covariance, twist, tuple(stops))
+    return WristPose(z, theta_x, theta_y, covariance)
 
 
 def distances_at(
@@ -220,30 +206,11 @@ def _covariance(wrist: Wrist, theta_x: float, theta_y: float) -> NDArray[np.floa
     return covariance
 
 
-def pose_under_load(
-    wrist: Wrist, force_n: float, moment_x_nmm: float = 0.0, moment_y_nmm: float = 0.0
-) -> WristPose:
-    """Return where the lower plate hangs under a force and moments about its centre.
-
-    Parameters
-    ----------
-    wrist
-        The wrist; its plate hangs at the lower end stop when nothing presses.
-    force_n
-        Pressing the plates together, along -z.
-    moment_x_nmm, moment_y_nmm
-        Turning the plate about x and y, wrist frame, N mm.
-    """
-    z = wrist.travel_mm[1] - force_n / (4 * wrist.spring_n_mm + wrist.axial_n_mm)
-    turns = np.linalg.solve(_tilt_springs(wrist), [moment_x_nmm, moment_y_nmm])
-    free = (z, float(turns[0]), float(turns[1]))
-    held = [min(max(v, low), high) for v, (low, high) in zip(free, wrist.ranges(), strict=True)]
-    stops = tuple(
-        name
-        for name, value, (low, high) in zip(FREEDOMS, free, wrist.ranges(), strict=True)
-        if not low < value < high
-    )
-    return WristPose(held[0], held[1], held[2], np.zeros((3, 3)), 0.0, stops)
+def travel_under_load(wrist: Wrist, force_n: float) -> float:
+    """Return D_z (mm) under a force (N) along -z; unloaded, the lower end stop holds the plate."""
+    low, high = wrist.travel_mm
+    z = high - force_n / (4 * wrist.spring_n_mm + wrist.axial_n_mm)
+    return min(max(z, low), high)
 
 
 def stiffness(wrist: Wrist) -> WristStiffness:

@@ -1,9 +1,9 @@
-"""What takes long to compute, kept in the user's cache folder under the hash of what made it.
+"""Costly results, kept in the user's cache folder under the hash of what made them.
 
-Content -> file of that hash -> content. A file is whole or not there (atomic rename), is checked
-as it is read, and never changes: processes may share the folder, and it may be deleted at any
-time. Beyond a number of bytes the files that were not used for longest go. Where the folder cannot
-be written nothing is kept and everything works; `XDG_CACHE_HOME=/dev/null` turns it off so.
+A file is whole or not there (atomic rename), is checked as it is read, and never changes:
+processes may share the folder, and it may be deleted at any time. Beyond a number of bytes the
+files unused for longest go. Where the folder cannot be written nothing is kept and everything
+works; `XDG_CACHE_HOME=/dev/null` turns it off.
 """
 
 from __future__ import annotations
@@ -22,13 +22,7 @@ _CHECK_BYTES = 4
 
 
 def cache_folder(kind: str) -> Path:
-    """Return the folder that keeps things of a kind, in `XDG_CACHE_HOME` or `~/.cache`.
-
-    Raises
-    ------
-    RuntimeError
-        There is no home folder.
-    """
+    """Return the folder of a kind, in `XDG_CACHE_HOME` or `~/.cache`; RuntimeError without home."""
     given = os.environ.get("XDG_CACHE_HOME")
     root = Path(given) if given and Path(given).is_absolute() else Path.home() / ".cache"
     return root / "encoded-objects" / kind
@@ -46,17 +40,7 @@ def content_key(values: Iterable[object], sources: Iterable[Path] = ()) -> str:
 def cached_bytes(
     kind: str, key: str, make: Callable[[], bytes], *, largest: int = LARGEST_BYTES
 ) -> bytes:
-    """Return what `make` returns; from the second time on out of the file of its key.
-
-    Parameters
-    ----------
-    kind
-        Name of the folder.
-    key
-        Of `content_key`.
-    largest
-        Bytes that all files of this kind may have.
-    """
+    """Return what `make` returns; from the second time on from the file `key` in folder `kind`."""
     try:
         file = cache_folder(kind) / key
     except RuntimeError:
@@ -72,7 +56,7 @@ def cached_bytes(
 
 
 def _checked(file: Path) -> bytes | None:
-    """Return the content of a file; None where it is not there, or not what was written."""
+    """Return the content of a file; None where it is missing or damaged."""
     try:
         with file.open("rb") as stream:
             check, content = stream.read(_CHECK_BYTES), stream.read()
@@ -91,7 +75,7 @@ def _write(file: Path, content: bytes) -> None:
 
 
 def _shrink(folder: Path, largest: int) -> None:
-    """Delete what was not used for longest, drafts of processes that were killed among it."""
+    """Delete the files unused for longest, and drafts of processes that were killed."""
     files = sorted(((at.stat(), at) for at in folder.iterdir()), key=lambda one: -one[0].st_mtime)
     total = 0
     for state, file in files:

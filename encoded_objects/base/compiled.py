@@ -37,12 +37,7 @@ def sources_in(folder: Path) -> tuple[Path, ...]:
 
 
 def load_library(folder: Path, signatures: Signatures, file: Path | None = None) -> ctypes.CDLL:
-    """Return the compiled loops of a folder.
-
-    Parameters
-    ----------
-    file
-        Library to load; by default `kernels.so` in the folder.
+    """Return the compiled loops of a folder; `file` in place of its `kernels.so`.
 
     Raises
     ------
@@ -72,10 +67,7 @@ def _is_made_of(library: ctypes.CDLL, sources: Sequence[Path]) -> bool:
 
 
 def addresses(*arrays: Any) -> list[int | None]:
-    """Return where the values of arrays lie, None of none.
-
-    Thrice as fast as `ctypes.data`, which serves those that may not be written.
-    """
+    """Return where the values of arrays lie, None of none; thrice as fast as `ctypes.data`."""
     return [
         None if one is None
         else ctypes.addressof(_Start.from_buffer(one)) if one.flags.writeable

@@ -1,6 +1,6 @@
 """How every command starts and ends: exit codes of errors and signals, the page of `--help`.
 
-A command is a typer application whose functions read options and return an `Action`; the
+A command is an `Application` (`options`), which reads the arguments and returns an action; the
 action does the work and returns the exit code, or raises an `EncodedObjectsError`.
 """
 
@@ -17,20 +17,21 @@ from contextlib import contextmanager
 from types import FrameType, ModuleType
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from encoded_objects.base.options import HELP_OPTIONS, Application
+
 if TYPE_CHECKING:
-    from typer import Typer
+    from encoded_objects.base.errors import EncodedObjectsError
 
 DONE, FAILED, BAD_INPUT, DEVICE, DATABASE, INTERRUPTED = 0, 1, 2, 3, 4, 130
 
 Action = Callable[[], int]
 """What a command does once its options are read; returns the exit code."""
 
-Chosen = Callable[[list[str]], "Typer"]
+Chosen = Callable[[list[str]], Application]
 """Arguments -> the application that reads them; heavy parts load when it is called."""
 
 MATRIX_LIBRARIES = ("OMP", "OPENBLAS", "MKL")
 
-HELP_OPTIONS = ("-h", "--help")
 #: What typer's help page imports and no page of ours uses: names that it imports, by module.
 UNUSED_BY_HELP = {"rich.markdown": ("Markdown",), "rich.traceback": ("Traceback",)}
 
@@ -46,7 +47,6 @@ def main(
     chosen: Chosen,
     arguments: Sequence[str] | None = None,
     *,
-    groups: Sequence[str] = (),
     bare: bool = False,
     advice: str = "",
 ) -> NoReturn:
@@ -60,8 +60,6 @@ def main(
         Returns the application for the arguments.
     arguments
         In place of the process's own.
-    groups
-        Subcommands that have subcommands: given alone they show their help.
     bare
         Whether the command does something without any argument; otherwise it shows its help.
     advice
@@ -73,7 +71,7 @@ def main(
         sys.stdout.reconfigure(errors="backslashreplace")  # a name the terminal cannot show
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = run(name, chosen, given, groups=groups, bare=bare)
+        code = run(name, chosen, given, bare=bare)
         sys.stdout.flush()
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would end us without our code
@@ -86,45 +84,30 @@ def main(
     sys.exit(code)
 
 
-def run(
-    name: str,
-    chosen: Chosen,
-    arguments: list[str],
-    *,
-    groups: Sequence[str] = (),
-    bare: bool = False,
-) -> int:
+def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) -> int:
     """Run one command; returns its exit code. Errors are reported, not raised."""
-    from typer import BadParameter, Exit
-
     from encoded_objects.base import output
     from encoded_objects.base.errors import EncodedObjectsError, UsageError
-    from encoded_objects.base.options import read_plain
 
-    usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
     as_json = "--json" in arguments
-    unsaid = not (arguments or bare) or arguments in [[group] for group in groups]
+    unsaid = not (arguments or bare)
     app = None
     try:
-        asked = [*arguments, "--help"] if unsaid else arguments
         app = chosen(arguments)
+        unsaid = unsaid or arguments in [[group] for group in app.groups]
+        asked = [*arguments, "--help"] if unsaid else arguments
         if any(word in HELP_OPTIONS for word in asked):
             action = _show_help(app, name, asked)
         else:
-            action = read_plain(app, asked) or app(asked, prog_name=name, standalone_mode=False)
+            action = app.read_plain(asked) or app.for_typer()(
+                asked, prog_name=name, standalone_mode=False
+            )
         code = action() if callable(action) else int(action or 0)
         return BAD_INPUT if unsaid else code
-    except Exit as leaving:
-        return BAD_INPUT if unsaid else leaving.exit_code
-    except (usage_error, UsageError) as error:
-        called = getattr(getattr(error, "ctx", None), "command_path", "")
-        called = called or _command_path(name, app, arguments)
-        problem = EncodedObjectsError(_misuse(error), fix=f"see {called} --help")
-        output.error(problem, as_json=as_json)
-        return BAD_INPUT
     except EncodedObjectsError as error:
-        output.error(error, as_json=as_json)
-        return error.exit_code
+        code, problem = error.exit_code, error
+        if isinstance(error, UsageError):
+            code, problem = BAD_INPUT, _misuse(error, name, app, arguments)
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -132,25 +115,25 @@ def run(
         problem = EncodedObjectsError(
             f"{what}: {error.strerror or error}", fix="check folder, space and rights"
         )
-        output.error(problem, as_json=as_json)
-        return FAILED
+        code = FAILED
+    except Exception as error:
+        typer = sys.modules.get("typer")
+        if typer is not None and isinstance(error, typer.Exit):
+            return BAD_INPUT if unsaid else int(error.exit_code)
+        if typer is None or not isinstance(error, typer.BadParameter.__mro__[1]):
+            raise
+        code, problem = BAD_INPUT, _misuse(error, name, app, arguments)
+    output.error(problem, as_json=as_json)
+    return code
 
 
-def application(**settings: Any) -> Typer:
-    """Return an empty application as all commands have it; `settings` as those of `Typer`."""
-    from typer import Typer
-
-    return Typer(
-        add_completion=False,
-        pretty_exceptions_enable=False,
-        rich_markup_mode="rich",
-        context_settings={"help_option_names": list(HELP_OPTIONS)},
-        **settings,
-    )
+def application(**settings: Any) -> Application:
+    """Return an application without commands."""
+    return Application(**settings)
 
 
 def one_thread() -> None:
-    """Let matrix libraries use one thread; call before numpy is imported. Users may differ.
+    """Let matrix libraries use one thread, unless the user says otherwise; call before numpy loads.
 
     Matrices of a touch are small: several threads only wait for each other.
     """
@@ -176,31 +159,33 @@ def interruption() -> Iterator[threading.Event]:
 
 
 def _spare_start() -> None:
-    """Leave out what start-up pays for and no command needs; a fifth of `encode-object`'s start."""
+    """Leave out of start-up what no command needs."""
     gc.set_threshold(*GARBAGE)
     # Each installed package is asked for plug-ins of pydantic; none of ours needs one.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
-def _command_path(name: str, app: Typer | None, arguments: list[str]) -> str:
-    """Return how the command that was meant is called, with the groups it stands in."""
-    from typer.main import get_command
+def _misuse(
+    error: Exception, name: str, app: Application | None, arguments: list[str]
+) -> EncodedObjectsError:
+    """Return what is wrong with an option, with the option's name and the command's."""
+    from encoded_objects.base.errors import EncodedObjectsError
 
-    words, command = [name], None if app is None else get_command(app)
-    for word in arguments:
-        command = getattr(command, "commands", {}).get(word)
-        if command is None:
-            break
-        words.append(word)
-    return " ".join(words)
-
-
-def _misuse(error: Exception) -> str:
-    """Return what is wrong with an option, with the option's name."""
+    called = getattr(getattr(error, "ctx", None), "command_path", "")
+    if not called:
+        words, inner = [name], app
+        for word in arguments:
+            if inner is None or not (inner.is_group and word in inner.commands | inner.groups):
+                break
+            words.append(word)
+            inner = inner.groups.get(word)
+        called = " ".join(words)
     if getattr(error, "param", None) is None:  # a message of our own, which names it
-        return str(getattr(error, "message", getattr(error, "cause", error)))
-    message = str(getattr(error, "format_message", error.__str__)())
-    return message.replace("Invalid value for ", "").removesuffix(".")
+        cause = str(getattr(error, "message", getattr(error, "cause", error)))
+    else:
+        message = str(getattr(error, "format_message", error.__str__)())
+        cause = message.replace("Invalid value for ", "").removesuffix(".")
+    return EncodedObjectsError(cause, fix=f"see {called} --help")
 
 
 def _end(number: int, _frame: FrameType | None) -> NoReturn:
@@ -208,15 +193,15 @@ def _end(number: int, _frame: FrameType | None) -> NoReturn:
     sys.exit(128 + number)
 
 
-def _show_help(app: Typer, name: str, arguments: list[str]) -> Any:
+def _show_help(app: Application, name: str, arguments: list[str]) -> Any:
     """Run the command that the arguments name: its own `--help` shows its page.
 
-    To find a subcommand, typer reads the options of all groups above it, and imports pydantic for
+    To find a subcommand typer reads the options of all groups above it, and imports pydantic for
     that, a third of the time of a page.
     """
     from typer.main import get_command
 
-    command: Any = get_command(app)
+    command: Any = get_command(app.for_typer())
     words, rest = [name], list(arguments)
     while rest and rest[0] in getattr(command, "commands", {}):
         command = command.commands[rest[0]]
@@ -227,11 +212,7 @@ def _show_help(app: Typer, name: str, arguments: list[str]) -> Any:
 
 
 def _import_help_page() -> None:
-    """Import typer's page with stand-ins for what it does not use here.
-
-    Our pages are written in rich's markup; typer imports a parser of Markdown for other ones, a
-    fifth of the time of a page.
-    """
+    """Import typer's page without its parser of Markdown, a fifth of the time of a page."""
     stand_ins = {}
     for module, names in UNUSED_BY_HELP.items():
         if module not in sys.modules:

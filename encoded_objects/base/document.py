@@ -1,8 +1,7 @@
-"""Files that people write: their text, and what is wrong with it at which line and column.
+"""Files that people write: their text, and what is wrong with it at which line and column, from 1.
 
 A `DocumentKind` holds the words of messages about one kind of file, and the error that its package
 raises. A problem prints as `file:line:column: error: cause`, the line, a caret and a `fix:`.
-Lines and columns count from 1.
 """
 
 from __future__ import annotations
@@ -91,13 +90,7 @@ class Problem:
 
 
 class DocumentError(EncodedObjectsError):
-    """A file that cannot be used; holds every problem that was found, in file order.
-
-    Parameters
-    ----------
-    problems
-        One or more problems.
-    """
+    """A file that cannot be used; holds every problem that was found, in file order."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
@@ -125,7 +118,7 @@ class DocumentError(EncodedObjectsError):
 
 @dataclass(frozen=True, slots=True)
 class DocumentKind:
-    """What a file is, in the words of its messages."""
+    """The words of messages about one kind of file."""
 
     error: type[DocumentError]  #: what is raised when it cannot be used
     name: str  #: as "a spec"
@@ -182,7 +175,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def _suggest_similar(path: Path, kind: DocumentKind) -> str:
-    """Return a fix that names files like `path` beside it."""
+    """Return a fix that names similar files of the same folder."""
     try:
         beside = sorted(entry.name for entry in path.parent.iterdir())
     except (OSError, ValueError):

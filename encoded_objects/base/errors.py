@@ -9,8 +9,6 @@
     ├── DecoderError          decoder.errors
     ├── ProbeError            probe.errors
     └── RecognizerError       recognizer.errors
-
-Imports nothing of ours, so that every package may stand on it.
 """
 
 from __future__ import annotations
@@ -114,8 +112,7 @@ installed; pip install 'encoded-objects[report]'
             absent = isinstance(error, ModuleNotFoundError)
             why = "is not installed" if absent else f"cannot be loaded ({error})"
             raise MissingExtraError(
-                f"{purpose} needs {module.partition('.')[0]}, which {why}",
-                fix=install_line(extra),
+                f"{purpose} needs {module.partition('.')[0]}, which {why}", fix=install_line(extra)
             ) from error
 
 

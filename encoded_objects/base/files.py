@@ -13,14 +13,7 @@ from encoded_objects.base.errors import EncodedObjectsError
 
 
 def refuse_taken(out: Path, suffix: str, *, replace: bool) -> None:
-    """Refuse a file that is there already, unless it may be replaced, before work is done.
-
-    Parameters
-    ----------
-    out, suffix
-        The file to write, and how its name has to end.
-    replace
-        Whether a file of that name may go.
+    """Refuse a file to write before work is done: its name must end in `suffix`.
 
     Raises
     ------

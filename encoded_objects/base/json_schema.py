@@ -1,7 +1,7 @@
 """The JSON schema of blocks of settings: the text under a field is its description.
 
-pydantic would take these texts from the source whenever a model is defined, that is at each start
-of a command (60 ms); they are read here, where somebody asks for them.
+pydantic would take these texts from the source whenever a model is defined, at each start of a
+command (60 ms); they are read here, where somebody asks for them.
 """
 
 from __future__ import annotations

@@ -30,10 +30,11 @@ from encoded_objects.base.errors import UsageError
 if TYPE_CHECKING:
     from typer import Typer
 
+HELP_OPTIONS = ("-h", "--help")
+
 Work = Callable[..., int]
 Declared = dict[str, tuple[Any, "Option", Any]]  #: parameter -> type, option, default
 
-_COMMANDS: dict[Typer, dict[str, tuple[Declared, Callable[..., Any]]]] = {}
 _NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)(e-?\d{1,2})?", re.ASCII)
 
 
@@ -50,13 +51,7 @@ class Option:
     variable: str = ""  #: of the environment, read where the option is not given
 
     def checked(self, name: str, value: object, default: object) -> None:
-        """Refuse a value that is no choice.
-
-        Raises
-        ------
-        UsageError
-            With the choices.
-        """
+        """Refuse a value that is no choice; raises `UsageError` with the choices."""
         if self.choices and value not in self.choices and value != default:
             *others, last = self.choices
             allowed = f"{', '.join(others)} or {last}" if others else last
@@ -106,21 +101,145 @@ class Options:
         self.check()
 
     def check(self) -> None:
-        """Refuse options that exclude each other.
-
-        Raises
-        ------
-        UsageError
-            Which ones, and what to give.
-        """
+        """Refuse options that exclude each other; raises `UsageError` with what to give."""
 
 
 Json = Annotated[bool, Option("One JSON object on stdout, also for errors.", names=("--json",))]
 Replace = Annotated[bool, Option("Replace files that are there.")]
+_VERSION = Option("Say which version this is.")
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A function that is called by name."""
+
+    work: Work
+    declared: Declared
+    version_of: str  #: name of the command, which then has the option `--version`
+    parts: Callable[[], Mapping[str, str]]  #: what the version says besides
+    page: dict[str, Any]  #: help and epilog, in place of the docstring
+
+    def read(self, **given: Any) -> Callable[[], int]:
+        """Return the action of a command line, from the values of its options."""
+        if given.pop("version", False):
+            return partial(_report_version, self.version_of, self.parts, bool(given.get("as_json")))
+        values = dict(given)
+        for parameter, options in _option_classes(self.work).items():
+            chosen = {field.name: values.pop(field.name) for field in fields(options)}
+            values[parameter] = options(**chosen)
+        for parameter in values.keys() & self.declared.keys():
+            _, option, default = self.declared[parameter]
+            option.checked(parameter, values[parameter], default)
+        return partial(self.work, **values)
+
+    def for_typer(self) -> Callable[..., Callable[[], int]]:
+        """Return the function whose signature typer reads."""
+
+        def read(**given: Any) -> Callable[[], int]:
+            return self.read(**given)
+
+        signature = [
+            inspect.Parameter(
+                parameter, inspect.Parameter.KEYWORD_ONLY, default=default,
+                annotation=Annotated[kind, option.for_typer(parameter, default)],
+            )
+            for parameter, (kind, option, default) in self.declared.items()
+        ]  # fmt: skip
+        read.__signature__ = inspect.Signature(signature)  # type: ignore[attr-defined]
+        read.__annotations__ = {one.name: one.annotation for one in signature}
+        read.__doc__, read.__name__ = self.work.__doc__, self.work.__name__
+        return read
+
+
+class Application:
+    """The commands of a program, or of a group of them.
+
+    Typer's own application is made where typer is needed: for help, and for lines that are not
+    plain. It takes a sixth of the start of `recognize-object`.
+
+    Parameters
+    ----------
+    help, epilog
+        Of the page of `--help` of several commands.
+    named
+        Whether the only command is called by its name.
+    version_of
+        Name of the program: it gets the options `--version` and `--json`.
+    """
+
+    def __init__(
+        self,
+        *,
+        help: str | None = None,  # noqa: A002  typer's word
+        epilog: str | None = None,
+        named: bool = False,
+        version_of: str = "",
+    ) -> None:
+        self.commands: dict[str, Command] = {}
+        self.groups: dict[str, Application] = {}
+        self._page: dict[str, Any] = {"help": help, "epilog": epilog}
+        self._named = named
+        self._version_of = version_of
+
+    @property
+    def is_group(self) -> bool:
+        """Whether its commands are called by their names."""
+        return bool(len(self.commands) > 1 or self.groups or self._named or self._version_of)
+
+    def for_typer(self) -> Typer:
+        """Return typer's application."""
+        from typer import Typer
+
+        made = Typer(
+            add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
+            context_settings={"help_option_names": list(HELP_OPTIONS)},
+            **{name: text for name, text in self._page.items() if text is not None},
+        )  # fmt: skip
+        if self._version_of:
+            made.callback(invoke_without_command=True)(self._head())
+        elif self._named:
+            made.callback()(lambda: None)
+        for name, group in self.groups.items():
+            made.add_typer(group.for_typer(), name=name)
+        for name, one in self.commands.items():
+            made.command(name, **one.page)(one.for_typer())
+        return made
+
+    def _head(self) -> Callable[..., None]:
+        """Return the function of a line without a command."""
+        from typer import Exit
+
+        def head(version: bool, as_json: bool) -> None:
+            if version:
+                _report_version(self._version_of, dict, as_json)
+                raise Exit
+
+        given = {"version": _VERSION, "as_json": typing.get_args(Json)[1]}
+        head.__annotations__ = {
+            name: Annotated[bool, option.for_typer(name, default=False)]
+            for name, option in given.items()
+        }
+        head.__defaults__ = (False, False)
+        return head
+
+    def read_plain(self, arguments: Sequence[str]) -> Callable[[], int] | None:
+        """Return the action of a plain command line; None: it is left to typer, with every error.
+
+        Plain is a line of known options with sound values.
+        """
+        words = list(arguments)
+        if self.is_group:
+            if not words or words[0] not in self.commands:
+                return None
+            command = self.commands[words.pop(0)]
+        else:
+            [command] = self.commands.values()
+        values = _plain_values(command.declared, words)
+        return None if values is None else command.read(**values)
 
 
 def command(
-    app: Typer,
+    app: Application,
     name: str | None = None,
     *,
     help: str | None = None,  # noqa: A002  typer's word
@@ -132,8 +251,6 @@ def command(
 
     Parameters
     ----------
-    app
-        Reads the options.
     name
         Of the subcommand; that of the function by default.
     help, epilog
@@ -145,60 +262,16 @@ def command(
     """
 
     def register(work: Work) -> Work:
-        declared, classes = _declared(work), _option_classes(work)
-
-        def read(**given: Any) -> Callable[[], int]:
-            if given.pop("version", False):
-                return partial(_report_version, version_of, parts, bool(given.get("as_json")))
-            values = dict(given)
-            for parameter, options in classes.items():
-                chosen = {field.name: values.pop(field.name) for field in fields(options)}
-                values[parameter] = options(**chosen)
-            for parameter in values.keys() & declared.keys():
-                _, option, default = declared[parameter]
-                option.checked(parameter, values[parameter], default)
-            return partial(work, **values)
-
+        declared = _declared(work)
         if version_of:
-            version = Option("Say which version this is.")
-            declared = declared | {"version": (bool, version, False)}
-        signature = [
-            inspect.Parameter(
-                parameter, inspect.Parameter.KEYWORD_ONLY, default=default,
-                annotation=Annotated[kind, option.for_typer(parameter, default)],
-            )
-            for parameter, (kind, option, default) in declared.items()
-        ]  # fmt: skip
-        read.__signature__ = inspect.Signature(signature)  # type: ignore[attr-defined]
-        read.__annotations__ = {one.name: one.annotation for one in signature}
-        read.__doc__, read.__name__ = work.__doc__, work.__name__
-        _COMMANDS.setdefault(app, {})[name or work.__name__.replace("_", "-")] = declared, read
-        app.command(name, help=help, epilog=epilog)(read)
+            declared = declared | {"version": (bool, _VERSION, False)}
+        page = {"help": help, "epilog": epilog}
+        app.commands[name or work.__name__.replace("_", "-")] = Command(
+            work, declared, version_of, parts, page
+        )
         return work
 
     return register
-
-
-def read_plain(app: Typer, arguments: Sequence[str]) -> Callable[[], int] | None:
-    """Return what a plain command line does; None: it is left to typer, with every error.
-
-    To read options typer imports pydantic, a quarter of the start of `recognize-object`. Plain is
-    a line of known options with sound values.
-    """
-    commands, words = _COMMANDS.get(app, {}), list(arguments)
-    if len(app.registered_commands) > 1 or app.registered_groups or app.registered_callback:
-        if not words or words[0] not in commands:
-            return None
-        declared, read = commands[words.pop(0)]
-    elif len(commands) == 1:
-        [(declared, read)] = commands.values()
-    else:
-        return None
-    values = _plain_values(declared, words)
-    if values is None:
-        return None
-    action: Callable[[], int] = read(**values)
-    return action
 
 
 def _plain_values(declared: Declared, words: list[str]) -> dict[str, Any] | None:
@@ -285,7 +358,7 @@ def _option_classes(work: Work) -> dict[str, type[Any]]:
 
 @cache
 def _declared(source: Any) -> Declared:
-    """Return type, option and default of each option of a function or a class, in their order."""
+    """Return type, option and default of each option of a function or a class, in order."""
     hints = typing.get_type_hints(source, include_extras=True)
     found: Declared = {}
     for name, parameter in inspect.signature(source).parameters.items():

@@ -111,7 +111,7 @@ def json_value(value: Any) -> Any:
 
 
 class ProgressBar:
-    """How far the work is; a bar on a terminal, nothing elsewhere."""
+    """A bar of progress on a terminal, nothing elsewhere."""
 
     def __init__(self, bar: Progress | None, task: TaskID | None) -> None:
         self._bar, self._task = bar, task
@@ -140,12 +140,7 @@ class ProgressBar:
 def progress_bar(label: str, total: float | None = None) -> Iterator[ProgressBar]:
     """Yield a bar on a terminal; elsewhere notices are written and progress is not.
 
-    Parameters
-    ----------
-    label
-        What is being done.
-    total
-        How much there is to do; None: nobody knows. A total of 1 is shown as a share.
+    `total` None: nobody knows; a total of 1 is shown as a share.
     """
     if not sys.stderr.isatty():
         yield ProgressBar(None, None)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def page_environment(folder: Path) -> Environment:
-    """Return what renders the templates of a folder: escaped, strict about names."""
+    """Return the Jinja2 environment of a folder of templates: escaped, strict about names."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(

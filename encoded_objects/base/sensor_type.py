@@ -4,7 +4,6 @@ Sensor frame: seen through its back, from outside the object; origin at the cent
 the matrix in the plane of the undeformed overlay's tips; x right along columns, y up
 against rows, z away from the object; tactel (0, 0) top left. mm, N, MPa.
 
-Making takes the size and the proposed pitch of symbols from it, touching everything else.
 `sensor_type_file` reads and ships types as YAML; it loads pydantic, this module does not.
 """
 
@@ -48,9 +47,9 @@ class SensorTypeError(DocumentError):
 class Overlay:
     """The elastomer between the sensor and the object: separate tabs, one pad, or a gel.
 
-    Young's modulus and Poisson's ratio are those of the elastomer at small strain. A tab is
-    a round column bonded to the sensor; a pad is one layer bonded to it; a gel is a soft layer
-    behind a membrane, whose height is seen, not its force.
+    Young's modulus and Poisson's ratio are those at small strain. A tab is a round column bonded
+    to the sensor; a pad is one layer bonded to it; a gel is a soft layer behind a membrane, whose
+    height is seen, not its force.
     """
 
     kind: OverlayKind = "tab"
@@ -132,9 +131,8 @@ class SensorType:
     def symbol_pitch_mm(self) -> float:
         """Pitch of symbols that the type reads best, mm; `encode-object --sensor-type` takes it.
 
-        A touch needs several tactels on every symbol, and enough symbols on the sensor. The pitch
-        is the largest that shows `CELLS` symbols on the matrix's area, but at most `TACTELS`
-        tactels to a symbol (`PAD_TACTELS` under a pad, which blurs): finer sampling gains nothing.
+        The largest that shows `CELLS` symbols on the matrix's area, but at most `TACTELS` tactels
+        to a symbol (`PAD_TACTELS` under a pad, which blurs): finer sampling gains nothing.
 
         Examples
         --------
@@ -185,13 +183,8 @@ USUAL_SENSOR = SensorType()
 def force_share(sensor: SensorType) -> float:
     """Return the share of forces on `fsr-16` that a type is pressed with.
 
-    Pressure is the same, or for a gel the imprint: it is far softer than tabs, and the forces of
+    Pressure is equal, or for a gel the imprint: it is far softer than tabs, and the forces of
     `fsr-16` on its area would press symbols and bare face alike into it.
-
-    Examples
-    --------
-    >>> force_share(SensorType())
-    1.0
     """
     area_mm2 = 4 * math.prod(sensor.half_mm)
     if sensor.overlay.kind == "gel":
@@ -201,13 +194,7 @@ def force_share(sensor: SensorType) -> float:
 
 
 def usual_force_n(sensor: SensorType) -> float:
-    """Return the force that a type is pressed with by default, N.
-
-    Examples
-    --------
-    >>> usual_force_n(SensorType())
-    80.0
-    """
+    """Return the force that a type is pressed with by default, N; 80 for `fsr-16`."""
     return USUAL_FORCE_N * force_share(sensor)
 
 

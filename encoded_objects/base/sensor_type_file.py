@@ -1,8 +1,7 @@
 """Files of sensor types: name or YAML file -> `SensorType`, and the JSON schema of such files.
 
 A name without a folder or a suffix is that of a shipped type (`sensor_types/NAME.yaml`);
-everything else is a file. Errors read `file:line:column: error:`, the line, a caret and a fix.
-Lengths in mm.
+everything else is a file. Lengths in mm.
 """
 
 from __future__ import annotations
@@ -275,13 +274,7 @@ def shipped_text(name: str) -> str:
 
 
 def parse_sensor_type(text: str, place: str) -> SensorType:
-    """Return the type that a text describes; `place` stands in messages.
-
-    Raises
-    ------
-    SensorTypeError
-        With the line and the column of what is wrong.
-    """
+    """Return the type that a text describes; `place` stands in messages of `SensorTypeError`."""
     return _sensor_type(tree_of(text, place, Path(), _KIND))
 
 

@@ -68,7 +68,7 @@ class Block(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class SettingWords:
-    """What messages about settings say of one kind of file."""
+    """The words of messages about settings of one kind of file."""
 
     whole: str  #: as "a spec is made of settings"
     start: str  #: the first line of a right one
@@ -250,19 +250,7 @@ PathText = Annotated[str, BeforeValidator(path_text)]
 def explain_settings(
     error: ValidationError, tree: Tree, model: type[BaseModel], words: SettingWords
 ) -> list[Problem]:
-    """Return the problems behind a validation error.
-
-    Parameters
-    ----------
-    error
-        What pydantic found in `tree.value`.
-    tree
-        The values with their places.
-    model
-        The model that was to be read.
-    words
-        Of messages about this kind of file.
-    """
+    """Return the problems behind a validation error of `tree.value` as `model`."""
     items = error.errors(include_url=False)
     meant = {
         _likely_place(item["loc"], model) for item in items if item["type"] == "extra_forbidden"
@@ -317,7 +305,6 @@ def _problem(
 
 
 def _missing_setting(place: Place, tree: Tree, words: SettingWords) -> Problem:
-    """Explain a setting that must be there."""
     key, block = str(place[-1]), place[:-1]
     inside = f" in '{block[-1]}'" if block else ""
     fix = "add " + words.missing.get(key, f"{key}: ...")
@@ -382,7 +369,6 @@ def _value_text(value: Any) -> str:
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Yield the models that a type mentions."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for part in typing.get_args(annotation):

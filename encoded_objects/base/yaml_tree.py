@@ -1,9 +1,8 @@
 """Read a YAML file into plain values that remember their places.
 
 File -> Tree: mappings, lists, text, numbers and truth values, with line and column of
-every key and value. Only the plain part of YAML is read: no anchors, no tags, one
-document, at most 16 levels, so that no file can cost more than its size.
-Numbers follow YAML 1.2: `1:30`, `yes` and `2026-01-01` are text.
+every key and value. No anchors, no tags, one document, at most 16 levels, so that no file can cost
+more than its size. Numbers follow YAML 1.2: `1:30`, `yes` and `2026-01-01` are text.
 """
 
 from __future__ import annotations
@@ -16,13 +15,7 @@ from typing import Any
 
 import yaml
 
-from encoded_objects.base.document import (
-    DocumentKind,
-    Problem,
-    SourceMark,
-    TextSource,
-    read_text,
-)
+from encoded_objects.base.document import DocumentKind, Problem, SourceMark, TextSource, read_text
 
 DEPTH_MAX = 16
 
@@ -91,20 +84,9 @@ class Tree:
 
 
 def read_tree(path: Path, kind: DocumentKind) -> Tree:
-    """Read a YAML file.
+    """Read a YAML file; its name appears in messages as it is given here.
 
-    Parameters
-    ----------
-    path
-        The file; its name appears in messages as it is given here.
-    kind
-        What it is: the words of messages, and the error that is raised.
-
-    Returns
-    -------
-    Tree
-        Plain values with the places of keys and values, and what is wrong but does not
-        stop reading: keys given twice, anchors, tags.
+    The tree says what is wrong but does not stop reading: keys given twice, anchors, tags.
 
     Raises
     ------
@@ -115,13 +97,7 @@ def read_tree(path: Path, kind: DocumentKind) -> Tree:
 
 
 def tree_of(text: str, name: str, folder: Path, kind: DocumentKind) -> Tree:
-    """Read YAML text; `name` stands in messages, file names in it are relative to `folder`.
-
-    Raises
-    ------
-    DocumentError
-        As for `read_tree`.
-    """
+    """Read YAML text as `read_tree` does; `name` stands in messages."""
     source = TextSource.of(name, text)
     reader = _Reader(source, folder, kind)
     try:

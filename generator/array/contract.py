@@ -26,58 +26,30 @@ Labels = NDArray[np.int64]
 class SymbolArray(Protocol):
     """A toroidal array of symbols in which every small window occurs once."""
 
-    @property
-    def rows(self) -> int:
-        """Number of rows; a Python integer, up to 2^63."""
-        ...
-
-    @property
-    def columns(self) -> int:
-        """Number of columns."""
-        ...
-
-    @property
-    def order(self) -> int:
-        """Number of different symbols; labels are 0 ... order - 1."""
-        ...
-
-    @property
-    def window(self) -> tuple[int, int]:
-        """Rows and columns of the window that is known to be unique."""
-        ...
-
-    @property
-    def first(self) -> tuple[int, int]:
-        """Row and column at which the placing of objects begins."""
-        ...
+    rows: int  #: up to 2^64, a Python integer
+    columns: int
+    order: int  #: number of different symbols; labels are 0 ... order - 1
+    window: tuple[int, int]  #: rows and columns of a window that is known to be unique
+    first: tuple[int, int]  #: row and column at which the placing of objects begins
+    full_rank: int  #: rank at which a set of visible cells names its place
 
     def symbols(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
         """Return the labels at cells (rows, columns), broadcast together, taken on the torus.
 
         Integers of any size are accepted (object arrays beyond 2^63); nothing else is materialised.
         """
-        ...
 
     def rank(self, rows: ArrayLike, columns: ArrayLike) -> int:
         """Return the rank of a set of visible cells; only their differences matter."""
-        ...
-
-    @property
-    def full_rank(self) -> int:
-        """Rank at which a set of visible cells names its place."""
-        ...
 
     def identifies(self, rows: ArrayLike, columns: ArrayLike) -> bool:
         """Whether the cells together name their place: the rank test."""
-        ...
 
     def minimum_distance(self, rows: ArrayLike, columns: ArrayLike) -> int:
         """Return in how many of these cells two places differ at least; 0 if some look alike."""
-        ...
 
     def definition(self) -> dict[str, Any]:
         """Return the plain values (JSON) from which `array_from` makes this array again."""
-        ...
 
 
 def on_torus(indices: ArrayLike, steps: int) -> NDArray[np.uint64]:
@@ -130,6 +102,6 @@ def touches_needed(order: int, cells: int, pitch_mm: float, *, sensor_mm: float 
     return 1 + max(0, math.ceil((length_mm / sensor_mm - 1) / STEP_SHARE - 0.25))
 
 
-def symbols_seen(pitch_mm: float, *, sensor_mm: float = SENSOR_MM) -> float:
+def symbols_seen(pitch_mm: float) -> float:
     """Return how many symbols have their centre under the sensor, a mean over a face's places."""
-    return float(((sensor_mm - 2 * FELT_MM) / pitch_mm) ** 2)
+    return float(((SENSOR_MM - 2 * FELT_MM) / pitch_mm) ** 2)

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
+from math import gcd
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,33 +65,21 @@ class Field:
     inverse: Labels  #: (q,); entry 0 is 0 and has no meaning
     label_of_code: Labels  #: (q,) label of the element whose digits have the value sum d_i p^i
 
-    def add(self, a: ArrayLike, b: ArrayLike) -> Labels:
-        """Return a + b for labels, broadcast together."""
-        return np.asarray(self.addition[np.asarray(a), np.asarray(b)])
-
-    def subtract(self, a: ArrayLike, b: ArrayLike) -> Labels:
-        """Return a - b for labels, broadcast together."""
-        return np.asarray(self.addition[np.asarray(a), self.negative[np.asarray(b)]])
-
-    def multiply(self, a: ArrayLike, b: ArrayLike) -> Labels:
-        """Return a b for labels, broadcast together."""
-        return np.asarray(self.multiplication[np.asarray(a), np.asarray(b)])
-
     def labels(self, digits: ArrayLike) -> Labels:
         """Return the labels of elements given by their digits, (..., m)."""
         weights = self.characteristic ** np.arange(self.degree)
         return np.asarray(self.label_of_code[np.asarray(digits, dtype=np.int64) @ weights])
 
-    def matrix(self, label: int) -> Labels:
-        """Return the (m, m) matrix of multiplication: digits(b) @ matrix = digits(b label)."""
-        basis = self.labels(np.eye(self.degree, dtype=np.int64))
-        return np.asarray(self.digits[self.multiplication[basis, label]])
-
     @property
     def primitive_labels(self) -> tuple[int, ...]:
         """Labels of the elements that generate the multiplicative group."""
-        primes = period_factors(self.order, 1)
-        return tuple(a for a in range(1, self.order) if _is_generator(self, a, tuple(primes)))
+        size = self.order - 1
+        if self.degree > 1:  # label k is A^(k - 1)
+            return tuple(k for k in range(1, self.order) if gcd(k - 1, size) == 1)
+        steps = [size // prime for prime in period_factors(self.order, 1)]
+        return tuple(
+            a for a in range(1, self.order) if all(pow(a, step, self.order) != 1 for step in steps)
+        )
 
 
 def field_of_order(order: int, minimal: Sequence[int] | None = None) -> Field:
@@ -100,8 +89,8 @@ def field_of_order(order: int, minimal: Sequence[int] | None = None) -> Field:
     `MINIMAL_POLYNOMIALS` by default, not used for prime orders. Raises `ArrayError` if the order is
     no prime power or too large, or `minimal` is not primitive.
 
-    >>> field_of_order(4).add(2, 3)  # A + A^2 = 1
-    array(1)
+    >>> int(field_of_order(4).addition[2, 3])  # A + A^2 = 1
+    1
     """
     return _field(order, None if minimal is None else tuple(int(c) for c in minimal))
 
@@ -177,16 +166,6 @@ def _first_primitive(prime: int, exponent: int) -> tuple[int, ...]:
     raise AssertionError("every field has a primitive polynomial of every degree")
 
 
-def _is_generator(field: Field, label: int, primes: tuple[int, ...]) -> bool:
-    for prime in primes:
-        power = 1
-        for _ in range((field.order - 1) // prime):
-            power = int(field.multiplication[power, label])
-        if power == 1:
-            return False
-    return True
-
-
 _TERM = re.compile(r"(?P<number>\d+)?(?P<a>A(?:\^(?P<power>\d+))?)?(?P<x>x(?:\^(?P<degree>\d+))?)?")
 _GROUP = re.compile(r"([^()+]*)\(([^()]*)\)")
 
@@ -251,13 +230,7 @@ def format_polynomial(field: Field, h: Sequence[int]) -> str:
         label = h[degree]
         if label:
             unknown = "" if degree == 0 else "x" if degree == 1 else f"x^{degree}"
-            scale = element_text(field, label)
+            integer = field.degree == 1 or label == 1
+            scale = str(label) if integer else "A" if label == 2 else f"A^{label - 1}"
             terms.append(unknown if scale == "1" and unknown else scale + unknown)
     return "+".join(terms) or "0"
-
-
-def element_text(field: Field, label: int) -> str:
-    """Return an element as the thesis writes it: 0, 1, A, A^2, ... or an integer."""
-    if field.degree == 1 or label < 2:
-        return str(label)
-    return "A" if label == 2 else f"A^{label - 1}"

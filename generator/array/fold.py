@@ -16,8 +16,7 @@ translations x -> x + k.
 
 from __future__ import annotations
 
-from collections import abc
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from math import gcd, prod
 from typing import Any
 
@@ -32,7 +31,7 @@ from generator.array.factor import (
     period_factors,
 )
 from generator.array.field import Field, format_polynomial
-from generator.array.residue import Digits, Powers, pack_words
+from generator.array.residue import Powers, pack_words
 from generator.array.sequence import Sequence, sequence_definition
 from generator.array.window import minimum_distance
 from generator.errors import ArrayError
@@ -42,14 +41,11 @@ def folds(order: int, degree: int) -> list[tuple[int, int]]:
     """Return every coprime (rows, columns), 1 < rows < columns, the most square first."""
     parts = [prime**exponent for prime, exponent in period_factors(order, degree).items()]
     period = prod(parts)
-    divisors = {prod(chosen) for chosen in _subsets(parts)}
+    divisors = {1}
+    for part in parts:
+        divisors |= {part * divisor for divisor in divisors}
     pairs = [(rows, period // rows) for rows in divisors if 1 < rows < period // rows]
     return sorted(pairs, key=lambda pair: pair[1])
-
-
-def _subsets(parts: list[int]) -> Iterator[Iterable[int]]:
-    for chosen in range(1 << len(parts)):
-        yield [part for place, part in enumerate(parts) if chosen >> place & 1]
 
 
 def usual_fold(order: int, degree: int) -> tuple[int, int] | None:
@@ -57,22 +53,6 @@ def usual_fold(order: int, degree: int) -> tuple[int, int] | None:
     every = folds(order, degree)
     powers = {order**k - 1 for k in range(1, degree)}
     return next((pair for pair in every if pair[0] in powers), every[0] if every else None)
-
-
-def no_fold(order: int, degree: int, rows: int, columns: int) -> ArrayError:
-    """Return the error for rows and columns that do not fold; it names some that do."""
-    period = order**degree - 1
-    allowed = folds(order, degree)
-    if allowed:
-        names = ", ".join(f"{a}x{b}" for a, b in allowed[:3])
-        way_out = f"take {names}, or rows and columns exchanged"
-    else:
-        way_out = f"{period} has no coprime factors: take family prbs or prmvs, or another degree"
-    return ArrayError(
-        f"{rows}x{columns} does not fold the {period} terms of degree {degree} over GF({order}): "
-        "rows and columns must be coprime with that product",
-        fix=way_out,
-    )
 
 
 def nearest_sizes(order: int, degree: int) -> list[tuple[int, tuple[int, int]]]:
@@ -120,30 +100,6 @@ def translation(field: Field, label: int) -> tuple[int, ...]:
     return tuple(field.addition[:, label].tolist())
 
 
-def checked_permutation(permutation: Iterable[int] | None, order: int) -> Labels:
-    """Return (order,) labels, read-only, each once; the identity for None."""
-    given = list(range(order)) if permutation is None else list(permutation)
-    if sorted(given) != list(range(order)):
-        raise ArrayError(
-            f"permutation {given} does not show each of the {order} labels once",
-            fix=f"give 0 to {order - 1} in any order, or leave permutation: out",
-        )
-    labels = np.array(given, dtype=np.int64)
-    labels.setflags(write=False)
-    return labels
-
-
-def checked_cell(cell: abc.Sequence[int], rows: int, columns: int) -> tuple[int, int]:
-    """Return a cell of an array of rows x columns."""
-    row, column = cell
-    if not (0 <= row < rows and 0 <= column < columns):
-        raise ArrayError(
-            f"first: [{row}, {column}] is no cell of an array of {rows}x{columns}",
-            fix=f"give a row below {rows} and a column below {columns}, or leave first: out",
-        )
-    return int(row), int(column)
-
-
 _CHUNK = 1 << 14  # cells at a time where digits are not packed
 
 
@@ -168,53 +124,43 @@ class FoldedArray:
         permutation: Iterable[int] | None = None,
         first: tuple[int, int] = (0, 0),
     ) -> None:
-        if rows < 1 or rows * columns != sequence.period or gcd(rows, columns) != 1:
-            raise no_fold(sequence.field.order, sequence.degree, rows, columns)
+        order, degree, period = sequence.field.order, sequence.degree, sequence.period
+        if rows < 1 or rows * columns != period or gcd(rows, columns) != 1:
+            names = ", ".join(f"{a}x{b}" for a, b in folds(order, degree)[:3])
+            none = f"{period} has no coprime factors: take family prbs or prmvs, or another degree"
+            raise ArrayError(
+                f"{rows}x{columns} does not fold the {period} terms of degree {degree} over "
+                f"GF({order}): rows and columns must be coprime with that product",
+                fix=f"take {names}, or rows and columns exchanged" if names else none,
+            )
         self.sequence = sequence
-        self._rows, self._columns = rows, columns
-        period = sequence.period
+        self.rows, self.columns = rows, columns  #: n1, n2
+        self.order = order  #: number of different symbols, q
+        self.full_rank = degree  #: rank at which cells name their place, n
         self.row_step = columns * pow(columns, -1, rows) % period  #: e1: index of cell (1, 0)
         self.column_step = rows * pow(rows, -1, columns) % period  #: e2: index of cell (0, 1)
         ring = sequence.ring
         self._beta = Powers(ring, ring.power_of_x(self.row_step), rows)
         self._gamma = Powers(ring, ring.power_of_x(self.column_step), columns)
-        self._window = self._smallest_window() if window is None else self._checked(window)
-        self.permutation = checked_permutation(permutation, self.order)  #: (q,)
+        self.window = self._smallest_window() if window is None else self._checked(window)
+        shown = list(range(order)) if permutation is None else list(permutation)
+        if sorted(shown) != list(range(order)):
+            raise ArrayError(
+                f"permutation {shown} does not show each of the {order} labels once",
+                fix=f"give 0 to {order - 1} in any order, or leave permutation: out",
+            )
+        self.permutation: Labels = np.array(shown, dtype=np.int64)  #: (q,)
+        self.permutation.setflags(write=False)
         self._label_of_symbol = np.append(np.argsort(self.permutation), -1)
-        self._first = checked_cell(first, rows, columns)
+        self.first = int(first[0]), int(first[1])  #: cell at which the placing of objects begins
+        if not (0 <= self.first[0] < rows and 0 <= self.first[1] < columns):
+            raise ArrayError(
+                f"first: {list(self.first)} is no cell of an array of {rows}x{columns}",
+                fix=f"give a row below {rows} and a column below {columns}, or leave first: out",
+            )
 
     def __repr__(self) -> str:
         return f"FoldedArray({self.sequence!r}, {self.rows}x{self.columns})"
-
-    @property
-    def rows(self) -> int:
-        """Number of rows, n1."""
-        return self._rows
-
-    @property
-    def columns(self) -> int:
-        """Number of columns, n2."""
-        return self._columns
-
-    @property
-    def order(self) -> int:
-        """Number of different symbols, q."""
-        return self.sequence.field.order
-
-    @property
-    def window(self) -> tuple[int, int]:
-        """Rows and columns of the window that is known to be unique."""
-        return self._window
-
-    @property
-    def first(self) -> tuple[int, int]:
-        """Row and column at which the placing of objects begins."""
-        return self._first
-
-    @property
-    def full_rank(self) -> int:
-        """Rank at which cells name their place, n."""
-        return self.sequence.degree
 
     @property
     def family(self) -> str:
@@ -245,17 +191,13 @@ class FoldedArray:
                 ones = np.bitwise_count(masks[in_row, digit] & words)
                 codes |= (ones & np.uint8(1)).astype(np.int64) << digit
             return np.asarray(field.label_of_code[codes])
-        return self._summed(maps, elements, in_row.ravel(), in_column.ravel()).reshape(in_row.shape)
-
-    def _summed(
-        self, maps: Digits, elements: Digits, in_row: NDArray[np.intp], in_column: NDArray[np.intp]
-    ) -> Labels:
-        labels = np.empty(in_row.size, dtype=np.int64)
-        for start in range(0, in_row.size, _CHUNK):
+        row, column = in_row.ravel(), in_column.ravel()
+        labels = np.empty(row.size, dtype=np.int64)
+        for start in range(0, row.size, _CHUNK):
             part = slice(start, start + _CHUNK)
-            sums = np.einsum("kmd,kd->km", maps[in_row[part]], elements[in_column[part]])
-            labels[part] = self.sequence.field.labels(self.sequence.ring.reduced(sums))
-        return labels
+            sums = np.einsum("kmd,kd->km", maps[row[part]], elements[column[part]])
+            labels[part] = field.labels(self.sequence.ring.reduced(sums))
+        return labels.reshape(in_row.shape)
 
     def index(self, row: int, column: int) -> int:
         """Return the index t of a cell in the sequence."""
@@ -265,10 +207,6 @@ class FoldedArray:
         """Return the cell (row, column) of index t: (t mod n1, t mod n2)."""
         return int(index) % self.rows, int(index) % self.columns
 
-    def element(self, row: int, column: int) -> Digits:
-        """Return the field element x^t of a place as (D,) digits, see `Sequence.element`."""
-        return self.sequence.element(self.index(row, column))
-
     # --- what visible cells tell --------------------------------------------------------------
 
     def offsets(self, rows: ArrayLike, columns: ArrayLike) -> list[int]:
@@ -277,14 +215,6 @@ class FoldedArray:
         return [
             self.index(a, b) for a, b in zip(r.ravel().tolist(), c.ravel().tolist(), strict=True)
         ]
-
-    def coefficients(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
-        """Return (k, n) labels c with s at (place + cell) = sum_j c_j s[t + j], t place's index."""
-        return self.sequence.coefficients(self.offsets(rows, columns))
-
-    def functionals(self, rows: ArrayLike, columns: ArrayLike) -> Digits:
-        """Return (k, m, D) digits F: those of the term at place + cell are F @ element(place)."""
-        return self.sequence.functionals(self.sequence.element(self.offsets(rows, columns)))
 
     def rank(self, rows: ArrayLike, columns: ArrayLike) -> int:
         """Return the rank over GF(q) of a set of visible cells."""
@@ -302,9 +232,6 @@ class FoldedArray:
 
     # --- the window --------------------------------------------------------------------------
 
-    def _unique(self, window: tuple[int, int]) -> bool:
-        return self._window_rank(window) == self.full_rank
-
     def _window_rank(self, window: tuple[int, int]) -> int:
         return self.rank(np.arange(window[0])[:, None], np.arange(window[1]))
 
@@ -318,7 +245,7 @@ class FoldedArray:
             for a, b in sorted(shapes, key=lambda s: (abs(s[0] - s[1]), s[1])):
                 compact = max(a, b) <= 4 * min(a, b) or a == self.rows or b == self.columns
                 fits = at_least[0] <= a <= self.rows and at_least[1] <= b <= self.columns
-                if compact and fits and self._unique((a, b)):
+                if compact and fits and self._window_rank((a, b)) == self.full_rank:
                     return a, b
         return self.rows, self.columns
 

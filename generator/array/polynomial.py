@@ -12,13 +12,13 @@ import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import combinations, count
+from itertools import combinations
 from itertools import product as tuples_of
 from pathlib import Path
 
 import numpy as np
 
-from generator.array.factor import LARGEST_PERIOD, period_factors, prime_factors
+from generator.array.factor import LARGEST_PERIOD, period_factors
 from generator.array.field import Field, Labels, field_of_order, parse_polynomial
 from generator.array.residue import Residues
 from generator.errors import ArrayError
@@ -33,60 +33,6 @@ def product(field: Field, a: Sequence[int], b: Sequence[int]) -> tuple[int, ...]
             part = result[shift : shift + len(a)]
             part[:] = field.addition[part, field.multiplication[left, coefficient]]
     return tuple(result.tolist())
-
-
-def remainder(field: Field, a: Sequence[int], h: Sequence[int]) -> tuple[int, ...]:
-    """Return a modulo the monic polynomial h of degree n, n coefficients."""
-    degree = len(h) - 1
-    modulus = np.asarray(h, dtype=np.int64)
-    result = np.zeros(max(len(a), degree), dtype=np.int64)
-    result[: len(a)] = a
-    for top in range(len(result) - 1, degree - 1, -1):
-        if result[top]:
-            part = result[top - degree : top + 1]
-            factor = field.negative[result[top]]
-            part[:] = field.addition[part, field.multiplication[factor, modulus]]
-    return tuple(result[:degree].tolist())
-
-
-def mulmod(field: Field, a: Sequence[int], b: Sequence[int], h: Sequence[int]) -> tuple[int, ...]:
-    """Return a b modulo the monic polynomial h."""
-    return remainder(field, product(field, a, b), h)
-
-
-def powmod(field: Field, a: Sequence[int], exponent: int, h: Sequence[int]) -> tuple[int, ...]:
-    """Return a^exponent modulo the monic polynomial h, exponent >= 0."""
-    result = remainder(field, (1,), h)
-    for bit in bin(exponent)[2:]:
-        result = mulmod(field, result, result, h)
-        if bit == "1":
-            result = mulmod(field, result, a, h)
-    return result
-
-
-def order(field: Field, h: Sequence[int]) -> int:
-    """Return the least t > 0 with x^t = 1 modulo h, monic with a constant term; h may be reducible.
-
-    Slow for large degrees: `is_primitive` is quick.
-    """
-    checked = monic(field, h)
-    degree = len(checked) - 1
-    one = remainder(field, (1,), checked)
-    lifted = next(
-        field.characteristic**k for k in count() if field.characteristic**k >= degree
-    )  # an irreducible factor may be repeated up to `degree` times
-    primes = set(prime_factors(lifted))
-    bound: int = field.order**degree - 1
-    if powmod(field, (0, 1), bound, checked) != one:
-        bound = lifted
-        for k in range(1, degree + 1):
-            bound *= field.order**k - 1
-    for k in range(1, degree + 1):
-        primes.update(period_factors(field.order, k))
-    for prime in sorted(primes):
-        while bound % prime == 0 and powmod(field, (0, 1), bound // prime, checked) == one:
-            bound //= prime
-    return bound
 
 
 def norm(field: Field, h: Sequence[int]) -> tuple[int, ...]:
@@ -180,7 +126,7 @@ def known_polynomials() -> tuple[PrimitivePolynomial, ...]:
     )
 
 
-def primitive_polynomial(order: int, degree: int, source: str | None = None) -> tuple[int, ...]:
+def primitive_polynomial(order: int, degree: int) -> tuple[int, ...]:
     """Return the primitive polynomial of `degree` over GF(order) that is on file.
 
     Raises `ArrayError` if none is.
@@ -190,27 +136,17 @@ def primitive_polynomial(order: int, degree: int, source: str | None = None) -> 
     """
     entries = [p for p in known_polynomials() if p.order == order]
     for entry in entries:
-        if entry.degree == degree and source in (None, entry.source):
+        if entry.degree == degree:
             return entry.labels
     period_factors(order, degree)  # first say if there can be none
-    degrees = sorted({p.degree for p in entries if source in (None, p.source)})
-    wanted = f" from {source}" if source else ""
+    degrees = [p.degree for p in entries]
+    known = f"on file: degrees {min(degrees)} to {max(degrees)}" if degrees else ""
     raise ArrayError(
-        f"no primitive polynomial of degree {degree} over GF({order}){wanted} is on file; "
-        + (f"on file: degrees {_ranges(degrees)}" if degrees else "none is for this field"),
+        f"no primitive polynomial of degree {degree} over GF({order}) is on file; "
+        + (known or "none is for this field"),
         fix="give one as polynomial: 'x^2+x+A', found by "
         f"generator.array.polynomial.search_primitive({order}, {degree})",
     )
-
-
-def _ranges(numbers: list[int]) -> str:
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]} to {r[-1]}" for r in runs)
 
 
 def search_primitive(order: int, degree: int) -> tuple[int, ...]:

@@ -41,14 +41,25 @@ class ProductArray:
     ) -> None:
         self.row_sequence = row_sequence
         self.column_sequence = column_sequence
-        self.law = self._checked_law(law)
+        self.rows, self.columns = row_sequence.period, column_sequence.period
+        p, q = row_sequence.field.order, column_sequence.field.order
+        self.order = p * q  #: number of different symbols
+        self.full_rank = row_sequence.degree + column_sequence.degree  #: both factors determined
+        self.first = (0, 0)  #: cell at which the placing of objects begins
+        every = np.arange(self.order).reshape(p, q)
+        given = every if law is None else np.asarray(law)
+        if given.shape != (p, q) or not np.array_equal(np.sort(given, axis=None), every.ravel()):
+            raise ArrayError(
+                f"the product law must be a table of {p}x{q} labels with each of 0 to "
+                f"{self.order - 1} once (injective)",
+                fix="leave law: out for the thesis's, or correct the table",
+            )
+        self.law: Labels = given.astype(np.int64)
         places = np.argsort(self.law.ravel())
-        q = column_sequence.field.order
         #: (order, 2) labels of SR and SC for each symbol
         self.factors: Labels = np.stack([places // q, places % q], axis=1).astype(np.int64)
         least = (row_sequence.degree, column_sequence.degree)
-        self._window = least if window is None else window
-        a, b = self._window
+        self.window = a, b = least if window is None else window
         if not (least[0] <= a <= self.rows and least[1] <= b <= self.columns):
             raise ArrayError(
                 f"a {a}x{b} window of a {self.rows}x{self.columns} product array does not show "
@@ -58,36 +69,6 @@ class ProductArray:
 
     def __repr__(self) -> str:
         return f"ProductArray({self.row_sequence!r}, {self.column_sequence!r})"
-
-    @property
-    def rows(self) -> int:
-        """Number of rows: the period of SR."""
-        return self.row_sequence.period
-
-    @property
-    def columns(self) -> int:
-        """Number of columns: the period of SC."""
-        return self.column_sequence.period
-
-    @property
-    def order(self) -> int:
-        """Number of different symbols, q_r q_c."""
-        return self.row_sequence.field.order * self.column_sequence.field.order
-
-    @property
-    def window(self) -> tuple[int, int]:
-        """Rows and columns of the window that is known to be unique."""
-        return self._window
-
-    @property
-    def first(self) -> tuple[int, int]:
-        """Row and column at which the placing of objects begins."""
-        return 0, 0
-
-    @property
-    def full_rank(self) -> int:
-        """Sum of the two degrees: both factors determined."""
-        return self.row_sequence.degree + self.column_sequence.degree
 
     @property
     def family(self) -> str:
@@ -118,35 +99,17 @@ class ProductArray:
 
         A row of cells changes as a whole: d = min(b d_row, a d_column) for an a x b window.
         """
-        r, c = self._cells(rows, columns)
-        pairs = set(zip(r, c, strict=True))
+        pairs = sorted(set(zip(*self._cells(rows, columns), strict=True)))
         in_row = Counter(row for row, _ in pairs)
-        in_column = Counter(column for _, column in pairs)
+        in_column = Counter(sorted(column for _, column in pairs))
         return min(
-            minimum_distance(sequence, list(count), list(count.values()))
-            for sequence, count in (
-                (self.row_sequence, dict(sorted(in_row.items()))),
-                (self.column_sequence, dict(sorted(in_column.items()))),
-            )
+            minimum_distance(self.row_sequence, list(in_row), list(in_row.values())),
+            minimum_distance(self.column_sequence, list(in_column), list(in_column.values())),
         )
 
     def _cells(self, rows: ArrayLike, columns: ArrayLike) -> tuple[list[int], list[int]]:
         r, c = np.broadcast_arrays(on_torus(rows, self.rows), on_torus(columns, self.columns))
         return r.ravel().tolist(), c.ravel().tolist()
-
-    def _checked_law(self, law: ArrayLike | None) -> Labels:
-        shape = (self.row_sequence.field.order, self.column_sequence.field.order)
-        every = np.arange(shape[0] * shape[1])
-        if law is None:
-            return every.reshape(shape)
-        given = np.asarray(law)
-        if given.shape != shape or not np.array_equal(np.sort(given.ravel()), every):
-            raise ArrayError(
-                f"the product law must be a table of {shape[0]}x{shape[1]} labels with each of "
-                f"0 to {every.size - 1} once (injective)",
-                fix="leave law: out for the thesis's, or correct the table",
-            )
-        return given.astype(np.int64)
 
     def definition(self) -> dict[str, Any]:
         """Return the plain values (JSON) from which `array_from` makes this array again."""

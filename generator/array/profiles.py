@@ -31,7 +31,6 @@ class Profile:
     window: tuple[int, int]  #: rows, columns
     alphabet: str  #: name of the alphabet
     pitch_mm: float  #: distance of neighbouring symbols
-    purpose: str
     keyed: bool = False  #: whether every lab has an array of its own; the others are published
 
     def array(self) -> FoldedArray | ProductArray:
@@ -44,20 +43,6 @@ class Profile:
         if not (lab_key and self.keyed) or isinstance(published, ProductArray):
             return published
         return keyed_array(published, lab_key)
-
-
-def _profile(
-    name: str,
-    encoding: dict[str, Any],
-    window: tuple[int, int],
-    alphabet: str,
-    pitch_mm: float,
-    purpose: str,
-    *,
-    keyed: bool = False,
-) -> Profile:
-    whole = MappingProxyType(encoding | {"window": list(window)})
-    return Profile(name, whole, window, alphabet, pitch_mm, purpose, keyed)
 
 
 def _gf4(degree: int, polynomial: str, rows: int, columns: int) -> dict[str, Any]:
@@ -75,59 +60,34 @@ _LARGER = {
     12: _gf4(12, "x^12+A^2x^11+A^2x^10+x^9+Ax^7+x^6+x^5+A^2x^4+Ax^3+A^2x^2+A", 3133, 5355),
 }
 
+_THESIS = {"family": "prba", "polynomial": "0x1099", "rows": 63, "columns": 65}
+_PRODUCT = {
+    "family": "prmvpa",
+    "factors": {
+        "rows": {"order": 2, "polynomial": "x^4+x+1"},
+        "columns": {"order": 4, "polynomial": "x^2+x+A"},
+    },
+}
+
 PROFILES: Mapping[str, Profile] = MappingProxyType(
     {
-        profile.name: profile
-        for profile in (
-            _profile(
-                "one-touch",
-                _gf4(6, "x^6+x^2+x+A", 63, 65),
-                (3, 2),
-                "dense-4",
-                7.0,
-                "one 25 mm touch is enough",
-                keyed=True,
-            ),
-            _profile(
-                "thesis",
-                {"family": "prba", "polynomial": "0x1099", "rows": 63, "columns": 65},
-                (6, 2),
-                "thesis-2",
-                12.0,
-                "the thesis's own experiment, its three published windows",
-            ),
-            _profile(
-                "product",
-                {
-                    "family": "prmvpa",
-                    "factors": {
-                        "rows": {"order": 2, "polynomial": "x^4+x+1"},
-                        "columns": {"order": 4, "polynomial": "x^2+x+A"},
-                    },
-                },
-                (4, 2),
-                "dense-8",
-                12.0,
-                "the thesis's product array (figure 5.11), indices found apart",
-            ),
-            _profile(
-                "large",
-                _LARGE,
-                (4, 2),
-                "dense-4",
-                7.0,
-                "hundreds of objects",
-                keyed=True,
-            ),
-            _profile(
-                "fine",
-                _LARGE,
-                (4, 2),
-                "dense-4",
-                4.5,
-                "resin printing, small faces",
-                keyed=True,
-            ),
+        name: Profile(
+            name,
+            MappingProxyType(encoding | {"window": list(window)}),
+            window,
+            alphabet,
+            pitch_mm,
+            keyed,
+        )
+        for name, encoding, window, alphabet, pitch_mm, keyed in (
+            # one 25 mm touch is enough
+            ("one-touch", _gf4(6, "x^6+x^2+x+A", 63, 65), (3, 2), "dense-4", 7.0, True),
+            # the thesis's own experiment, its three published windows
+            ("thesis", _THESIS, (6, 2), "thesis-2", 12.0, False),
+            # the thesis's product array (figure 5.11), indices found apart
+            ("product", _PRODUCT, (4, 2), "dense-8", 12.0, False),
+            ("large", _LARGE, (4, 2), "dense-4", 7.0, True),  # hundreds of objects
+            ("fine", _LARGE, (4, 2), "dense-4", 4.5, True),  # resin printing, small faces
         )
     }
 )

@@ -46,16 +46,6 @@ class Residues:
             self.reduced(np.convolve(a, b)) @ self.powers_of_x[: 2 * self.degree - 1]
         )
 
-    def power(self, a: Digits, exponent: int) -> Digits:
-        """Return a^exponent modulo H, exponent >= 0."""
-        result: Digits | None = None
-        for bit in bin(exponent)[2:]:
-            if result is not None:
-                result = self.product(result, result)
-            if bit == "1":
-                result = a if result is None else self.product(result, a)
-        return self.powers_of_x[0] if result is None else result
-
     def power_of_x(self, exponent: int) -> Digits:
         """Return x^exponent modulo H, exponent >= 0; (D,)."""
         result: Digits = self.powers_of_x[0]

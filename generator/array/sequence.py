@@ -56,7 +56,15 @@ class Sequence:
         self.degree = len(self.polynomial) - 1  #: n
         self.period: int = field.order**self.degree - 1  #: N
         self.factors = period_factors(field.order, self.degree)  #: {prime: exponent} of N
-        self._refuse_undecodable()
+        largest = max(self.factors, default=1)
+        if largest > LARGEST_PRIME_FACTOR:
+            near = degrees_that_decode(field.order, self.degree)
+            sizes = " or ".join(f"{n} ({field.order**n - 1} terms)" for n in near)
+            raise ArrayError(
+                f"degree {self.degree} over GF({field.order}) cannot be decoded: {self.period} has "
+                f"the prime factor {largest}, and the discrete logarithm is limited to 2^40",
+                fix=f"take degree {sizes}, the nearest that decode",
+            )
         self.ring = Residues(field.characteristic, norm(field, self.polynomial))
         if not self.ring.is_primitive(self.factors):
             given = format_polynomial(field, self.polynomial)
@@ -67,7 +75,17 @@ class Sequence:
                 f"{field.order}, {self.degree})) or leave polynomial: out",
             )
         start = (*[0] * (self.degree - 1), 1) if initial is None else tuple(initial)
-        self.initial = self._checked_state(start)
+        self.initial = tuple(int(label) for label in start)
+        if (
+            len(self.initial) != self.degree
+            or not any(self.initial)
+            or not all(0 <= label < field.order for label in self.initial)
+        ):
+            raise ArrayError(
+                f"state {list(self.initial)} does not start a sequence of degree {self.degree} "
+                f"over GF({field.order})",
+                fix=f"give {self.degree} labels from 0 to {field.order - 1}, not all 0",
+            )
         self.powers = Powers(self.ring, self.ring.powers_of_x[1], self.period)
         terms = list(islice(self.forward(), 2 * self.ring.degree))
         windows = np.lib.stride_tricks.sliding_window_view(
@@ -79,32 +97,6 @@ class Sequence:
     def __repr__(self) -> str:
         return f"Sequence(GF({self.field.order}), {format_polynomial(self.field, self.polynomial)})"
 
-    def _refuse_undecodable(self) -> None:
-        largest = max(self.factors, default=1)
-        if largest > LARGEST_PRIME_FACTOR:
-            order = self.field.order
-            near = degrees_that_decode(order, self.degree)
-            sizes = " or ".join(f"{n} ({order**n - 1} terms)" for n in near)
-            raise ArrayError(
-                f"degree {self.degree} over GF({order}) cannot be decoded: {self.period} has the "
-                f"prime factor {largest}, and the discrete logarithm is limited to 2^40",
-                fix=f"take degree {sizes}, the nearest that decode",
-            )
-
-    def _checked_state(self, state: Iterable[int]) -> tuple[int, ...]:
-        labels = tuple(int(label) for label in state)
-        if (
-            len(labels) != self.degree
-            or not any(labels)
-            or not all(0 <= label < self.field.order for label in labels)
-        ):
-            raise ArrayError(
-                f"state {list(labels)} does not start a sequence of degree {self.degree} over "
-                f"GF({self.field.order})",
-                fix=f"give {self.degree} labels from 0 to {self.field.order - 1}, not all 0",
-            )
-        return labels
-
     # --- terms -----------------------------------------------------------------------------
 
     def symbols(self, indices: ArrayLike) -> Labels:
@@ -114,36 +106,12 @@ class Sequence:
         digits = self.ring.reduced(self.powers.at(distinct) @ self._first_digits)
         return np.asarray(self.field.labels(digits)[place.reshape(t.shape)])
 
-    def __getitem__(self, index: int) -> int:
-        return int(self.symbols(index))
-
-    def state(self, index: int) -> tuple[int, ...]:
-        """Return the n labels s[t] ... s[t+n-1]: the window at t."""
-        return tuple(self.symbols([index + k for k in range(self.degree)]).tolist())
-
-    def forward(self, state: Iterable[int] | None = None) -> Iterator[int]:
-        """Yield the terms from `state` (s[0] ... by default) on, by the direct feedback."""
+    def forward(self) -> Iterator[int]:
+        """Yield the terms from s[0] on, by the direct feedback."""
         field = self.field
         scale = field.multiplication[field.negative[list(self.polynomial[:-1])]].tolist()
         taps = [(k, scale[k]) for k, label in enumerate(self.polynomial[:-1]) if label]
-        return self._shifted(state, taps)
-
-    def reverse(self, state: Iterable[int] | None = None) -> Iterator[int]:
-        """Yield s[t-1], s[t-2], ... before `state` (s[t] ...), by the reverse feedback."""
-        field = self.field
-        register = self.initial if state is None else self._checked_state(state)
-        over = field.negative[field.inverse[self.polynomial[0]]]
-        scale = field.multiplication[field.multiplication[list(self.polynomial[1:]), over]].tolist()
-        taps = [
-            (self.degree - 1 - k, scale[k]) for k, label in enumerate(self.polynomial[1:]) if label
-        ]
-        return islice(self._shifted(register[::-1], taps), self.degree, None)
-
-    def _shifted(
-        self, state: Iterable[int] | None, taps: list[tuple[int, list[int]]]
-    ) -> Iterator[int]:
-        register = list(self.initial if state is None else self._checked_state(state))
-        sums = self.field.addition.tolist()
+        register, sums = list(self.initial), field.addition.tolist()
         while True:
             yield register[0]
             label = 0

@@ -12,16 +12,14 @@ from collections.abc import Iterator
 from math import comb
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from generator.array.contract import SymbolArray
 from generator.array.field import Field, Labels
 from generator.array.sequence import Sequence
 from generator.errors import ArrayError
 
 PLACES_LIMIT = 1 << 20  #: sequences up to this length are searched term by term
 DUAL_LIMIT = 1 << 16  #: otherwise the dual code is listed, up to this many words
-WINDOWS_LIMIT = 1 << 26  #: symbols compared by `windows_are_unique`
 
 
 def minimum_distance(sequence: Sequence, offsets: list[int], weights: list[int]) -> int:
@@ -127,21 +125,3 @@ def null_space(field: Field, matrix: ArrayLike) -> Labels:
         word[column] = 1
         word[pivots] = field.negative[rows[:, column]]
     return basis
-
-
-def windows_are_unique(array: SymbolArray, window: tuple[int, int]) -> bool:
-    """Compare every window of an array of up to 2^26 / (a b) cells with every other one.
-
-    Independent of the rank test, which says the same for arrays of any size.
-    """
-    a, b = window
-    if array.rows * array.columns * a * b > WINDOWS_LIMIT:
-        raise ArrayError(
-            f"{array.rows}x{array.columns} windows of {a}x{b} are too many to compare",
-            fix="use array.identifies(), the rank test",
-        )
-    grid = array.symbols(np.arange(array.rows)[:, None], np.arange(array.columns))
-    small: NDArray[np.uint16] = np.pad(grid, ((0, a - 1), (0, b - 1)), mode="wrap").astype("u2")
-    seen = np.lib.stride_tricks.sliding_window_view(small, window)
-    flat = np.ascontiguousarray(seen.reshape(-1, a * b)).view(f"V{2 * a * b}").ravel()
-    return np.unique(flat).size == flat.size

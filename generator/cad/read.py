@@ -1,4 +1,4 @@
-"""A solid of build123d, cadquery or trimesh -> polyhedron. mm.
+"""A solid of build123d, cadquery or trimesh -> polyhedron, mm.
 
 The first two go through the kernel that holds them; of a mesh, coplanar triangles that hang
 together become one face and curved regions stay blank, as in an STL file.
@@ -23,11 +23,8 @@ PLACE = "the solid"
 def polyhedron_from(solid: Any) -> Polyhedron:
     """Return the polyhedron of a solid.
 
-    Parameters
-    ----------
-    solid
-        A `build123d` part or solid, a `cadquery` workplane, shape or assembly's shape, a
-        kernel shape, or a `trimesh.Trimesh`; it must hold one solid.
+    A `build123d` part or solid, a `cadquery` workplane, shape or assembly's shape, a kernel shape,
+    or a `trimesh.Trimesh`.
 
     Raises
     ------

@@ -1,8 +1,7 @@
 """An encoded solid -> solids of build123d or cadquery, for scripts to go on with.
 
-The parts go through the STEP text that is written for them, so a script gets exactly what
-the files hold: planar faces, one valid solid a part. mm, in the frame of the solid that was
-encoded, where the panels of an object stand assembled.
+The parts go through the STEP text that is written for them: one valid solid a part, mm, in the
+frame of the solid that was encoded, where the panels of an object stand assembled.
 """
 
 from __future__ import annotations
@@ -21,10 +20,7 @@ from generator.solid import Part
 def to_build123d(result: EncodedSolid) -> Any:
     """Return a `build123d.Compound` with one labelled `Solid` for each part.
 
-    Raises
-    ------
-    MissingExtraError
-        build123d is not installed.
+    Raises `MissingExtraError` where build123d is not installed.
     """
     require("build123d", extra="cad", purpose="to_build123d")
     from build123d import Compound, Solid
@@ -40,10 +36,7 @@ def to_build123d(result: EncodedSolid) -> Any:
 def to_cadquery(result: EncodedSolid) -> Any:
     """Return a `cadquery.Assembly` with one named child for each part.
 
-    Raises
-    ------
-    MissingExtraError
-        cadquery is not installed.
+    Raises `MissingExtraError` where cadquery is not installed.
     """
     require("cadquery", extra="cad", purpose="to_cadquery")
     from cadquery import Assembly, Solid

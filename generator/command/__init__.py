@@ -2,16 +2,15 @@
 
 ::
 
-    __init__.py        which command is meant
     encode.py          encode-object SPEC.yaml...
     tools.py           encode-object init | schema | printers
     objects.py         encode-object lab | list | show | retire | export | import
     made_report.py     what was made, as text and as JSON
     object_report.py   what is registered and how full the lab is, as text and as JSON
+    printed_report.py  what becomes of symbols on a printer
 
-Results go to stdout, progress and messages to stderr (`encoded_objects.base.output`). Exit codes:
-0 done, 1 could not be written, 2 bad input, 4 database, 130 interrupted. Nothing heavy is
-imported before it is needed: `encode-object --help` loads no array, no geometry, no database.
+Exit codes: 0 done, 1 could not be written, 2 bad input, 4 database, 130 interrupted. Nothing heavy
+is imported before it is needed: `--help` loads no array, no geometry, no database.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from typing import TYPE_CHECKING, NoReturn
 from encoded_objects.base import console
 
 if TYPE_CHECKING:
-    from typer import Typer
+    from encoded_objects.base.options import Application
 
 NAME = "encode-object"
 TOOLS = ("init", "schema", "printers")
@@ -39,7 +38,7 @@ def run(arguments: list[str]) -> int:
     return console.run(NAME, _application, arguments)
 
 
-def _application(arguments: list[str]) -> Typer:
+def _application(arguments: list[str]) -> Application:
     """Return the command that is meant; a spec file needs no command's name."""
     if arguments[:1] and arguments[0] in TOOLS:
         from generator.command.tools import app

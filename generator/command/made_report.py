@@ -1,7 +1,4 @@
-"""What `encode-object` says of the objects that it made, as text and as JSON.
-
-The last line says what a person does next with what was really made.
-"""
+"""Report of the objects that `encode-object` made, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -71,7 +68,6 @@ def _group_text(alike: Sequence[MadeObject], dry_run: bool) -> str:
 
 
 def _object_text(made: MadeObject, dry_run: bool) -> str:
-    """Return a few lines on one object."""
     verb = "made"
     if dry_run:
         verb = "would be made"
@@ -120,7 +116,6 @@ def _face_lines(reports: Sequence[FaceReport]) -> list[str]:
 
 
 def _enumeration(names: Sequence[str]) -> str:
-    """Return names with commas, of many the first and the number of the others."""
     return ", ".join(names) if len(names) <= 6 else f"{names[0]} and {len(names) - 1} like it"
 
 
@@ -161,11 +156,7 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
         ],
         "set_files": [str(file) for file in result.set_files],
         "database": without_password(result.database),
-        "array": {
-            "rows": result.rows,
-            "columns": result.columns,
-            "used_cells": result.used_cells,
-        },
+        "array": {"rows": result.rows, "columns": result.columns, "used_cells": result.used_cells},
         "dry_run": dry_run,
         "seconds": round(result.seconds, 3),
     }
@@ -274,7 +265,6 @@ def _of_set(result: Encoded) -> str:
 
 
 def _of_object(made: MadeObject) -> list[str]:
-    """Return the steps for one object alone."""
     sheet = next((file for file in made.files if file.name.endswith("-build.html")), None)
     steps = [f"open {sheet}"] if sheet else []
     printable = [f for suffix in (".3mf", ".stl") for f in made.files if f.suffix == suffix]

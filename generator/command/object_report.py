@@ -212,7 +212,6 @@ def _faces(held: RegisteredObject, sensor: SensorType) -> list[_Face]:
 
 
 def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
-    """Return one line of the list as plain values."""
     return {
         "name": entry.name,
         "shape": entry.object_type,
@@ -231,7 +230,6 @@ def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
 def _object_values(
     held: RegisteredObject, faces: Sequence[_Face], files: Sequence[PartState]
 ) -> dict[str, Any]:
-    """Return all about an object as plain values; `faces` are the faces, not their number."""
     entry = held.entry
     return _entry_values(entry) | {
         "faces": [_face_values(face) for face in faces],
@@ -270,10 +268,7 @@ def _face_values(face: _Face) -> dict[str, Any]:
         "places": on.places,
         "promise": None
         if face.promise is None
-        else {
-            "at_once": face.promise.at_once,
-            "within_three": face.promise.within_three,
-        },
+        else {"at_once": face.promise.at_once, "within_three": face.promise.within_three},
         "placement": None
         if place is None
         else {

@@ -89,7 +89,6 @@ def printers(as_json: Json = False) -> int:
 
 
 def _printer_values(printer: Printer) -> dict[str, Any]:
-    """Return a printer's limits as plain values; angles in degrees."""
     from dataclasses import asdict
 
     values = asdict(printer)

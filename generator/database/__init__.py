@@ -16,10 +16,7 @@
     exchange      export to a file, import from one
     as_built      how prints came out, as touches measured it
     part_file     files of parts: whether they are there and unchanged, their triangles
-    round_face    where a plane stands that touches a registered round face
-
-Reading sees of `generator` this package, the array and the alphabet alone: what it needs to
-know of a shape it has from `registered`.
+    round_face    the plane that touches a registered round face
 """
 
 from generator.errors import DatabaseError

@@ -1,8 +1,7 @@
-"""How prints came out, as touches measured it: kept with the object, or with printer and material.
+"""Deviations of prints, as touches measured them: of an object, or of a printer and a material.
 
-A part of an object, an object, or all that a printer makes of a material -> scale, skew and
-stroke with their covariance. What is kept of an object goes when the object is replaced or
-removed.
+Scale, skew and stroke with their covariance. What is kept of an object goes when the object is
+replaced or removed.
 """
 
 from __future__ import annotations
@@ -36,15 +35,7 @@ class AsBuilt:
 
 
 def write_as_built(connection: Connection, measured: AsBuilt) -> None:
-    """Keep a measurement in the place of an earlier one.
-
-    That is the one of the same object and part, whatever it was said to be printed of, or, of
-    printers, the one of the same printer and material.
-
-    Parameters
-    ----------
-    connection
-        Of a `write_transaction`.
+    """Keep a measurement in place of one of the same object and part, or printer and material.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Cells of an array: which are taken, and which object and face hold them.
 
-`cells` is the truth. `occupancy` holds the same as bits, one row a tile of 64 x 64 cells
-(`generator.layout.occupancy`), so that placing the next object reads 300 rows where a million
-cells are taken. Whoever writes cells writes these bits in the same transaction.
+`cells` is the truth. `occupancy` holds it as bits, one row a tile of 64 x 64 cells
+(`generator.layout.occupancy`): placing the next object reads 300 rows where a million cells are
+taken. Whoever writes cells writes these bits in the same transaction.
 """
 
 from __future__ import annotations
@@ -27,8 +27,7 @@ _CHUNK = 64  #: cells looked up in one statement
 def array_key(array: SymbolArray) -> str:
     """Return the digest by which the database knows an array.
 
-    The window is left out, and where placing begins: they change no symbol, so objects
-    registered with others stand on the same cells.
+    The window is left out, and where placing begins: they change no symbol.
     """
     kept = {name: v for name, v in array.definition().items() if name not in ("window", "first")}
     return digest(canonical(kept))
@@ -50,10 +49,7 @@ def occupancy(connection: Connection, array: SymbolArray) -> Occupancy:
 
 
 def occupied_cells(connection: Connection, array_id: int | None) -> Cells:
-    """Return the cells of an array that objects hold: rows (n,) and columns (n,), sorted.
-
-    An array that the database does not know yet, None, has no cells taken.
-    """
+    """Return the taken cells of an array, sorted: rows (n,) and columns (n,); none for None."""
     return cells_of_tiles({} if array_id is None else taken_tiles(connection, array_id))
 
 
@@ -70,10 +66,7 @@ def cells_of(connection: Connection, object_id: int, array_id: int) -> Cells:
 
 
 def held_cells(connection: Connection, array_id: int) -> NDArray[np.int64]:
-    """Return every registered cell of an array, (n, 5): row, column, object, face, label.
-
-    Sorted by row and column.
-    """
+    """Return every registered cell of an array, sorted (n, 5): row, column, object, face, label."""
     cells = tables.cells.c
     rows = connection.execute(
         select(cells.row, cells.column, cells.object_id, cells.face_id, cells.label)
@@ -86,16 +79,9 @@ def held_cells(connection: Connection, array_id: int) -> NDArray[np.int64]:
 def faces_at(
     connection: Connection, array_id: int, rows: ArrayLike, columns: ArrayLike
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return which object and which face hold each cell; -1 where nothing is registered.
+    """Return object numbers (n,) and face numbers (n,) of cells; -1 where nothing is registered.
 
-    Parameters
-    ----------
-    rows, columns
-        Cells on the torus, 0 <= row < rows; broadcast together to (n,).
-
-    Returns
-    -------
-    Object numbers (n,) and face numbers (n,).
+    `rows` and `columns` (0 <= row < rows) are broadcast together to (n,).
     """
     r, c = np.broadcast_arrays(np.atleast_1d(rows), np.atleast_1d(columns))
     asked = list(zip(r.tolist(), c.tolist(), strict=True))
@@ -110,9 +96,7 @@ def faces_at(
         # together, and each is one step in the primary key, unlike a search for pairs.
         for row, column, object_id, face_id in connection.execute(
             select(cells.row, cells.column, cells.object_id, cells.face_id).where(
-                cells.array_id == array_id,
-                cells.row.in_(near_rows),
-                cells.column.in_(near_columns),
+                cells.array_id == array_id, cells.row.in_(near_rows), cells.column.in_(near_columns)
             )
         ):
             held[row, column] = (object_id, face_id)
@@ -177,7 +161,6 @@ def _write(connection: Connection, array_id: int, cells: Cells, *, taken: bool) 
 
 
 def _read_tiles(connection: Connection, array_id: int, wanted: Iterable[tuple[int, int]]) -> Tiles:
-    """Return the tiles among `wanted` that the database has."""
     occupancy = tables.occupancy.c
     columns_of: dict[int, set[int]] = defaultdict(set)
     for row, column in wanted:

@@ -1,13 +1,9 @@
 """Export objects into a file of their own, and import them in another lab.
 
-An exported file is a database like any other (SQLite), whatever engine it comes from: every
-command reads it. Importing works on a copy, so that a file is never changed, whichever
-schema version it has, and brings in all objects or none. Files of parts are not carried:
-they are named from where they lie, and made again from the same spec on the same cells.
-
-Labs have arrays of their own (`lab.py`), so that what one imports of another stands beside its
-own objects, on the arrays that it came on. Labs of schema version 1 and 2 have none: two of them
-hold the same cells, and what one imports of the other is refused.
+An exported file is a SQLite database that every command reads. Importing works on a copy, so that
+a file is never changed, whichever schema version it has, and brings in all objects or none. Files
+of parts are not carried: they are named from where they lie. What a lab imports stands on the
+arrays that it came on; labs of schema version 1 and 2 hold the same cells, and refuse each other's.
 """
 
 from __future__ import annotations
@@ -37,19 +33,13 @@ from generator.errors import DatabaseError
 def export_objects(
     url: str, file: Path, *, names: Sequence[str] = (), force: bool = False
 ) -> CopyReport:
-    """Write objects of a database into a new database file, whole or not at all.
-
-    Parameters
-    ----------
-    names
-        Which objects; empty for all.
-    force
-        Replace a file that is there.
+    """Write objects of a database into a new database file, whole or not at all; () for all.
 
     Raises
     ------
     DatabaseError
-        No object has a name asked for, the file is there already or cannot be written.
+        No object has a name asked for, the file is there already (without `force`) or cannot be
+        written.
     """
     engine = open_database(url, writable=False)
     file = file.absolute()

@@ -6,9 +6,9 @@ on keeps its array, whatever a later version would make of the same key. Arrays 
 imported objects are other labs': nothing new is placed on them.
 
 An array is full where it has no free blocks for whole faces any more; a larger one is then
-taken. A touch is not enough where so many places are registered that a surface of no object
-shows what one of them shows. Of k symbols out of q it shows a given place's with probability
-q^-k, whatever the size of the array: a larger array is no help there, a finer pitch is.
+taken. Of k symbols out of q a foreign surface shows a given place's with probability q^-k,
+whatever the size of the array: where too many places are registered for one touch, a finer pitch
+helps, a larger array does not.
 """
 
 from __future__ import annotations
@@ -37,13 +37,7 @@ def lab_key(connection: Connection) -> str:
 
 
 def require_lab_key(connection: Connection, wanted: str) -> None:
-    """Refuse a key that is not the database's.
-
-    Raises
-    ------
-    LabKeyError
-        The database has another key, or none.
-    """
+    """Refuse a key that is not the database's; raises `LabKeyError`."""
     key = lab_key(connection)
     if read_lab_key(wanted) != key:
         has = f"has the lab key {key}" if key else "was made before there were lab keys"
@@ -127,7 +121,7 @@ class ArrayUse:
 
 @dataclass(frozen=True, slots=True)
 class Fullness:
-    """What a database says of its arrays."""
+    """The arrays of a database and their use."""
 
     lab_key: str  #: empty where the arrays are the published ones
     arrays: tuple[ArrayUse, ...]

@@ -1,9 +1,8 @@
 """Bring a database of an earlier schema version to this one: whole, or not at all.
 
-A new version is `migrations/vN.py`. The version is `meta.schema_version`, and all versions in
-between are one transaction, so that a killed migration leaves the database as it was. A SQLite
-file is copied first (`lab.v1.db` beside `lab.db`); of a server's database the copies are its
-administrator's.
+A new version is `migrations/vN.py`; all versions in between are one transaction, so that a killed
+migration leaves the database as it was. A SQLite file is copied first (`lab.v1.db` beside
+`lab.db`); of a server's database the copies are its administrator's.
 """
 
 from __future__ import annotations
@@ -27,16 +26,9 @@ _log = logging.getLogger(__name__)  # without settings of its own, warnings go t
 
 
 def migrate(engine: Engine, version_of: Callable[[Connection], int | None], *, keep: bool) -> None:
-    """Bring a database to `SCHEMA_VERSION`, and say so.
+    """Bring a writable database to `SCHEMA_VERSION`, and say so; `keep` copies a SQLite file first.
 
-    Parameters
-    ----------
-    engine
-        Writable.
-    version_of
-        Reads the schema's version; asked anew when it is our turn to write.
-    keep
-        Copy a SQLite file before it is changed.
+    `version_of` reads the schema's version, again when it is our turn to write.
 
     Raises
     ------

@@ -1,7 +1,6 @@
 """Open the database, make its schema when it is new and bring it up to date when it is old.
 
-A URL or a file name -> Engine. Another program's database is left alone, a newer schema is
-refused, an older one is brought to today's.
+Another program's database is left alone, a newer schema is refused.
 """
 
 from __future__ import annotations
@@ -45,8 +44,6 @@ from generator.errors import DatabaseError
 def normal_url(url: str) -> URL:
     """Return the URL of a file name, `sqlite:///file` or `postgresql://...`; checks no more.
 
-    Examples
-    --------
     >>> normal_url("postgresql://lab@host/objects").drivername
     'postgresql+psycopg'
     """
@@ -84,12 +81,8 @@ def normal_url(url: str) -> URL:
 def without_password(url: str) -> str:
     """Return a database's address as it may be shown.
 
-    Examples
-    --------
     >>> without_password("postgresql://lab:secret@host/objects")
     'postgresql://lab:***@host/objects'
-    >>> without_password("sqlite:///lab.db")
-    'sqlite:///lab.db'
     """
     return make_url(url).render_as_string(hide_password=True)
 
@@ -97,7 +90,7 @@ def without_password(url: str) -> str:
 def part_file(url: URL, file: str) -> str:
     """Return how a database names a part's file: from its own folder, absolute on a server.
 
-    A folder that holds a SQLite database and its parts can so be moved and copied.
+    A folder that holds a SQLite database and its parts can be moved and copied.
     """
     path = Path(file).absolute()
     if url.get_backend_name() != "sqlite":
@@ -106,7 +99,7 @@ def part_file(url: URL, file: str) -> str:
 
 
 def part_path(url: URL, file: str) -> Path:
-    """Return where a part's file is, from how the database names it: `part_file` undone."""
+    """Return the path of a part's file from its name in the database; undoes `part_file`."""
     if url.get_backend_name() != "sqlite":
         return Path(file)
     return Path(os.path.normpath(Path(url.database or "").absolute().parent / file))
@@ -122,13 +115,7 @@ _POSTGRESQL = {
 
 
 def database_engine(url: URL, writable: bool, wait_s: float) -> Engine:
-    """Return an engine on a database of either kind.
-
-    Raises
-    ------
-    DatabaseError
-        A place that does not exist or may not be written, or a driver that is missing.
-    """
+    """Return an engine on a database of either kind, or raise `DatabaseError`."""
     if url.get_backend_name() != "sqlite":
         return _postgresql_engine(url, writable, wait_s)
     path = Path(url.database or "").absolute()
@@ -206,9 +193,7 @@ def open_database(
     keep_older: bool = True,
     lab_key: str = "",
 ) -> Engine:
-    """Return an engine on a database with the schema of this tool.
-
-    A database of an earlier version is brought to this one (`migrate.py`), also for a reader.
+    """Return an engine on a database with the schema of this tool; an older one is brought to it.
 
     Parameters
     ----------
@@ -258,13 +243,7 @@ def existing_database(url: str) -> Engine:
 
 
 def database_exists(url: str) -> bool:
-    """Whether there is a database whose objects can be read; makes and changes nothing.
-
-    Raises
-    ------
-    DatabaseError
-        As `open_database`: what is there is no database, or its folder does not exist.
-    """
+    """Whether there is a database whose objects can be read; raises as `open_database`."""
     normal = normal_url(url)
     if not _file_is_there(normal):
         return False

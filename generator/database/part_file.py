@@ -50,16 +50,7 @@ LARGEST_BYTES = 84 + 50 * MOST_PART_TRIANGLES
 
 
 def part_triangles(file: str | os.PathLike[str]) -> NDArray[np.float64]:
-    """Return the triangles of a written part.
-
-    Parameters
-    ----------
-    file
-        STL, binary or ASCII.
-
-    Returns
-    -------
-    (n, 3, 3) corners, mm, frame of the part; exactly the numbers of the file.
+    """Return the triangles (n, 3, 3) of a written part (STL), mm, frame of the part; exact.
 
     Raises
     ------

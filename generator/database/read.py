@@ -1,7 +1,7 @@
 """Read objects and cells back, exactly as they were registered. Thesis 6.3.
 
 Every function takes a connection, so that several of them see one state of the
-database: `with read_transaction(engine) as connection: ...` (`generator.database.transaction`).
+database: `with read_transaction(engine) as connection: ...`.
 """
 
 from __future__ import annotations
@@ -47,10 +47,8 @@ def object_names(connection: Connection) -> tuple[str, ...]:
 
 
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
-    """Return what sorts names as people count: Block-2 before Block-10.
+    """Return a key that sorts names as people count.
 
-    Examples
-    --------
     >>> sorted(["B-10", "B-2", "A"], key=natural_key)
     ['A', 'B-2', 'B-10']
     """
@@ -129,7 +127,7 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
     Raises
     ------
     DatabaseError
-        When no object has this name; the fix lists names that are known.
+        No object has this name; the fix lists names that are known.
     """
     entry = object_entry(connection, name)
     polyhedron = _read_polyhedron(connection, entry)
@@ -161,7 +159,7 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
 
 
 def surfaces_of(spec: Any) -> tuple[Developable, ...]:
-    """Return the round faces of an object from the plain values it was registered with."""
+    """Return the round faces of an object from its registered spec."""
     known = spec.get("surfaces", ()) if isinstance(spec, dict) else ()
     return tuple(developable_from(one) for one in known)
 
@@ -221,7 +219,7 @@ def _layout_of(connection: Connection, entry: ObjectEntry) -> Layout:
 
 
 def read_styles(connection: Connection) -> tuple[RegisteredStyle, ...]:
-    """Return on which array and in which style every object is embossed, by its number."""
+    """Return array and style of every object, by its number."""
     objects = tables.objects.c
     query = (
         select(
@@ -280,7 +278,6 @@ def read_parts(connection: Connection, object_id: int) -> tuple[RegisteredPart, 
 
 
 def _rows_of_object(table: Table, entry: ObjectEntry, *order: str) -> Select[Any]:
-    """Return the query for an object's rows of a table, in a stated order."""
     return (
         select(table)
         .where(table.c.object_id == literal(entry.object_id))

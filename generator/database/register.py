@@ -2,14 +2,13 @@
 
 ::
 
-    with write_transaction(engine) as connection:                 # nobody else writes from here on
+    with write_transaction(engine) as connection:           # nobody else writes from here on
         known = find_object(connection, name)
-        layout = lay_out(..., occupancy(connection, array))  # beside what is taken
+        layout = lay_out(..., occupancy(connection, array))
         register(connection, ObjectRecord(...))
-                                                        # committed here, undone on any error
+                                                            # committed, or undone on any error
 
-Polyhedron + Layout + array + alphabet -> rows of every table of `tables`. The primary
-key of `cells` is the last defence of the promise that no cell is used twice.
+The primary key of `cells` is the last defence of the promise that no cell is used twice.
 """
 
 from __future__ import annotations
@@ -61,21 +60,15 @@ class ObjectRecord:
 def register(connection: Connection, registration: ObjectRecord, *, replace: bool = False) -> int:
     """Insert an object with its faces, edges, cells and parts; return its number.
 
-    The same spec under a registered name changes nothing but its parts; pass the layout
-    that `read_layout` returns.
-
-    Parameters
-    ----------
-    connection
-        Of a `writing` transaction.
-    replace
-        Remove what the name held before, and free its cells; the number stays.
+    The same spec under a registered name changes nothing but its parts; pass the layout that
+    `read_layout` returns. `replace` removes what the name held before, and frees its cells; the
+    number stays. `connection` is that of a `write_transaction`.
 
     Raises
     ------
     DatabaseError
-        When another spec is registered under this name (without `replace`), another
-        object holds a cell, or the array is beyond what a database can count.
+        Another spec is registered under this name (without `replace`), another object holds a
+        cell, or the array is beyond what a database can count.
     """
     _check(registration)
     known = find_object(connection, registration.name)
@@ -145,9 +138,7 @@ def record_parts(connection: Connection, object_id: int, written: Sequence[Regis
     for part in written:
         connection.execute(
             delete(tables.parts).where(
-                parts.object_id == object_id,
-                parts.name == part.name,
-                parts.format == part.format,
+                parts.object_id == object_id, parts.name == part.name, parts.format == part.format
             )
         )
     last = connection.execute(
@@ -291,10 +282,7 @@ def _insert_object(
 def retire(connection: Connection, name: str) -> ObjectEntry:
     """Mark an object as retired; one that is retired keeps its date. Returns its entry now.
 
-    Raises
-    ------
-    DatabaseError
-        When no object has this name; the fix lists names that are known.
+    Raises `DatabaseError` for an unknown name; the fix lists those that are known.
     """
     if not object_entry(connection, name).retired_utc:
         _mark(connection, name, datetime.now(UTC).isoformat(timespec="seconds"))

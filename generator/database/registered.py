@@ -1,7 +1,7 @@
-"""What the database holds of an object, as values. Thesis 6.3.
+"""What the database holds of an object, as values; mm, radians. Thesis 6.3.
 
-Lengths in mm, angles in radians. A face's frame has its origin at the face's first
-vertex, x along its first edge, z outward; `T_object_face` takes it to the object frame.
+A face's frame has its origin at the face's first vertex, x along its first edge, z outward;
+`T_object_face` takes it to the object frame.
 """
 
 from __future__ import annotations
@@ -21,13 +21,10 @@ from generator.polyhedron.winged import Developable, Polyhedron
 
 
 def canonical(value: Any) -> str:
-    """Return the JSON text of `value` with sorted keys, no blanks, and no NaN.
+    """Return the JSON text of `value` with sorted keys, no blanks; floats read back bit for bit.
 
-    Floats are written so that they read back bit for bit. Raises `TypeError` on what
-    JSON does not know and `ValueError` on NaN and infinity.
+    Raises `TypeError` on what JSON does not know and `ValueError` on NaN and infinity.
 
-    Examples
-    --------
     >>> canonical({"b": [1, 0.1], "a": "é"})
     '{"a":"é","b":[1,0.1]}'
     """

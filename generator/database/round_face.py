@@ -1,13 +1,9 @@
-"""Where a plane stands that touches a round face: place in the unrolled plane -> pose, and bend.
+"""The plane that touches a round face: place in the unrolled plane -> pose, and curvature.
 
 A flat plate on a cylinder or cone touches it along one straight line. `RoundFace.tangent(x, y)`
-is the unrolled plane rolled about the round face until it touches along the line through (x, y):
-there plane and object meet, and a small step in the plane is the same step on the object.
+is the unrolled plane rolled about the round face until it touches along the line through (x, y).
 Between the middles of facets the plane turns evenly, as it does on the round face for which the
 facets stand. Lengths in mm, angles in rad; plane and heights as in `development`.
-
-How the face falls away from that plane is its `Bend`: along `towards` it is straight, across it
-round. A cylinder's radius is the same all along; a cone's grows with the distance from its tip.
 """
 
 from __future__ import annotations
@@ -28,7 +24,7 @@ SHARPEST_MM = 1e-3  #: radius that the tip of a cone is given
 
 @dataclass(frozen=True, slots=True)
 class Bend:
-    """A round face as a plate sees it that touches it at one point."""
+    """Curvature of a round face as a plate sees it that touches it at one point."""
 
     radius_mm: float  #: of curvature, across the straight line through the point
     towards_rad: float  #: direction of that line in the plane, away from the tip of a cone
@@ -56,14 +52,10 @@ class Bend:
         return np.asarray(square / (radius + root))
 
     def unrolled_mm(self, points_mm: Array, height_mm: float = 0.0) -> Array:
-        """Return the places (n, 2) of the unrolled face under points (n, 2) about the point.
+        """Return the places (n, 2) of the unrolled face under points (n, 2) of the touching plane.
 
-        Parameters
-        ----------
-        points_mm
-            Of the plane that touches what stands `height_mm` over the face.
-        height_mm
-            What is met there is taken down to the face along the face's normal.
+        The plane touches what stands `height_mm` over the face; a place is taken down to the
+        face along the face's normal.
         """
         top = self.raised(height_mm)
         along, across = self._along_across(points_mm)

@@ -24,8 +24,7 @@ Rows = list[Row]
 def insert_rows(connection: Connection, table: Table, rows: Rows) -> None:
     """Insert rows of one table, all of which name the same columns; none is well, too.
 
-    A server gets one statement with an array per column: a message per row costs it twice
-    the time, and its driver complains aloud when one of them is refused.
+    A server gets one statement with an array per column: a message per row costs twice the time.
     """
     if not rows:
         return
@@ -46,15 +45,8 @@ _EQUAL = 1e-6  #: lengths that differ by less than this share are equal; angles,
 
 
 def face_type(polygon: Sequence[NDArray[np.float64]]) -> str:
-    """Return triangle, square, rectangle, quadrilateral or polygon.
+    """Return triangle, square, rectangle, quadrilateral or polygon of loops (k, 2), mm.
 
-    Parameters
-    ----------
-    polygon
-        Loops (k, 2), mm, the outer one first; a face with holes is a polygon.
-
-    Examples
-    --------
     >>> face_type([np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])])
     'rectangle'
     """

@@ -4,16 +4,8 @@ Writers take turns from their first statement (SQLite: BEGIN IMMEDIATE, PostgreS
 advisory lock for the transaction), so that the occupied cells a writer reads stay what
 they are until it commits. Nobody waits longer than the engine's `wait_s`. What is left to
 conflict: a layout made before the turn came, a writer that takes no turns, a deadlock on the
-server. The work is then undone and repeated on the state that the other writer left::
-
-    def placed_and_registered(connection: Connection) -> int:
-        taken = occupancy(connection, array)
-        return register(connection, ObjectRecord(..., layout=lay_out(..., taken)))
-
-    number = retry_on_conflict(engine, placed_and_registered)
-
-A connection that was not made has no error code: the words of libpq and of the server say why;
-a server that speaks another language than English is quoted as it is.
+server. The work is then undone and repeated on the state that the other writer left
+(`retry_on_conflict`).
 """
 
 from __future__ import annotations
@@ -46,8 +38,8 @@ def write_transaction(engine: Engine) -> Iterator[Connection]:
     Raises
     ------
     DatabaseError
-        When other writers keep the database for too long, the place is read-only or
-        full, or the database refuses a row (a cell that another object holds).
+        Other writers keep the database for too long, the place is read-only or full, or the
+        database refuses a row (a cell that another object holds).
     """
     try:
         with engine.connect() as connection:
@@ -136,11 +128,7 @@ _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
         "other programs keep the database locked",
         "wait until they have ended, then run the same command again",
     ),
-    (
-        ("SQLITE_NOTADB",),
-        "this file is not a database",
-        "name another file, or move this one away",
-    ),
+    (("SQLITE_NOTADB",), "this file is not a database", "name another file, or move this one away"),
     (
         ("SQLITE_CORRUPT",),
         "the database file is damaged",
@@ -179,21 +167,13 @@ def retry_on_conflict(
 ) -> Result:
     """Return what `work` returns; its transaction is committed then.
 
-    Parameters
-    ----------
-    work
-        Called with the connection of a `write_transaction`; again after each conflict, so that
-        it must read the database itself and leave nothing behind that is not undone.
-    tries
-        How often in all.
-    rng
-        Lengths of the pauses; left out, the process number is the seed, so that two losers
-        do not meet again.
+    `work` gets the connection of a `write_transaction`, again after each conflict: it must read the
+    database itself and leave nothing behind that is not undone.
 
     Raises
     ------
     WriteConflictError
-        The last of `tries` met a conflict, too.
+        The last of `TRIES` met a conflict, too.
     DatabaseError
         As `write_transaction`.
     """
@@ -209,14 +189,10 @@ def retry_on_conflict(
 
 
 def connection_error(said: str, url: URL, place: str) -> DatabaseError:
-    """Return the error for a connection that was not made.
+    """Return the error for a connection that was not made, from all that the driver says.
 
-    Parameters
-    ----------
-    said
-        All that the driver says, one line per address that was tried.
-    url, place
-        The database, and how messages name it.
+    It has no error code: the words of libpq and of the server say why; a server that speaks another
+    language than English is quoted as it is.
     """
     server = f"{url.host or 'this computer'}{f':{url.port}' if url.port else ''}"
     for phrases, cause, fix in _CONNECTION_MEANINGS:

@@ -228,10 +228,8 @@ def copy_objects(
 
     Parameters
     ----------
-    source
-        Of a `reading` transaction.
-    target
-        Of a `writing` transaction.
+    source, target
+        Of a read and a write transaction.
     names
         Which objects; empty for all.
     renamed
@@ -324,7 +322,6 @@ def _copy_object(
 
 
 def _refusal(refused: Sequence[RefusedCopy], place: str) -> DatabaseError:
-    """Return the error that names every object that is refused."""
     causes = "; ".join(f"'{each.name}' {each.cause}" for each in refused)
     fixes = "; ".join(dict.fromkeys(each.fix for each in refused))
     return DatabaseError(f"nothing was imported: {causes}", fix=fixes, place=place)

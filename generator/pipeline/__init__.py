@@ -2,12 +2,12 @@
 
 ::
 
-    choose.py   the array, for profile auto
-    plan.py     what the stages need of one spec
+    choose.py   the lab's array of a run, for profile auto the smallest with room
+    plan.py     spec -> polyhedron, array, outlines, clearances
     place.py    cells for it: those it has, or free ones
-    round.py    cylinder and cone faces: unrolled, printed whole
     faces.py    what each face shows
     files.py    layout -> parts -> staged files
+    sheet.py    the build sheet of one object
     make.py     one object, one transaction
     sets.py     several objects, in parallel; what was made before is skipped
     plates.py   the set on the printer's bed: plates, overview, packing list

@@ -1,12 +1,10 @@
 """The lab that objects are made in, and the array of a run.
 
-The array is the lab's own of the profile, and for `auto` the one that the objects need. Of arrays
-with the same symbols the smallest is taken in which the objects fit together with what the
-database holds, an empty one with room for more of them: `large`, and its next sizes. Objects that
-are registered keep the array they are on and their pitch, and a lab goes on with the arrays that
-it has: what it made objects on under a profile's name is what that profile means. The finer
-symbols are taken where the printer makes them and they show places on faces that would
-stay blank. Objects that came from another lab, asked for again, keep that lab's array.
+The array is the lab's own of the profile. `auto` takes the smallest array of its symbols in which
+the objects fit together with what the database holds, an empty one with room for more: `large`, and
+its next sizes. Registered objects keep their array and pitch, those that came from another lab keep
+that lab's array, and a lab goes on with the arrays that it has. Finer symbols are taken where the
+printer makes them and they show places on faces that would stay blank.
 """
 
 from __future__ import annotations
@@ -103,7 +101,7 @@ def choose_array(
     lab
         Whose arrays they are.
     connection
-        Of a `reading` transaction; None where there is no database yet.
+        Of a read transaction; None where there is no database yet.
     solid
         Shape of the one object, where it does not come from its spec.
     replace_changed
@@ -160,7 +158,6 @@ def choose_array(
 
 
 def _larger_note(chosen: Profile, array: SymbolArray, why: str) -> str:
-    """Return the note that a larger array was taken than the smallest one."""
     rows, columns = array.window
     of_smallest = "x".join(map(str, PROFILES[SMALLEST].window))
     window = f"window {rows}x{columns} in place of {of_smallest}"
@@ -188,7 +185,6 @@ def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> A
 
 
 def _candidates() -> Iterator[Profile]:
-    """Yield the arrays from the smallest on."""
     larger = PROFILES[SMALLEST]
     yield larger
     for _ in range(LARGER):
@@ -220,7 +216,7 @@ def _array_of_another_lab(
 def _registered_pitches(
     specs: Sequence[ObjectSpec], connection: Connection | None
 ) -> dict[str, float]:
-    """Return the pitch of each object that is registered already, mm."""
+    """Return the pitch (mm) of each object that is registered already."""
     if connection is None:
         return {}
     entries = (find_object(connection, one.name) for one in specs)
@@ -247,7 +243,6 @@ def _of_candidate(profile: str) -> bool:
 
 
 def _share_mm(share: float, spec: ObjectSpec) -> float:
-    """Return a share of the pitch that the sensor of an object proposes, mm."""
     return round(share * spec.sensor.symbol_pitch_mm, 2)
 
 
@@ -292,10 +287,7 @@ def _blank(plans: Sequence[ObjectPlan], layouts: Sequence[Layout]) -> int:
 
 
 def _room(array: SymbolArray, connection: Connection | None) -> int:
-    """Return how many more cells of an array objects may have, faces of all shapes.
-
-    The first ones leave room for more.
-    """
+    """Return how many more cells objects may take of an array; the first ones leave room."""
     taken = 0 if connection is None else occupancy(connection, array).used
     room = max(0, int(MOST_FILLED * array.rows * array.columns) - taken)
     return room if taken else int(FIRST * room)

@@ -1,10 +1,9 @@
-"""Spec -> array -> layout -> solid -> files + database: the whole of making objects.
+"""Make objects: one run from specs to files and database.
 
-One object is one transaction: its place on the array is chosen, its files are staged, its
-rows are committed, and then its files appear. Whatever interrupts the run, the database
-holds the object whole or not at all, and no file stands under its final name that the
-database does not know. The next run of the same spec finishes what was interrupted: it
-finds the cells in the database and makes the same bytes again.
+One object is one transaction: its place on the array is chosen, its files are staged, its rows are
+committed, and then its files appear. Whatever interrupts the run, the database holds the object
+whole or not at all, and no file stands under its final name that the database does not know. The
+next run finds the cells in the database and makes the same bytes again.
 """
 
 from __future__ import annotations
@@ -26,12 +25,7 @@ from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
 from generator.pipeline.made import Encoded, MadeObject, describe_object
 from generator.pipeline.make import MakeJob, make_under_lock
-from generator.pipeline.place import (
-    PlacedObject,
-    occupancy_of,
-    occupancy_with,
-    place_object,
-)
+from generator.pipeline.place import PlacedObject, occupancy_of, occupancy_with, place_object
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.polyhedron import Polyhedron
@@ -60,10 +54,8 @@ def encode(
         From `generator.spec.read_specs`; one or more, all on one array.
     folder
         For the files, in place of the specs' own; several objects get a folder each in it.
-    formats
-        In place of the specs' own: step, stl, 3mf, glb, stpz, mjcf, urdf, sdf, usd.
-    database
-        URL in place of the specs' own.
+    formats, database
+        In place of the specs' own: names of `EXPORTERS`, a URL.
     lab_key
         Of a new database, in place of the specs' own; drawn where neither says one.
     dry_run
@@ -77,13 +69,6 @@ def encode(
         Allow a changed spec under a registered name; its old cells become free.
     jobs
         Processes that make the objects of a set; left out, one for each processor.
-    progress
-        Called with what is being done and the share of the run that is done.
-
-    Returns
-    -------
-    Encoded
-        Of several objects also the files of the set: plates, overview and packing list.
 
     Raises
     ------
@@ -137,15 +122,9 @@ def plan_in_lab(
 ) -> tuple[Engine | None, tuple[ObjectPlan, ...], PlacedObject | None]:
     """Return a lab's database, the plans of objects on its array, and a dry build of one object.
 
-    Parameters
-    ----------
-    lab_key
-        See `encode`.
-    make
-        Make the database if it is new, where the first object can be made. A key that was drawn
-        for it gives way to that of another program which made it meanwhile.
-    replace_changed, solid
-        See `choose_array`.
+    `make` makes the database if it is new and the first object can be made; a key drawn for it
+    gives way to that of another program which made it meanwhile. For the others see `encode` and
+    `choose_array`.
     """
     while True:
         engine = open_if_there(url, writable=make)

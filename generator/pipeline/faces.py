@@ -1,8 +1,7 @@
 """What each face of an object shows, its expected recognition rate, and what would raise that.
 
-Plan + layout -> a report on every face that symbols can stand on. A remedy has been tried: the
-face is laid out again, wider or at another pitch, and its rate is computed again. Round faces have
-no rate, since none was measured.
+A remedy has been tried: the face is laid out again, wider or at another pitch, and its rate is
+computed again. Round faces have no rate, since none was measured.
 """
 
 from __future__ import annotations
@@ -58,12 +57,7 @@ def face_reports(
 ) -> tuple[FaceReport, ...]:
     """Return a report on every face that symbols can stand on.
 
-    Parameters
-    ----------
-    plan, layout
-        An object and its symbols.
-    smallest
-        Say also how small each face could be, for which its layout is searched many times.
+    `smallest` says also how small each face could be, for which its layout is searched many times.
     """
     rates = _rates(plan, layout)
     request = LatticeRequest(

@@ -1,10 +1,9 @@
 """Parts -> files: everything that belongs to one object, staged to appear together.
 
 `NAME-F1.step`, `NAME-F1.stl`, ... one per part in its local origin; `NAME.step`, the panels as an
-assembly (`.stpz`: the same, gzipped); `NAME.3mf` and
-`NAME-prusaslicer.3mf` for each plate of the printer; `NAME.glb` assembled; `NAME.xml`,
-`NAME.urdf`, `NAME.sdf` with their meshes and `NAME.usda` for robots; `NAME.png`, the picture;
-`NAME-build.html`, the build sheet; `NAME-array.svg`, the faces on the array.
+assembly (`.stpz`: gzipped); `NAME.3mf` and `NAME-prusaslicer.3mf` for each plate of the printer;
+`NAME.glb` assembled; `NAME.xml`, `NAME.urdf`, `NAME.sdf` with their meshes and `NAME.usda` for
+robots; the picture `NAME.png`, the build sheet `NAME-build.html`, and `NAME-array.svg`.
 """
 
 from __future__ import annotations
@@ -29,13 +28,7 @@ from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.pipeline.sheet import SheetPlate, build_sheet
 from generator.polyhedron import Polyhedron, face_polygon
-from generator.solid import (
-    Part,
-    emboss_whole,
-    panels,
-    prove_closed,
-    triangles,
-)
+from generator.solid import Part, emboss_whole, panels, prove_closed, triangles
 from generator.spec.problem import error_location
 
 if TYPE_CHECKING:
@@ -64,20 +57,16 @@ def stage(
     slice_plates: bool = False,
     progress: Progress,
 ) -> StagedObject:
-    """Write all files of an object into the staging folder.
+    """Write all files of an object into the staging folder: `formats` of `EXPORTERS`, and pictures.
 
     Parameters
     ----------
-    plan, layout
-        The object and its symbols.
     built
         From `parts_of`.
-    formats
-        Of `EXPORTERS`; the pictures are always made.
     verify
         Read files back by independent programs before anything is kept.
     slice_plates
-        Ask PrusaSlicer what printing takes, for the build sheet.
+        Ask PrusaSlicer for the cost of printing, for the build sheet.
 
     Raises
     ------
@@ -193,7 +182,7 @@ def _array_picture(plan: ObjectPlan, layout: Layout) -> str:
 
 
 def outer_size_mm(polyhedron: Polyhedron, parts: Sequence[Part]) -> NDArray[np.float64]:
-    """Return the lengths of the box (3,) mm.
+    """Return the lengths (3,) of the box, mm.
 
     The facets that stand for a round face leave it by their chord error (a can of 60 mm measures
     59.96 mm between their corners); where it goes all around, its circles count in their place.

@@ -1,4 +1,4 @@
-"""What a run made, as values; and how a whole body lies on the bed, and what of it hangs over."""
+"""The results of a run, and how a whole body lies on the bed, with its overhangs."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ class Overhang:
 
 
 def overhang_of(plan: ObjectPlan, layout: Layout) -> Overhang:
-    """Return what a whole body of this plan does on the bed; z of the object frame is up."""
+    """Return the overhangs of a whole body on the bed; z of the object frame is up."""
     polyhedron, limit = plan.polyhedron, math.sin(plan.printer.overhang_max_rad)
     counts = {face.face: len(face.labels) for face in layout.faces}
     lowest = float(polyhedron.vertices[:, 2].min())

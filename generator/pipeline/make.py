@@ -1,9 +1,8 @@
 """One object: place, stage, commit, and let the files appear.
 
-Either under the lock of the database from beginning to end (`make_under_lock`), or with a
-place chosen before, so that several processes build at once and only the rows wait for
-their turn (`make_at`). Where another writer took the chosen cells meanwhile, the object is made
-again under the lock.
+Either under the lock of the database from beginning to end (`make_under_lock`), or at a place
+chosen before, so that several processes build at once and only the rows wait for their turn
+(`make_at`). Where another writer took the cells meanwhile, the object is made again under the lock.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from generator.pipeline.progress import Progress, no_progress, part_of_progress
 
 @dataclass(frozen=True, slots=True)
 class MakeJob:
-    """One object to make: its plan and what is wanted of it."""
+    """One object to make."""
 
     plan: ObjectPlan
     folder: Path
@@ -119,7 +118,6 @@ def _register(
 def _commit(
     job: MakeJob, placed: PlacedObject, staged: StagedObject, staging: Staging
 ) -> MadeObject:
-    """Let the files appear under their final names."""
     written = tuple(file.path for file in staging.commit())
     return describe_object(
         job.plan, placed.layout, staged.parts, staged.warnings, written, staged.faces,

@@ -1,6 +1,5 @@
 """Independent tasks in processes of their own, in order, with progress.
 
-Few tasks run here: a process costs about a second until it has loaded what it needs.
 Processes start afresh (spawn), because the libraries for triangles and algebra have threads
 that a forked copy would wait for. They end with the process that started them.
 """
@@ -66,10 +65,7 @@ class Engines:
 class Workers:
     """Processes for the tasks of one run, started when there is enough to do; a context.
 
-    Parameters
-    ----------
-    jobs
-        How many; None for one on each processor that we may use, if tasks are many.
+    `jobs` None: one on each processor that we may use, if tasks are many.
     """
 
     def __init__(self, jobs: int | None) -> None:
@@ -88,11 +84,7 @@ class Workers:
     def done(self, tasks: Sequence[Task[Result]], progress: Progress) -> list[Result]:
         """Return the results of independent tasks in their order.
 
-        Raises
-        ------
-        Exception
-            That of the first task, in their order, that failed; tasks not begun by then are
-            left.
+        Raises the error of the first task, in their order, that failed; later ones are left.
         """
         if self._jobs == 1 or len(tasks) < self._few:
             results = []

@@ -1,7 +1,4 @@
-"""An object's place on the array: its cells in the database, or free ones.
-
-Plan + cells of others -> PlacedObject. Thesis 6.3.
-"""
+"""An object's place on the array: its cells in the database, or free ones. Thesis 6.3."""
 
 from __future__ import annotations
 
@@ -27,7 +24,7 @@ NO_CELLS = (np.empty(0, np.int64), np.empty(0, np.int64))
 
 @dataclass(frozen=True, slots=True)
 class PlacedObject:
-    """Where an object's symbols are, and what is around them."""
+    """An object's layout among the cells that others hold."""
 
     layout: Layout
     taken: int  #: cells that other objects hold
@@ -45,8 +42,6 @@ def place_object(
     ----------
     connection
         None where there is no database yet.
-    plan
-        The object.
     replace
         Whether a changed spec may take the place of the registered one.
     taken
@@ -76,7 +71,7 @@ def place_object(
 
 
 def occupancy_of(connection: Connection | None, plan: ObjectPlan) -> Occupancy:
-    """Return what the objects of a database hold of a plan's array."""
+    """Return the cells of a plan's array that the objects of a database hold."""
     if connection is None:
         return Occupancy.from_cells(*NO_CELLS, plan.array)
     return occupancy(connection, plan.array)

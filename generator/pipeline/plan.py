@@ -1,10 +1,9 @@
-"""Spec -> what the stages need: polyhedron, array, outlines and clearances.
+"""Spec -> what the stages need: polyhedron, array, outlines and clearances; lengths in mm.
 
-Every error is given the line of the setting that causes it. Lengths in mm.
-
-A round face is no flat panel, so an object that has one is printed whole. Each round face is laid
-out on its development, under the number of its first facet; the other facets carry nothing.
-Cylinder and cone stand on their base when they are printed, so it stays blank.
+Every error is given the line of the setting that causes it. A round face is no flat panel, so an
+object that has one is printed whole. Each round face is laid out on its development, under the
+number of its first facet; the other facets carry nothing. Cylinder and cone stand on their base
+when they are printed, so it stays blank.
 """
 
 from __future__ import annotations
@@ -94,14 +93,7 @@ def plan_objects(
 
 
 def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan:
-    """Return the plan of one object.
-
-    Parameters
-    ----------
-    spec
-        What is asked for.
-    solid
-        Its shape, where it does not come from the spec.
+    """Return the plan of one object; `solid` is its shape where that does not come from the spec.
 
     Raises
     ------
@@ -238,9 +230,7 @@ def _check_order(alphabet: Alphabet, array: SymbolArray) -> None:
 
 
 def _cut_corners(
-    polyhedron: Polyhedron,
-    spec: ObjectSpec,
-    covered: Mapping[int, tuple[Loop, ...]],
+    polyhedron: Polyhedron, spec: ObjectSpec, covered: Mapping[int, tuple[Loop, ...]]
 ) -> dict[int, tuple[Loop, ...]]:
     """Return what is cut off the tops of panels, and what other faces cover of these faces."""
     if spec.parts != "panels":

@@ -2,8 +2,8 @@
 
 Objects with their layouts -> `SET-plate-1.3mf`, `SET-plate-1-prusaslicer.3mf`, ...,
 `SET-build.html`, `SET-overview.pdf`, `SET-packing.csv`. Objects for one printer share its
-plates; each object has a sheet of its own. The packing list is made each time; where it is what
-stands there already, and all plates are there, they stay.
+plates. The packing list is made each time; where the one that stands there is equal, and all
+plates are there, they stay.
 """
 
 from __future__ import annotations
@@ -124,13 +124,12 @@ def build_sheet_path(job: MakeJob) -> Path:
 
 
 def _name(objects: Sequence[SetObject]) -> str:
-    """Return what the files of the set are called: as the spec file that it comes from."""
+    """Return the name of the set's files: that of the spec file it comes from."""
     names = {job.plan.spec.origin for job, _ in objects}
     return names.pop() if len(names) == 1 and all(names) else "set"
 
 
 def _measure(number: int, plan: ObjectPlan, layout: Layout) -> list[SetPart]:
-    """Return the parts of one object with their sizes."""
     found = []
     for part in parts_of(plan, layout)[0]:
         low, high = box(part)
@@ -140,7 +139,7 @@ def _measure(number: int, plan: ObjectPlan, layout: Layout) -> list[SetPart]:
 
 
 def _plates(objects: Sequence[SetObject], parts: Sequence[SetPart]) -> list[SetPlate]:
-    """Arrange all parts: what one printer prints with the same settings lies together."""
+    """Arrange all parts: those that one printer prints with the same settings lie together."""
     plates: list[SetPlate] = []
     ways = [(job.plan.printer, settings_of(job.plan)) for job, _ in objects]
     for printer, settings in dict.fromkeys(ways):
@@ -175,7 +174,7 @@ def _packing_rows(objects: Sequence[SetObject], plate: SetPlate, number: int) ->
 def _plate_task(
     objects: Sequence[SetObject], title: str, plate: SetPlate
 ) -> tuple[str, list[tuple[ObjectPlan, Layout, list[str]]], Plate, SlicerSettings | None]:
-    """Return what `_plate_files` needs: the objects on a plate, and the plate of them alone."""
+    """Return the arguments of `_plate_files`: objects on a plate, and the plate of them alone."""
     places = plate.plate.places
     numbers = dict.fromkeys(plate.parts[place.part].number for place in places)
     wanted: list[tuple[ObjectPlan, Layout, list[str]]] = []
@@ -221,7 +220,6 @@ def _set_sheet(
     plates: Sequence[SetPlate],
     costs: Sequence[PlateCost | None],
 ) -> str:
-    """Return the build sheet of a set: its plates, and the objects with their codes."""
     printers = list(dict.fromkeys(plate.printer for plate in plates))
     drawings, lying = [], [list[str]() for _ in objects]
     for number, (plate, cost) in enumerate(zip(plates, costs, strict=True), 1):

@@ -48,8 +48,6 @@ def check_printed(
 
     Parameters
     ----------
-    specs
-        As for `encode`.
     folder
         For the pictures, in place of the specs' own.
     database
@@ -58,8 +56,6 @@ def check_printed(
         Name of the print profile or an exported file; else that of each spec's printer.
     faults
         Of the machine; none if left out.
-    progress
-        Called with what is being done and the share of the run that is done.
 
     Raises
     ------

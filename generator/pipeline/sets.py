@@ -2,8 +2,7 @@
 
 All places are chosen first, each after the ones before it; then every process builds and
 registers objects of its own (`make.make_at`). An object that is registered from an equal
-spec, with all its files in place and unchanged, is skipped: the same command again finishes
-what was interrupted.
+spec, with all its files in place and unchanged, is skipped.
 """
 
 from __future__ import annotations
@@ -41,24 +40,10 @@ def make_set(
     *,
     slice_plates: bool = False,
 ) -> tuple[list[MadeObject], tuple[Path, ...]]:
-    """Make the objects of a set and what belongs to it as a whole.
+    """Make the objects of a set, and the files of the set in `folder`; return both, in order.
 
-    Parameters
-    ----------
-    engine, url
-        The database; processes open it for themselves.
-    to_make
-        The objects, on one array.
-    folder
-        For plates, overview and packing list.
-    processes
-        None for one on each processor, if there is enough to do.
-    slice_plates
-        Ask PrusaSlicer what printing takes, for the build sheet.
-
-    Returns
-    -------
-    The objects in the order of `to_make`, and the files of the set.
+    Processes open the database at `url` for themselves; `processes` None: one on each processor,
+    if there is enough to do.
 
     Raises
     ------

@@ -1,7 +1,4 @@
-"""The build sheet of an object: its parts, plates, gluing and check, from what was made.
-
-Plan + layout + parts + plates -> `NAME-build.html`.
-"""
+"""The build sheet of an object: its parts, plates, gluing and check -> `NAME-build.html`."""
 
 from __future__ import annotations
 
@@ -48,7 +45,7 @@ Rows = Sequence[tuple[str, ...]]
 
 @dataclass(frozen=True, slots=True)
 class SheetPlate:
-    """One plate: its files, what lies where, and what printing costs where that is known."""
+    """One plate on the build sheet."""
 
     file: str
     plate: Plate
@@ -107,11 +104,7 @@ def material_text(volume_mm3: float, *, resin: bool) -> str:
 
 
 def _facts(
-    plan: ObjectPlan,
-    layout: Layout,
-    code: str,
-    parts: Sequence[Part],
-    plates: Sequence[SheetPlate],
+    plan: ObjectPlan, layout: Layout, code: str, parts: Sequence[Part], plates: Sequence[SheetPlate]
 ) -> Rows:
     spec, printer = plan.spec, plan.printer
     rows = [
@@ -184,7 +177,7 @@ def _step_text(plan: ObjectPlan, step: AssemblyStep, names: Sequence[str]) -> st
 
 
 def _eye(down: Floats, normal: Floats) -> Floats:
-    """Return the view on an object that lies with `down` down: on a new face from in front."""
+    """Return the view (3, 3) on an object that lies with `down` down: a new face from in front."""
     up = -down
     side = normal - (normal @ up) * up
     if np.linalg.norm(side) < 1e-6:
@@ -223,7 +216,6 @@ def _checks(plan: ObjectPlan, layout: Layout) -> Rows:
 
 
 def _middle_cell(plan: ObjectPlan, face: FaceLayout) -> str:
-    """Return row and column of the symbol nearest to the middle of a face."""
     outline = face_polygon(plan.polyhedron, face.face)[0]
     middle = (outline.min(axis=0) + outline.max(axis=0)) / 2
     nearest = int(np.argmin(np.round(((face.centres_mm - middle) ** 2).sum(axis=1), 6)))

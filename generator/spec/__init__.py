@@ -6,13 +6,9 @@
     explain.py    validation errors in the words of specs
     resolve.py    defaults, and what settings mean together -> resolved.ObjectSpec
     read.py       files, sets, values of a script -> ObjectSpec
-    option.py     options of commands, by the rules of specs
+    option.py     options of commands, and starters for `encode-object init`
     schema.py     the JSON schema for editors
-    starter.py    commented specs to begin with
-
-    SpecError     problem.py: every problem with place, line, caret and fix
-
-How files become values that remember line and column: `encoded_objects.base.yaml_tree`.
+    problem.py    SpecError: every problem with place, line, caret and fix
 """
 
 from __future__ import annotations

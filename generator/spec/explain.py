@@ -28,12 +28,11 @@ _AFTER_COMMA = re.compile(r"[0-9]+ ?(mm|cm|m|um|in|deg)?")  # what a decimal com
 
 
 def explain_errors(error: ValidationError, tree: Tree, model: type[BaseModel]) -> list[Problem]:
-    """Return the problems behind a validation error; see `explain_settings`."""
+    """Return the problems behind a validation error (`explain_settings`)."""
     return explain_settings(error, tree, model, _WORDS)
 
 
 def _unknown_setting(place: Place, mark: SourceMark, model: type[BaseModel]) -> Problem:
-    """Explain a name that is not known where it stands."""
     word, block = str(place[-1]), place[:-1]
     known = list(model_at(model, block).model_fields)
     inside = f" in '{block[-1]}'" if block else ""

@@ -1,4 +1,4 @@
-"""What is wrong with a spec, in the words of specs, and at which setting an error lies."""
+"""What is wrong with a spec, and at which setting an error lies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ INPUT_ERROR = 2  # exit code of errors that a spec can cause
 
 
 class SpecError(DocumentError, GeneratorError):
-    """A spec that cannot be used; holds every problem that was found, in file order."""
+    """A spec that cannot be used; holds every problem found, in file order."""
 
 
 SPEC = DocumentKind(
@@ -30,18 +30,10 @@ SPEC = DocumentKind(
 
 @contextmanager
 def error_location(source: Tree, path: str) -> Iterator[None]:
-    """Give errors of a stage the place of the setting that causes them.
+    """Turn a `GeneratorError` of a stage into a `SpecError` at the setting of `path` (`mark_of`).
 
     Errors that no spec can cause (a database that does not open) and errors that have places
-    already pass as they are. Of others a `SpecError` is raised with their cause and fix; a place
-    of their own (a face, say) stands before the cause.
-
-    Parameters
-    ----------
-    source
-        The spec's settings as written: `ObjectSpec.source`.
-    path
-        As for `mark_of`.
+    already pass as they are. The error's own place (a face, say) stands before its cause.
     """
     try:
         yield
@@ -55,14 +47,8 @@ def error_location(source: Tree, path: str) -> Iterator[None]:
 def mark_of(tree: Tree, path: str) -> SourceMark:
     """Return where a setting stands.
 
-    Parameters
-    ----------
-    tree
-        Settings with their places.
-    path
-        Names with points between them, "symbols.pitch"; several with commas between them,
-        of which the first one that is written in the file counts. Where none is, the place
-        is that of the nearest block around the first, at last that of the object.
+    `path` has points between names, "symbols.pitch"; of several paths, with commas between, the
+    first that is written in the file counts. Where none is, the nearest block around the first one.
     """
     places = [_place(part.strip()) for part in path.split(",")]
     for place in places:
@@ -79,7 +65,6 @@ def _place(path: str) -> Place:
 
 
 def _value_or_key(tree: Tree, place: Place) -> SourceMark:
-    """Return the mark of a plain value, or of the key of a block."""
     value = tree.value
     for part in place:
         value = value[part]

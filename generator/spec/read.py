@@ -1,9 +1,8 @@
 """Read specs: one object a file, or a set of objects that share one array.
 
-Files -> `ObjectSpec` values. All problems of all files are reported at once.
-
-Settings from a Python script are written as YAML and read as a file is, so that a script and a
-file take equal words and give equal messages; the place is `encode():line:column`.
+Files -> `ObjectSpec` values; all problems of all files are reported at once. Settings from a
+Python script are written as YAML and read as a file is: equal words, equal messages, with the
+place `encode():line:column`.
 """
 
 from __future__ import annotations
@@ -33,21 +32,16 @@ SHARED_BLOCKS = ("symbols", "print", "output")  # merged setting by setting
 def read_specs(
     paths: Sequence[Path | str | Tree], *, database: str | None = None, sensor_type: str = ""
 ) -> tuple[ObjectSpec, ...]:
-    """Read all objects of one run.
+    """Read all objects of one run: one ObjectSpec for each object and copy, in the order of files.
 
     Parameters
     ----------
     paths
         Spec files, or what was read of them; each holds one object or a set.
     database
-        URL that takes the place of the one in the files; they may then name different ones.
+        URL in place of those in the files, which may then name different ones.
     sensor_type
         Name or file in place of what the specs say; empty: as they say.
-
-    Returns
-    -------
-    tuple of ObjectSpec
-        One for each object and copy, in the order of the files.
 
     Raises
     ------
@@ -92,14 +86,7 @@ def read_specs(
 
 
 def spec_of(settings: Mapping[str, Any], shape: ShapeSpec) -> ObjectSpec:
-    """Return the spec of one object.
-
-    Parameters
-    ----------
-    settings
-        As in a spec file: name, profile, symbols, print, output, ...; None means not given.
-    shape
-        What the object is.
+    """Return the spec of one object from settings as in a file and a shape; None means not given.
 
     Raises
     ------
@@ -192,7 +179,7 @@ def _collect_trees(trees: Iterable[Tree], problems: list[Problem]) -> list[Tree]
 
 
 def _origin(path: Path | str | Tree, source: Tree) -> str:
-    """Return what the files of a set are called: its name, or that of its file."""
+    """Return the name of a set's files: its own, or that of its file."""
     value = source.value
     named = value.get("name") if isinstance(value, dict) and "objects" in value else None
     if isinstance(named, str):
@@ -201,7 +188,7 @@ def _origin(path: Path | str | Tree, source: Tree) -> str:
 
 
 def _problems_of_read_blocks(error: ValidationError, tree: Tree) -> list[Problem]:
-    """Return the problems of blocks that were read, to be reported in one go with misread ones.
+    """Return the problems of the blocks that validated, to report them together with the others.
 
     Where symbols or settings they depend on are misread, nothing is concluded from defaults.
     """
@@ -370,7 +357,6 @@ def _position(problem: Problem) -> tuple[int, int]:
 
 
 def _without_none(value: Any) -> Any:
-    """Return settings without those that are None; paths as text, tuples as lists."""
     if isinstance(value, Mapping):
         return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
     if isinstance(value, list | tuple):

@@ -1,8 +1,7 @@
 """From settings to a resolved object: defaults by profile, and what settings mean together.
 
-ObjectSettings + Tree -> ObjectSpec for each copy, or every problem with its place. Array,
-alphabet and pitch of a profile stand in `generator.array.profiles`; here is what embossing adds
-to them. Thesis 5.2, 5.5, 6.2.
+Array, alphabet and pitch of a profile stand in `generator.array.profiles`; here is what
+embossing adds to them. Thesis 5.2, 5.5, 6.2.
 """
 
 from __future__ import annotations
@@ -71,7 +70,7 @@ _OF_ORDER = {
 def resolve(
     settings: NamedSettings, tree: Tree, solid: ShapeSpec | None = None
 ) -> tuple[ObjectSpec, ...]:
-    """Return the object, or its copies, with all settings resolved.
+    """Return the object, or its copies NAME-1, NAME-2, ..., with all settings resolved.
 
     Parameters
     ----------
@@ -81,11 +80,6 @@ def resolve(
         Where its settings stand.
     solid
         Its shape, where the settings hold none.
-
-    Returns
-    -------
-    tuple of ObjectSpec
-        One, or `copies` of them called NAME-1, NAME-2, ...
 
     Raises
     ------
@@ -166,7 +160,7 @@ def folder_name(name: str) -> str:
 
 
 def _defaults(settings: NamedSettings, order: int | None, sensor: SensorType) -> SymbolDefaults:
-    """Return what the profile gives, or the smallest alphabet for an array that is written out."""
+    """Return the profile's defaults, or those of the smallest alphabet for an explicit array."""
     if settings.encoding is None and _profile(settings) == AUTO:
         pitch = sensor.symbol_pitch_mm
         coarser = tuple(more for more in COARSER_MM if more > pitch)
@@ -180,7 +174,7 @@ def _defaults(settings: NamedSettings, order: int | None, sensor: SensorType) ->
 
 
 def _sensor(settings: NamedSettings, tree: Tree, problems: list[Problem]) -> SensorType:
-    """Return what will touch the object; problems with its type are added."""
+    """Return the sensor that will touch the object; add problems with its type."""
     name = settings.sensor_type
     if name is None:
         return USUAL_SENSOR
@@ -201,7 +195,7 @@ def _sensor(settings: NamedSettings, tree: Tree, problems: list[Problem]) -> Sen
 def _printer(
     settings: NamedSettings, defaults: SymbolDefaults, tree: Tree, problems: list[Problem]
 ) -> Printer:
-    """Return what prints; problems of its file are added."""
+    """Return the printer; add problems of its file."""
     if settings.print.printer is not None:
         try:
             return _described_printer(settings.print.printer, tree)
@@ -301,7 +295,6 @@ def _refuse_style(error: AlphabetError, refuse: Refuse) -> None:
 
 
 def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
-    """Refuse an alphabet with too few symbols."""
     enough = [name for name, other in ALPHABETS.items() if other.order >= order]
     most = max(other.order for other in ALPHABETS.values())
     fix = f"set alphabet to {' or '.join(enough)}" if enough else f"take an order of {most} or less"
@@ -310,7 +303,6 @@ def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
 
 
 def _profile(settings: NamedSettings) -> str:
-    """Return the profile of a spec that writes no encoding."""
     return settings.profile or AUTO
 
 
@@ -385,7 +377,6 @@ def _shape(shape: Shape, tree: Tree, refuse: Refuse) -> ShapeSpec | None:
 
 
 def _check_faces(faces: list[tuple[tuple[int, ...], ...]], vertices: int, refuse: Refuse) -> None:
-    """Refuse faces that name vertices which are not there."""
     for number, loops in enumerate(faces):
         wrong = [vertex for loop in loops for vertex in loop if not 0 <= vertex < vertices]
         if wrong:
@@ -397,7 +388,7 @@ def _check_faces(faces: list[tuple[tuple[int, ...], ...]], vertices: int, refuse
 
 
 def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeSpec | None:
-    """Return a shape that is read from a model file, which must be there."""
+    """Return a shape that is read from a model file; refuse one that is not there."""
     from generator.polyhedron.read import MESHES, STEP
 
     path = folder / name
@@ -420,7 +411,6 @@ def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeS
 
 
 def _similar_model(path: Path) -> str:
-    """Return a fix that names similar models in the folder of `path`."""
     from generator.polyhedron.read import MESHES, STEP
 
     try:

@@ -1,7 +1,6 @@
-"""One object, all settings resolved: what the pipeline works from.
+"""One object, all settings resolved: what the pipeline works from; mm and radians.
 
-Lengths in mm, angles in radians. Nothing but `source`, which is for messages, depends on how the
-spec was written.
+Nothing but `source`, which is for messages, depends on how the spec was written.
 """
 
 from __future__ import annotations
@@ -84,9 +83,8 @@ class ObjectSpec:
     def meaning(self) -> dict[str, Any]:
         """What a spec means, as plain values; equal specs mean the same object.
 
-        Comments, key order, units, names, folders, formats, the database and settings for
-        robots do not count; a default counts as if it had been written; a file counts by its
-        content.
+        Names, folders, formats, the database and settings for robots do not count; a default counts
+        as if it had been written; a file counts by its content.
         """
         gap = {} if self.gap_mm == GAP_MM else {"gap_mm": self.gap_mm}  # older specs had none
         style = {name: round(value, 9) for name, value in asdict(self.style).items()}

@@ -14,7 +14,7 @@ from generator.spec.shape import Shape
 
 
 class _SpecSchema(DescribedSchema):
-    """Says what a person may write: a setting is there with a value, or it is left out."""
+    """A setting is there with a value, or it is left out."""
 
     def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
         return self.generate_inner(schema["schema"])

@@ -1,15 +1,10 @@
 """The settings of a spec, as people write them: names, defaults and descriptions.
 
-These models read one object (`ObjectSettings`) or a set (`SetSettings`) and are the
-source of the JSON schema. Lengths are in mm and angles in radians after reading.
-
-An array is named by a profile, or explicitly (`Encoding`, Thesis 5.1 to 5.5): a sequence alone
-(prbs, prmvs), folded on the torus (prba, prmva), or the product of two sequences (prpa, prmvpa).
-What only the mathematics can tell (primitive, coprime, unique windows) is checked where the array
-is made; the keys are those of `generator.array.definition`.
-
-A printer is a name, a file, or a block, which takes what it leaves out from the printer that it
-is `like`; a nozzle of its own brings the limits of that nozzle.
+`ObjectSettings` reads one object, `SetSettings` a set; the JSON schema is made from both. Lengths
+are in mm and angles in radians after reading. An array is named by a profile, or explicitly
+(`Encoding`, Thesis 5.1 to 5.5): a sequence alone (prbs, prmvs), folded on the torus (prba, prmva),
+or the product of two (prpa, prmvpa). What only the mathematics can tell (primitive, coprime, unique
+windows) is checked where the array is made; the keys are those of `generator.array.definition`.
 """
 
 from __future__ import annotations
@@ -115,7 +110,7 @@ def sensor_type_name(value: Any) -> str:
 
 
 def lab_key(value: Any) -> str:
-    """Return a lab's key, as it is written everywhere."""
+    """Return a lab's key in its one written form."""
     if not isinstance(value, str):
         raise refuse(f"a lab key is text, not {value!r}", f"put it in quotes: '{value}'")
     try:
@@ -225,8 +220,7 @@ Polynomial = Annotated[
     ),
 ]
 Window = Annotated[
-    tuple[Side, Side],
-    BeforeValidator(window, json_schema_input_type=tuple[Side, Side] | str),
+    tuple[Side, Side], BeforeValidator(window, json_schema_input_type=tuple[Side, Side] | str)
 ]
 
 
@@ -306,8 +300,7 @@ class PrinterSettings(Block):
 
 
 PrinterChoice = Annotated[
-    PrinterSettings,
-    BeforeValidator(printer_block, json_schema_input_type=PrinterSettings | str),
+    PrinterSettings, BeforeValidator(printer_block, json_schema_input_type=PrinterSettings | str)
 ]
 
 

@@ -1,7 +1,6 @@
-"""The shapes a spec can ask for.
+"""The shapes a spec can ask for; sizes in mm after reading.
 
-Sizes in mm after reading. What only geometry can tell (closed, planar, oriented) is
-checked where the polyhedron is made.
+What only geometry can tell (closed, planar, oriented) is checked where the polyhedron is made.
 """
 
 from __future__ import annotations

@@ -54,8 +54,6 @@ name: {name}
 def starter(shape: str, file: str = "") -> str:
     """Return a commented spec for one of the shapes of `EXAMPLES`; it can be made as it is.
 
-    Its first line names `file`, or the shape where none is given.
-
     >>> starter("cube").splitlines()[5]
     'shape: {cube: 60 mm}'
     """

@@ -1,13 +1,10 @@
 """Counts -> newtons by a calibration, and back; whether a calibration still holds.
 
-Without a calibration counts are read as they are: any monotone, roughly proportional
-response. Frames at rest show a shift of the bias, a known load shows a change of the gain; changes
-beyond the thresholds stand in `Drift.warning`, for the operator.
+Without a calibration counts are read as they are: any monotone, roughly proportional response.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from probe.calibration.condition import tactel_words
 from probe.calibration.file import Calibration, Condition, Image
 from probe.calibration.fit import law_s
-from probe.calibration.load import CalibrationLoad, average_frames
+from probe.calibration.load import average_frames
 from probe.circuit import ConductanceEstimate, invert_readings
 from probe.circuit.reading import scan_shares, shares
 from probe.errors import CalibrationError
@@ -26,7 +23,6 @@ from probe.frame import Frame
 SIGMAS = 3.0  # of a conductance from which it is a force
 LEAK_S = 1e-9  # joins the network of a board with floating rows
 DRIFT_COUNTS = 2.0  # shift of the bias that warns
-DRIFT_GAIN = 0.10  # change of the gain that warns, share of 1
 DRIFT_SIGMAS = 5.0  # of the bias: a shift is one from so many standard deviations
 
 
@@ -60,10 +56,8 @@ def calibrate_image(
 
     Raises
     ------
-    CalibrationError
-        If the image has another shape than the calibration.
-    CircuitError
-        If a count is beyond the board's range.
+    CalibrationError, CircuitError
+        If the image has another shape than the calibration, or a count is beyond the board's range.
 
     Examples
     --------
@@ -99,14 +93,8 @@ def calibrate_image(
 def expected_counts(forces_n: ArrayLike, calibration: Calibration) -> Image:
     """Return the readings of the calibrated sensor under forces: inverse of `calibrate_image`.
 
-    Parameters
-    ----------
-    forces_n
-        (..., rows, columns) N.
-
-    Returns
-    -------
-    (..., rows, columns) counts, not rounded; dead and stuck tactels conduct as at rest.
+    Forces are (..., rows, columns) N, the counts not rounded; dead and stuck tactels conduct as at
+    rest.
     """
     c = calibration
     forces = np.asarray(forces_n, dtype=np.float64)
@@ -134,7 +122,7 @@ def _conductances(counts: Image, c: Calibration) -> ConductanceEstimate:
     above = counts - c.bias_counts
     sigma = np.broadcast_to(np.sqrt(c.noise_counts**2 + 1.0 / 12.0), above.shape)
     lost = above < sigma
-    return ConductanceEstimate(np.maximum(above, 0.0), sigma, lost, (~lost).sum(axis=(-2, -1)))
+    return ConductanceEstimate(np.maximum(above, 0.0), sigma, lost)
 
 
 def _of_the_law(over: Image, c: Calibration) -> Image:
@@ -151,31 +139,16 @@ def _of_the_law(over: Image, c: Calibration) -> Image:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drift:
-    """What changed since the calibration."""
+    """The change since the calibration."""
 
     bias_counts: Image  #: (rows, columns) reading at rest now, less then
-    gain: float  #: median of measured over known force, less 1; nan without a load
     warning: str  #: empty while the calibration holds
 
 
-def drift_of(
-    calibration: Calibration, rest_counts: ArrayLike, loads: Sequence[CalibrationLoad] = ()
-) -> Drift:
-    """Compare a sensor with its calibration.
+def drift_of(calibration: Calibration, rest_counts: ArrayLike) -> Drift:
+    """Compare a sensor with its calibration, by frames (N, rows, columns) at rest now.
 
-    Parameters
-    ----------
-    calibration
-        Of this sensor.
-    rest_counts
-        (N, rows, columns) counts, frames with nothing on the sensor, now.
-    loads
-        Known loads, now.
-
-    Raises
-    ------
-    CalibrationError
-        If the frames are of another shape, or too few.
+    Raises CalibrationError: the frames are of another shape, or too few.
     """
     rest = average_frames(rest_counts, "rest")
     if rest.mean.shape != calibration.shape:
@@ -185,21 +158,7 @@ def drift_of(
         )
     shift = rest.mean - calibration.rest_counts
     moved = ~calibration.bad & (np.abs(shift) > np.maximum(DRIFT_COUNTS, DRIFT_SIGMAS * rest.sigma))
-    said = []
-    if moved.any():
-        worst = float(np.abs(shift[moved]).max())
-        said.append(f"the bias of {tactel_words(moved)} moved by up to {worst:.3g} counts")
-    ratios = [_ratios(calibration, load) for load in loads]
-    clear = np.concatenate(ratios) if ratios else np.zeros(0)
-    gain = float(np.median(clear)) - 1.0 if clear.size else float("nan")
-    if clear.size and abs(gain) > DRIFT_GAIN:
-        said.append(f"the gain changed by {100 * gain:+.0f} %")
-    return Drift(shift, gain, "; ".join([*said, "calibrate again"]) if said else "")
-
-
-def _ratios(calibration: Calibration, load: CalibrationLoad) -> Image:
-    """Return measured over known force, of the tactels that read it clearly."""
-    read = calibrate_image(load.read.mean, calibration)
-    well = ~read.bad & (load.forces_n > 0) & (read.values > 5.0 * read.sigma)
-    ratios: Image = read.values[well] / load.forces_n[well]
-    return ratios
+    if not moved.any():
+        return Drift(shift, "")
+    by = f"moved by up to {np.abs(shift[moved]).max():.3g} counts"
+    return Drift(shift, f"the bias of {tactel_words(moved)} {by}; calibrate again")

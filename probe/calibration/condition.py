@@ -39,7 +39,7 @@ def common_bias(rest: Average) -> float:
 
 
 def raised_tactels(rest: Average, full: int) -> NDArray[np.bool_]:
-    """Say which tactels read more than the common bias at rest."""
+    """Tell which tactels read more than the common bias at rest."""
     least = np.maximum(RAISED_COUNTS, SIGMAS * rest.sigma)
     high: NDArray[np.bool_] = (rest.mean - common_bias(rest) > least) | (rest.highest >= full)
     return high
@@ -52,7 +52,7 @@ def judge_tactels(
     high: NDArray[np.bool_],
     saturated: NDArray[np.bool_],
 ) -> NDArray[np.uint8]:
-    """Judge every tactel.
+    """Return the condition (rows, columns) of every tactel.
 
     Parameters
     ----------
@@ -107,12 +107,12 @@ class ClearLoads:
 
     @property
     def few(self) -> NDArray[np.bool_]:
-        """Say where they are too few for a law."""
+        """Where they are too few for a law."""
         return self.levels < LEVELS
 
     @property
     def near(self) -> NDArray[np.bool_]:
-        """Say where they lie too near each other."""
+        """Where they lie too near each other."""
         return ~(self.highest_n >= RATIO * self.lowest_n)
 
 
@@ -133,12 +133,9 @@ def demand_loads(
     saturated: NDArray[np.bool_],
     live: NDArray[np.bool_],
 ) -> None:
-    """See that the loads that every live tactel feels determine its law.
+    """Refuse loads (CalibrationError) that leave the law of a live tactel open.
 
-    Raises
-    ------
-    CalibrationError
-        Which tactels, what they have, and which load is missing.
+    The message names the tactels, their loads, and the load that is missing.
     """
     levels, lowest, highest = known.levels, known.lowest_n, known.highest_n
     full = live & saturated.any(axis=0) & (known.few | known.near)

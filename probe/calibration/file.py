@@ -125,10 +125,7 @@ def calibration_hash(calibration: Calibration) -> str:
 def write_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> str:
     """Write a calibration, whole or not at all, and return its hash.
 
-    Raises
-    ------
-    CalibrationError
-        If the file cannot be written.
+    Raises CalibrationError: the file cannot be written.
     """
     text, name = _text(calibration), Path(path)
     digest = hashlib.sha256(text.encode()).hexdigest()
@@ -143,25 +140,11 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike[str]) ->
     return digest
 
 
-def read_calibration(
-    path: str | os.PathLike[str],
-    *,
-    sensor: str | None = None,
-    shape: tuple[int, int] | None = None,
-) -> Calibration:
-    """Read a calibration.
+def read_calibration(path: str | os.PathLike[str], *, sensor: str | None = None) -> Calibration:
+    """Read a calibration, of the sensor that is named if one is.
 
-    Parameters
-    ----------
-    path
-        The file.
-    sensor, shape
-        Of the sensor that it shall serve; not compared if not given.
-
-    Raises
-    ------
-    CalibrationError
-        If the file is none, is of a newer version, was changed, or is another sensor's.
+    Raises CalibrationError: the file is none, is of a newer version, was changed, or is another
+    sensor's.
     """
     place = str(path)
     try:
@@ -195,25 +178,13 @@ def read_calibration(
         raise CalibrationError(
             "was changed: its content does not give its sha256", fix="calibrate again", place=place
         )
-    _check_sensor(calibration, sensor, shape, place)
-    return calibration
-
-
-def _check_sensor(
-    calibration: Calibration, sensor: str | None, shape: tuple[int, int] | None, place: str
-) -> None:
     if sensor is not None and sensor != calibration.sensor:
         raise CalibrationError(
             f"is of sensor {calibration.sensor!r}, not of {sensor!r}",
             fix="use the file of the sensor that is connected",
             place=place,
         )
-    if shape is not None and shape != calibration.shape:
-        raise CalibrationError(
-            f"is for {calibration.shape} tactels, not {shape}",
-            fix="use the file of the sensor that is connected",
-            place=place,
-        )
+    return calibration
 
 
 def _text(calibration: Calibration) -> str:

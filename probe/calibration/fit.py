@@ -18,7 +18,7 @@ towards the mean. Parameters are ln gain, exponent, break force.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -137,23 +137,16 @@ def calibration_from(
         return image
 
     return Calibration(
-        sensor=sensor,
-        made=made,
-        board=board,
-        full=top,
-        loads=tuple(load.name for load in loads),
-        condition=condition,
-        bias_counts=bias,
-        rest_counts=rest.mean,
-        noise_counts=rest.noise,
+        sensor=sensor, made=made, board=board, full=top,
+        loads=tuple(load.name for load in loads), condition=condition,
+        bias_counts=bias, rest_counts=rest.mean, noise_counts=rest.noise,
         gain_s=spread(law.gain_s),
         exponent=spread(law.exponent),
         break_n=spread(law.break_n),
         covariance=spread(law.covariance[:, _UPPER[0], _UPPER[1]], (6,)),
         most_n=np.where(live, known.highest_n, np.nan),
-        scatter=float(np.sqrt((law.scatter**2).mean())),
-        repeat=REPEAT,
-    )
+        scatter=float(np.sqrt((law.scatter**2).mean())), repeat=REPEAT,
+    )  # fmt: skip
 
 
 def _conductances(
@@ -294,14 +287,9 @@ def _diagonal(normal: Array) -> Array:
 
 
 def shrink_laws(law: FittedLaw, alike: NDArray[np.bool_]) -> FittedLaw:
-    """Draw laws together as far as their own loads leave open.
+    """Draw the laws of T tactels together as far as their own loads leave open.
 
-    Parameters
-    ----------
-    law
-        Of T tactels.
-    alike
-        (T,) those that may be taken together: not the preloaded ones.
+    `alike` (T,) are those that may be taken together: not the preloaded ones.
     """
     theta = np.stack([np.log(law.gain_s), law.exponent, law.break_n], axis=1)
     middle = np.median(theta[alike], axis=0) if alike.any() else np.zeros(3)
@@ -320,10 +308,5 @@ def shrink_laws(law: FittedLaw, alike: NDArray[np.bool_]) -> FittedLaw:
     drawn[:, 2] = np.maximum(drawn[:, 2], 0.0)
     kept = np.where(usual[:, None], drawn, theta)
     symmetric = (narrowed + np.swapaxes(narrowed, 1, 2)) / 2
-    return replace(
-        law,
-        gain_s=np.exp(kept[:, 0]),
-        exponent=kept[:, 1],
-        break_n=kept[:, 2],
-        covariance=np.where(usual[:, None, None], symmetric, law.covariance),
-    )
+    covariance = np.where(usual[:, None, None], symmetric, law.covariance)
+    return FittedLaw(np.exp(kept[:, 0]), kept[:, 1], kept[:, 2], covariance, law.scatter)

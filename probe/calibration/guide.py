@@ -52,10 +52,7 @@ class CalibrationGuide:
     def read(self) -> None:
         """Read the load that is on the sensor now.
 
-        Raises
-        ------
-        CalibrationError
-            All loads were read, or one is being read.
+        Raises CalibrationError: all loads were read, or one is being read.
         """
         if self.done or self.reading:
             raise CalibrationError("no load is asked for now", fix="wait, or finish")

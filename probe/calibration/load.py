@@ -37,19 +37,9 @@ class Average:
 
 
 def average_frames(counts: ArrayLike, name: str = "frames") -> Average:
-    """Average frames of a steady load.
+    """Average the frames (N, rows, columns) of a steady load, N >= 20, in the order of reading.
 
-    Parameters
-    ----------
-    counts
-        (N, rows, columns) counts, N >= 20, in the order in which they were read.
-    name
-        Of the load, for messages.
-
-    Raises
-    ------
-    CalibrationError
-        If there are too few frames, or they are no images.
+    `name` is that of the load, for messages. Raises CalibrationError: too few frames, or no images.
     """
     read = np.asarray(counts, dtype=np.float64)
     if (
@@ -119,23 +109,11 @@ def known_load(counts: ArrayLike, forces_n: ArrayLike, name: str = "") -> Calibr
 def even_load(
     counts: ArrayLike, total_n: float, footprint: ArrayLike | None = None, name: str = ""
 ) -> CalibrationLoad:
-    """Return a load of known total force, even over its footprint.
+    """Return a load of known total force, even over its footprint; see `known_load`.
 
-    Parameters
-    ----------
-    counts
-        (N, rows, columns) counts.
-    total_n
-        Force of the whole load, N: a dead weight, or a cushion's pressure times the area.
-    footprint
-        (rows, columns) share of each tactel that is covered; all of every one by default.
-    name
-        For messages and for the calibration file.
-
-    Raises
-    ------
-    CalibrationError
-        As `known_load`; or if the footprint is empty.
+    `total_n` is the force of the whole load: a dead weight, or a cushion's pressure times the area;
+    `footprint` (rows, columns) the share of each tactel that is covered, all of every one by
+    default.
     """
     shape = np.shape(counts)[-2:]
     cover = np.ones(shape) if footprint is None else np.asarray(footprint, dtype=np.float64)
@@ -151,12 +129,8 @@ def even_load(
 def describe_load(counts: NDArray[np.uint16], rest: NDArray[np.uint16] | None) -> str:
     """Return in words how many tactels a load pressed, how much, and whether it was steady.
 
-    Parameters
-    ----------
-    counts
-        (N, rows, columns) frames of the load.
-    rest
-        (M, rows, columns) frames of the unloaded sensor; None: these are they.
+    `counts` (N, rows, columns) are frames of the load, `rest` those of the unloaded sensor; None:
+    `counts` are these.
     """
     mean = counts.mean(axis=0)
     if rest is None:

@@ -12,11 +12,6 @@ share per decade of time. Both are in `FilmState`, a value that goes in and come
 N, S (siemens), ohm, s. Arrays are (rows, columns), tactel (0, 0) top left. Figures: Interlink
 400 series; thesis 4.2 gives two decades of resistance for 1 to 100 N/cm^2, which is 0.025 to
 2.5 N on a tactel of 1.5875 mm.
-
-`draw_fsr` draws sensors whose tactels differ. The default spread is at least as bad as the public
-16x16 sensor of the measurements (159,120 frames): 147 of 256 tactels never responded, 5 were
-preloaded for more than half of the trials; its law had to be calibrated tactel by tactel.
-`DATASHEET` is the spread of single parts as their maker states it, all of them sound.
 """
 
 from __future__ import annotations
@@ -106,7 +101,7 @@ def fsr_of(rows: int = _USUAL.rows, columns: int = _USUAL.columns) -> Fsr:
 def conductances(
     fsr: Fsr, forces_n: ArrayLike, state: FilmState | None = None, elapsed_s: float = 0.0
 ) -> tuple[Image, FilmState]:
-    """Return the conductance of every tactel, and its new state.
+    """Return the conductance of every tactel (..., rows, columns), S, and its new state.
 
     Parameters
     ----------
@@ -115,13 +110,10 @@ def conductances(
     forces_n
         (..., rows, columns) N, 0 or more; leading axes are independent touches.
     state
-        Of the frame before, same shape; None for a matrix that was not loaded yet.
+        Of the frame before, same shape; None for a matrix that was not loaded yet. Its noise is
+        carried on as it was.
     elapsed_s
         Time since that frame, s.
-
-    Returns
-    -------
-    (..., rows, columns) S and the new state; the noise in it is carried on as it was.
 
     Raises
     ------
@@ -142,17 +134,11 @@ def conductances(
     kept = np.divide(state.effective_n, effective, out=np.ones(force.shape), where=more)
     age = np.where(effective > 0, (state.age_s + elapsed_s) * kept, 0.0)
     crept = 1.0 + fsr.drift * np.log10(1.0 + age)
-    film = film_conductances(fsr, effective) * crept
+    over = np.minimum(np.maximum(effective - fsr.break_n, 0.0), MOST_N)
+    film = fsr.gain_s * over**fsr.exponent * crept
     shown = np.where(fsr.dead, fsr.leak_s, fsr.leak_s + film / (1.0 + film * fsr.series_ohm))
     shown = np.where(fsr.stuck_s > 0, fsr.stuck_s, shown)
     return shown, FilmState(effective, age, state.flutter)
-
-
-def film_conductances(fsr: Fsr, effective_n: Image) -> Image:
-    """Return the conductance (S) of the film alone, without leak, series and creep."""
-    over = np.minimum(np.maximum(effective_n - fsr.break_n, 0.0), MOST_N)
-    film: Image = fsr.gain_s * over**fsr.exponent
-    return film
 
 
 def checked_forces(fsr: Fsr, forces_n: ArrayLike) -> Image:
@@ -170,89 +156,3 @@ def checked_forces(fsr: Fsr, forces_n: ArrayLike) -> Image:
             fix="give the forces of a contact",
         )
     return force
-
-
-@dataclass(frozen=True, slots=True)
-class Spread:
-    """Medians and spreads of the law, and how many tactels are unsound (shares of 1)."""
-
-    gain_s: float = GAIN_S  #: S, median
-    gain_spread: float = 0.30  #: standard deviation of its logarithm
-    exponent: float = 1.0  #: mean
-    exponent_spread: float = 0.08  #: standard deviation
-    break_n: float = BREAK_N  #: N, median
-    break_spread: float = 0.5  #: standard deviation of its logarithm
-    series_ohm: float = SERIES_OHM  #: median
-    series_spread: float = 0.3  #: standard deviation of its logarithm
-    dead: float = 147 / 256  #: share that never responds
-    stuck: float = 1 / 256  #: share that shows one conductance whatever the force
-    preloaded: float = 5 / 256  #: share that is pressed by the assembly
-    preload_n: float = 0.3  #: N, mean force on those (exponential)
-    leak_s: float = LEAK_S  #: S
-    hysteresis: float = 0.10  #: reading on the way back over the way up, less 1
-    drift: float = 0.05  #: per decade of time
-
-    def __post_init__(self) -> None:
-        shares = (self.dead, self.stuck, self.preloaded)
-        if not (min(shares) >= 0 and sum(shares) <= 1):
-            raise CircuitError(
-                f"dead {self.dead:g}, stuck {self.stuck:g} and preloaded {self.preloaded:g}",
-                fix="give shares of 1, together at most 1",
-            )
-
-
-MEASURED = Spread()
-
-DATASHEET = Spread(
-    gain_spread=0.06, exponent_spread=0.02, break_spread=0.2, series_spread=0.1,
-    dead=0.0, stuck=0.0, preloaded=0.0,
-)  # fmt: skip
-
-
-def draw_fsr(
-    rng: np.random.Generator,
-    spread: Spread = MEASURED,
-    rows: int = _USUAL.rows,
-    columns: int = _USUAL.columns,
-) -> Fsr:
-    """Draw one sensor.
-
-    Exactly the stated shares of its tactels are dead, stuck and preloaded (rounded up); which
-    of them is drawn.
-
-    Examples
-    --------
-    >>> fsr = draw_fsr(np.random.default_rng(1))
-    >>> int(fsr.dead.sum()), int((fsr.stuck_s > 0).sum()), int((fsr.preload_n > 0).sum())
-    (147, 1, 5)
-    """
-    shape, size = (rows, columns), rows * columns
-
-    def lognormal(median: float, deviation: float) -> np.ndarray:
-        return median * np.exp(deviation * rng.standard_normal(shape))
-
-    gain = lognormal(spread.gain_s, spread.gain_spread)
-    exponent = spread.exponent + spread.exponent_spread * rng.standard_normal(shape)
-    broken = lognormal(spread.break_n, spread.break_spread)
-    series = lognormal(spread.series_ohm, spread.series_spread)
-    order = rng.permutation(size)
-    counts = [int(np.ceil(s * size - 1e-9)) for s in (spread.dead, spread.stuck, spread.preloaded)]
-    ends = np.minimum(np.cumsum(counts), size)
-    dead, stuck, preload = np.zeros(size, bool), np.zeros(size), np.zeros(size)
-    dead[order[: ends[0]]] = True
-    held = order[ends[0] : ends[1]]
-    stuck[held] = spread.gain_s * np.exp(rng.uniform(-3.0, 3.0, held.size))
-    pressed = order[ends[1] : ends[2]]
-    preload[pressed] = spread.break_n + rng.exponential(spread.preload_n, pressed.size)
-    return Fsr(
-        gain,
-        np.maximum(exponent, 0.2),
-        broken,
-        preload.reshape(shape),
-        series,
-        stuck.reshape(shape),
-        dead.reshape(shape),
-        leak_s=spread.leak_s,
-        hysteresis=spread.hysteresis,
-        drift=spread.drift,
-    )

@@ -5,8 +5,8 @@
     floating            the convex problem of `network.solve_floating`
 
 Noise goes through the derivative of the same equations. A tactel whose conductance comes out
-below its own standard deviation is `lost`: the reading only bounds it (by a
-few sigma). A saturated reading is a lower bound only.
+below its own standard deviation is `lost`: the reading only bounds it (by a few sigma). A
+saturated reading is a lower bound only.
 """
 
 from __future__ import annotations
@@ -35,18 +35,6 @@ class ConductanceEstimate:
     conductance_s: Image  #: (..., rows, columns) S; nan where the readings contradict each other
     sigma_s: Image  #: (..., rows, columns) S, standard deviation; inf where saturated
     lost: NDArray[np.bool_]  #: (..., rows, columns) below its noise, saturated or contradictory
-    rank: NDArray[np.int64]  #: (...) directions of the conductances above the noise, of all tactels
-
-    def reason(self) -> str:
-        """Say what is lost, in a line; empty if nothing is."""
-        number = int(self.lost.sum())
-        if not number:
-            return ""
-        places = ", ".join(str(tuple(map(int, p))) for p in np.argwhere(self.lost)[:6])
-        return (
-            f"{number} of {self.lost.size} conductances are not determined, rank "
-            f"{int(self.rank.sum())}: {places}{', ...' if number > 6 else ''}"
-        )
 
 
 def invert_readings(
@@ -81,8 +69,8 @@ def invert_readings(
     >>> counts = np.full((16, 16), 4.0)
     >>> counts[3, 4] = 300
     >>> found = invert_readings(counts, Electronics())
-    >>> bool(found.lost[3, 4]), int(found.rank)
-    (False, 1)
+    >>> int((~found.lost).sum()), bool(found.lost[3, 4])
+    (1, False)
     """
     e = electronics
     read = np.asarray(counts, dtype=np.float64)
@@ -125,12 +113,7 @@ def _invert_driven(share: Image, spread: Image, e: Electronics) -> ConductanceEs
     if e.row_ohm > 0:
         g, sigma = _undo_row_resistance(g, sigma, current, noise, e.row_ohm, column)
     lost = ~possible | ~(g >= sigma)
-    return ConductanceEstimate(
-        np.maximum(g, 0.0),
-        np.where(possible, sigma, np.inf),
-        lost,
-        (~lost).sum(axis=(-2, -1)),
-    )
+    return ConductanceEstimate(np.maximum(g, 0.0), np.where(possible, sigma, np.inf), lost)
 
 
 def _undo_row_resistance(
@@ -179,7 +162,6 @@ def _invert_floating(share: Image, spread: Image, e: Electronics) -> Conductance
     """Invert floating rows, frame by frame."""
     shape = share.shape
     g, sigma, lost = np.empty(shape), np.empty(shape), np.empty(shape, np.bool_)
-    rank = np.empty(shape[:-2], np.int64)
     series = e.load_ohm + e.row_ohm + e.column_ohm
     most = e.volts_ratio * e.load_ohm / series  # of share: a short between row and column
     for index in np.ndindex(shape[:-2]):
@@ -188,25 +170,22 @@ def _invert_floating(share: Image, spread: Image, e: Electronics) -> Conductance
         ratio = e.volts_ratio * e.load_ohm / (offered**2 * resistance)
         relative = np.minimum(spread[index] * ratio, 1.0).ravel()
         found = solve_floating(resistance)
-        deviation, rank[index] = _deviation_and_rank(found, relative)
+        deviation = _deviation(found, relative)
         g[index] = found.conductance_s
         sigma[index] = (deviation / resistance.ravel()).reshape(shape[-2:])
         lost[index] = (found.own.ravel() <= deviation).reshape(shape[-2:])
-    return ConductanceEstimate(g, sigma, lost, rank)
+    return ConductanceEstimate(g, sigma, lost)
 
 
-def _deviation_and_rank(
-    found: FloatingSolution, relative: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], int]:
-    """Return the deviation of y = gR, and how many of its directions the readings determine.
+def _deviation(found: FloatingSolution, relative: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the deviation of y = gR.
 
-    Readings with relative errors `relative` and the bounds 0 <= y <= 1 (as an even prior,
-    whose variance is 1/12) together; the bounds keep a tactel that its neighbours hide from
-    blurring those that are seen.
+    Readings with relative errors `relative` and the bounds 0 <= y <= 1 (as an even prior, whose
+    variance is 1/12) together; the bounds keep a tactel that its neighbours hide from blurring
+    those that are seen.
     """
     weighted = found.hessian / np.maximum(relative, FINEST)[:, None]
     information = weighted.T @ weighted
-    own = found.own.ravel()
-    seen = np.linalg.eigvalsh(information * np.outer(own, own)) >= 1.0
     information[np.diag_indices_from(information)] += 12.0
-    return np.sqrt(np.diagonal(np.linalg.inv(information))), int(seen.sum())
+    deviation: NDArray[np.float64] = np.sqrt(np.diagonal(np.linalg.inv(information)))
+    return deviation

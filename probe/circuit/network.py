@@ -89,10 +89,7 @@ class Network:
 def eliminate(conductance_s: ArrayLike) -> Network:
     """Eliminate a network whose terminals are all open.
 
-    Raises
-    ------
-    CircuitError
-        If a conductance is negative or no number, or the network falls into parts.
+    Raises CircuitError: a conductance is negative or no number, or the network falls into parts.
     """
     g = checked_conductances(conductance_s)
     rows = g.shape[-2]
@@ -119,14 +116,7 @@ def eliminate(conductance_s: ArrayLike) -> Network:
 def effective_resistances(conductance_s: ArrayLike) -> Image:
     """Return the resistance (ohm) between every row and column, all others open.
 
-    Parameters
-    ----------
-    conductance_s
-        (..., rows, columns) S; at least so many above 0 that the network holds together.
-
-    References
-    ----------
-    Foster: the sum of conductance times resistance is rows + columns - 1.
+    `conductance_s` is (..., rows, columns) S; enough of them above 0 to hold the network together.
     """
     return eliminate(conductance_s).resistances_ohm
 
@@ -136,11 +126,8 @@ def transconductances(
 ) -> Image:
     """Return the current out of every column per volt on every row, the other rows at 0 V.
 
-    Every row is fed through `row_ohm`, every column led to ground through `column_ohm`.
-
-    Returns
-    -------
-    (..., rows, columns) S; equal to the conductances where both resistances are 0.
+    Every row is fed through `row_ohm`, every column led to ground through `column_ohm`. (..., rows,
+    columns) S; equal to the conductances where both resistances are 0.
     """
     g = checked_conductances(conductance_s)
     share = 1.0 / (1.0 + column_ohm * g.sum(axis=-2))
@@ -158,11 +145,9 @@ def transconductances(
 def transfers(conductance_s: Image, row_ohm: float, column_ohm: float) -> NDArray[np.float64]:
     """Return the derivative of `transconductances` by the conductances of one network.
 
-    Returns
-    -------
-    (tactels, tactels): a row for each reading, a column for each conductance. By reciprocity
-    an entry is the voltage over the tactel from the row that is driven, times that from the
-    column that is read, if that were driven.
+    (tactels, tactels): a row for each reading, a column for each conductance. By reciprocity an
+    entry is the voltage over the tactel from the row that is driven, times that from the column
+    that is read, if that were driven.
     """
     rows, columns = conductance_s.shape
     count = rows + columns
@@ -272,17 +257,9 @@ class FloatingSolution:
 def solve_floating(resistance_ohm: Image, tolerance: float = 1e-9) -> FloatingSolution:
     """Find the conductances of a network from all its resistances.
 
-    Parameters
-    ----------
-    resistance_ohm
-        (rows, columns) ohm between every row and column with all others open; > 0.
-    tolerance
-        Largest relative change of a conductance in the last step.
-
-    Raises
-    ------
-    CircuitError
-        If a resistance is not above 0, or the steps do not end.
+    `resistance_ohm` (rows, columns) is between every row and column with all others open; > 0.
+    `tolerance` is the largest relative change of a conductance in the last step. Raises
+    CircuitError: a resistance is not above 0, or the steps do not end.
     """
     if not (np.isfinite(resistance_ohm).all() and (resistance_ohm > 0).all()):
         raise CircuitError(

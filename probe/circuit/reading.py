@@ -32,9 +32,8 @@ def read_counts(
     fsr: Fsr,
     state: FilmState | None,
     rng: np.random.Generator,
-    elapsed_s: float | None = None,
 ) -> tuple[Counts, FilmState]:
-    """Read a frame.
+    """Read a frame; returns counts (u16, of the forces' shape) and the new state.
 
     Parameters
     ----------
@@ -46,12 +45,6 @@ def read_counts(
         What the frame before returned; None for a sensor that was not loaded yet.
     rng
         Source of the noise.
-    elapsed_s
-        Time since the frame before, s; the board's frame time by default.
-
-    Returns
-    -------
-    Counts, u16 of the forces' shape, and the new state.
 
     Raises
     ------
@@ -67,10 +60,8 @@ def read_counts(
     >>> np.unravel_index(counts.argmax(), counts.shape) == (3, 4)
     True
     """
-    passed = electronics.frame_s if elapsed_s is None else elapsed_s
-    fresh = state is None
-    conductance, now = conductances(fsr, forces_n, state, passed)
-    flutter = _contact_noise(now.flutter, electronics, fresh, passed, rng)
+    conductance, now = conductances(fsr, forces_n, state, electronics.frame_s)
+    flutter = _contact_noise(now.flutter, electronics, state is None, rng)
     offered = scan_shares(shares(conductance, electronics), electronics) * electronics.full
     counts = _sample_adc(offered, flutter, electronics, rng)
     return counts, FilmState(now.effective_n, now.age_s, flutter)
@@ -83,12 +74,9 @@ def read_sequence(
     state: FilmState | None,
     rng: np.random.Generator,
 ) -> tuple[Counts, FilmState]:
-    """Read frames that follow each other at the board's frame time; see `read_counts`.
+    """Read frames of forces (N, rows, columns), N >= 1, that follow at the board's frame time.
 
-    Parameters
-    ----------
-    forces_n
-        (N, rows, columns) N, N >= 1.
+    See `read_counts`.
     """
     forces = checked_forces(fsr, forces_n)
     if forces.ndim != 3 or not len(forces):
@@ -103,13 +91,15 @@ def read_sequence(
 
 
 def _contact_noise(
-    before: Image, electronics: Electronics, fresh: bool, passed_s: float, rng: np.random.Generator
+    before: Image, electronics: Electronics, fresh: bool, rng: np.random.Generator
 ) -> Image:
     """Return the contact's noise of this frame: unit variance, exponential correlation."""
     noise = electronics.noise
     if noise.contact_lsb == 0:
         return before
-    kept = 0.0 if fresh or noise.contact_s == 0 else math.exp(-passed_s / noise.contact_s)
+    kept = (
+        0.0 if fresh or noise.contact_s == 0 else math.exp(-electronics.frame_s / noise.contact_s)
+    )
     return kept * before + math.sqrt(1.0 - kept * kept) * rng.standard_normal(before.shape)
 
 

@@ -104,15 +104,8 @@ class Client:
     def frames(self, timeout_s: float | None = None) -> Iterator[Frame]:
         """Yield trusted frames until the client is closed, or a recording ends.
 
-        Parameters
-        ----------
-        timeout_s
-            End when no frame came for so long; None waits for ever.
-
-        Raises
-        ------
-        PortError
-            When nothing answers, or the port went away for good.
+        It ends, too, when no frame came for `timeout_s`. Raises PortError: nothing answers, or the
+        port went away for good.
         """
         while True:
             with self._ready:
@@ -156,11 +149,6 @@ class Client:
         """Read another sensor, 0 ... 7, from one of the next frames on."""
         self._sensor = sensor_command(sensor)
         self._send(self._sensor + Command.IDENT)
-
-    def select_bits(self, bits: int) -> None:
-        """Read with 8 or 10 bits from one of the next frames on."""
-        self._bits = bits_command(bits)
-        self._send(self._bits + Command.IDENT)
 
     def close(self) -> None:
         """Stop the stream and let go of the port; may be called twice."""
@@ -293,17 +281,7 @@ class Client:
 
 
 def diagnose_silence(damages: Mapping[Damage, int], waited_s: float, url: str) -> PortError:
-    """Return the error for a port at which no probe answered.
-
-    Parameters
-    ----------
-    damages
-        How many blocks failed, and why.
-    waited_s
-        How long a packet was waited for.
-    url
-        Of the port.
-    """
+    """Return the error for a port at which no probe answered for so long, and what came instead."""
     if damages[Damage.VERSION]:
         cause = f"the device speaks another version of the protocol, not {VERSION}"
         fix = "flash the firmware that belongs to this programme"

@@ -85,14 +85,9 @@ class FrameOrder:
         self._failed_bytes += length
 
     def take(self, packet: Packet, now_ns: int) -> Frame | None:
-        """Take the next packet; return the frame that it confirms, if it does.
+        """Take the next packet, checked by itself; return the frame that it confirms, if it does.
 
-        Parameters
-        ----------
-        packet
-            As it came, after its own check.
-        now_ns
-            The host's monotonic clock, ns. Only the pause at a reboot is measured by it.
+        `now_ns` is the host's monotonic clock; only the pause at a reboot is measured by it.
         """
         held, failed = self._taken()
         self._held = packet if isinstance(packet, FramePacket) else None

@@ -22,17 +22,9 @@ _IDENT_S = 2.0  #: for which a stream waits for the description of the probe
 
 
 class Stream:
-    """The frames of a probe; a context manager that lets go of the port too.
+    """The frames of a `Client`; a context manager that lets go of the port too.
 
-    Parameters
-    ----------
-    url, sensor, bits
-        As of a `Client`.
-
-    Raises
-    ------
-    PortError
-        When the port cannot be opened.
+    Raises PortError when the port cannot be opened.
     """
 
     def __init__(self, url: str, *, sensor: int | None = None, bits: int | None = None) -> None:
@@ -62,10 +54,7 @@ class Stream:
     def take(self, timeout_s: float) -> list[Frame]:
         """Return all frames that wait; none if none came in `timeout_s`, or at the end.
 
-        Raises
-        ------
-        ProbeError
-            When the probe went away for good, or a recording is damaged.
+        Raises ProbeError: the probe went away for good, or a recording is damaged.
         """
         frames: list[Frame] = []
         try:
@@ -114,12 +103,7 @@ class Stream:
 def name_of(ident: IdentPacket | None, url: str) -> str:
     """Return how recordings and calibrations call the sensor that is read; empty: unknown.
 
-    A recording that is played names the sensor that made it.
-
-    Raises
-    ------
-    RecordingError
-        When that recording cannot be read any more.
+    A recording that is played names the sensor that made it; RecordingError if it is gone.
     """
     address = address_of(url)
     if address.scheme == "file":

@@ -1,14 +1,14 @@
 """`probe-sensor`: list, info, types, calibrate, record, replay, export, simulate, live.
 
-    app            the commands and their options
+    app, options   the commands; their options
     listed         list, types
     described      info
     recorded       record, replay
     exported       export, import
-    calibrated     calibrate bias | loads;  loads: which are given, laws: the result in words
+    calibrated     calibrate bias | loads
     guided         calibrate port
     simulated      simulate
-    live           live;  live_state, live_view
+    live           live;  live_state: what the keys change
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 ran but failed,
 2 bad input, 3 device, 4 database, 130 interrupted. Nothing heavy is imported before it is
@@ -23,23 +23,22 @@ from typing import TYPE_CHECKING, NoReturn
 from encoded_objects.base import console
 
 if TYPE_CHECKING:
-    from typer import Typer
+    from encoded_objects.base.options import Application
 
 NAME = "probe-sensor"
-GROUPS = ("calibrate",)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `probe-sensor` and leave with its exit code."""
-    console.main(NAME, application, arguments, groups=GROUPS)
+    console.main(NAME, application, arguments)
 
 
 def run(arguments: list[str]) -> int:
     """Run one command; returns its exit code. Errors are reported, not raised."""
-    return console.run(NAME, application, arguments, groups=GROUPS)
+    return console.run(NAME, application, arguments)
 
 
-def application(_arguments: list[str]) -> Typer:
+def application(_arguments: list[str]) -> Application:
     """Return the application that reads the arguments."""
     from probe.command.app import app
 

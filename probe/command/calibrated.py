@@ -1,8 +1,14 @@
-"""`probe-sensor calibrate bias | loads`: recordings of loads -> the laws of a sensor."""
+"""`probe-sensor calibrate bias | loads`: recordings of loads -> the laws of a sensor, in words.
+
+Loads come from the command line, or from a table (CSV).
+"""
 
 from __future__ import annotations
 
+import csv
 import datetime
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -15,37 +21,28 @@ from encoded_objects.base.files import refuse_taken
 from encoded_objects.base.output import message, pairs, warning, write, write_json
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.calibration import (
+    Calibration,
+    Condition,
+    calibrate_image,
     calibration_from,
     calibration_hash,
     drift_of,
     even_load,
+    expected_counts,
     read_calibration,
     write_calibration,
 )
-from probe.calibration.condition import common_bias, raised_tactels
+from probe.calibration.condition import common_bias, raised_tactels, tactel_words
 from probe.calibration.load import average_frames
 from probe.circuit import Electronics
 from probe.client.stream import Stream, name_of
-from probe.command.laws import condition_map, describe_laws, places
-from probe.command.loads import LoadRecording
+from probe.command.options import GuideOptions, LoadsOptions
 from probe.errors import CalibrationError, CircuitError, PortError
 from probe.port.url import means_port, typed_port
 from probe.recording.layout import FrameBlock
 from probe.recording.read import Recording
 
 Counts = NDArray[np.uint16]
-
-
-@dataclass(frozen=True, slots=True)
-class LawOptions:
-    """How laws are fitted, and where they go."""
-
-    output: Path
-    board: Electronics | None
-    sensor_type: str = ""
-    made: str = ""  #: ISO 8601; empty: now
-    replace: bool = False
-    as_json: bool = False
 
 
 def report_bias(
@@ -59,12 +56,7 @@ def report_bias(
 ) -> int:
     """Print the readings of an unloaded sensor; returns the exit code.
 
-    Raises
-    ------
-    PortError, RecordingError
-        The source is not there, or gives no frame.
-    SensorTypeError
-        No such type, or one of another shape.
+    Raises PortError, RecordingError: no such source, or it gives no frame; SensorTypeError.
     """
     counts, name, kind = _frames_of(source, sensor, seconds, sensor_type)
     rest = average_frames(counts, source)
@@ -101,17 +93,15 @@ def report_bias(
     return FAILED if trouble else 0
 
 
-def calibrate_loads(given: list[LoadRecording], options: LawOptions, sensor: str = "") -> int:
+def calibrate_loads(
+    given: list[LoadRecording], options: LoadsOptions | GuideOptions, sensor: str
+) -> int:
     """Calibrate from recordings and write the file; returns the exit code.
 
-    Raises
-    ------
-    CalibrationError
-        Loads are missing or of different sensors; the message names the load to add.
-    RecordingError
-        A recording cannot be read.
+    Raises CalibrationError: loads are missing (it names the one to add) or of different sensors;
+    RecordingError: a recording cannot be read.
     """
-    output, board, made = options.output, options.board, options.made
+    output, board = options.output, board_from(options.board)
     refuse_taken(output, ".json", replace=options.replace)
     rest = [load for load in given if load.newtons == 0]
     if not rest:
@@ -122,16 +112,12 @@ def calibrate_loads(given: list[LoadRecording], options: LawOptions, sensor: str
     kind = Recording(rest[0].recording).sensor_type(options.sensor_type)
     even = kind.present().astype(np.float64) if kind.missing else None
     loads = [
-        even_load(
-            _counts(load),
-            load.newtons,
-            even if load.footprint is None else load.footprint,
-            f"{load.newtons:g} N",
-        )
+        even_load(_counts(load), load.newtons,
+                  even if load.footprint is None else load.footprint, f"{load.newtons:g} N")
         for load in given
         if load.newtons > 0
-    ]
-    when = made or datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    ]  # fmt: skip
+    when = options.made or datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     found = calibration_from(counts, loads, sensor=name, made=when, board=board, full=kind.full)
     digest = write_calibration(found, output)
     values, lines = describe_laws(found, digest, str(output))
@@ -140,18 +126,15 @@ def calibrate_loads(given: list[LoadRecording], options: LawOptions, sensor: str
     else:
         pairs(lines)
         if found.bad.any():
-            write("\n" + condition_map(found))
+            letters = (" ".join(Condition(int(one)).letter for one in row)
+                       for row in found.condition)  # fmt: skip
+            rows = "\n".join(letters)
+            write(f"\n{rows}\n. sound  D dead  S stuck  P preloaded  H hidden")
     return 0
 
 
 def board_from(text: str) -> Electronics | None:
-    """Read a board from the command line.
-
-    Raises
-    ------
-    CircuitError
-        When a name is unknown, or a value is none.
-    """
+    """Read a board from the command line; CircuitError when a name or value is none."""
     if text in ("", "none"):
         return None
     if text == "simulated":
@@ -220,3 +203,158 @@ def _listen(stream: Stream, seconds: float) -> Counts:
                 return np.stack(images)
             images.append(frame.counts)
     return np.stack(images) if images else FrameBlock.empty().counts
+
+
+_COLUMNS = ("recording", "newtons", "footprint")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadRecording:
+    """A recording of one steady load."""
+
+    recording: Path
+    newtons: float  #: in all; 0: the unloaded sensor
+    footprint: NDArray[np.float64] | None = None  #: (rows, columns) shares covered; None: all
+
+
+def loads_given(words: list[str]) -> list[LoadRecording]:
+    """Read loads as they stand on the command line: recording=newtons, or the name of a table.
+
+    Raises CalibrationError: a word is neither, or a table cannot be read.
+    """
+    given: list[LoadRecording] = []
+    for word in words:
+        name, mark, newtons = word.rpartition("=")
+        if mark:
+            given.append(LoadRecording(Path(name), _newtons(newtons, word)))
+        elif Path(word).suffix.lower() == ".csv":
+            given += _read_list(Path(word))
+        else:
+            raise CalibrationError(
+                "no load is given with it", fix=f"write {word}=NEWTONS, 0 for the unloaded sensor",
+                place=word,
+            )  # fmt: skip
+    return given
+
+
+def write_list(path: Path, given: Iterable[LoadRecording]) -> None:
+    """Write loads as a table; names are those of files in its folder."""
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_COLUMNS[:2])
+        writer.writerows((load.recording.name, f"{load.newtons:g}") for load in given)
+
+
+def _read_list(path: Path) -> list[LoadRecording]:
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise CalibrationError(
+            f"cannot be read: {reason}", fix="give a table of loads (CSV)", place=str(path)
+        ) from error
+    given = []
+    for number, row in enumerate(rows, 2):
+        place = f"{path}:{number}"
+        unknown = [str(name) for name in row if name not in _COLUMNS]
+        if unknown or not row.get("recording") or not row.get("newtons"):
+            raise CalibrationError(
+                f"unknown columns {', '.join(unknown)}" if unknown
+                else "recording or newtons is missing",
+                fix=f"the columns are {', '.join(_COLUMNS)}", place=place,
+            )  # fmt: skip
+        footprint = row.get("footprint") or ""
+        given.append(
+            LoadRecording(
+                path.parent / row["recording"],
+                _newtons(row["newtons"], place),
+                _footprint(path.parent / footprint) if footprint else None,
+            )
+        )
+    return given
+
+
+def _newtons(text: str, place: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise CalibrationError(f"{text!r} is no force", fix="give newtons, 0 or more", place=place)
+    return value
+
+
+def _footprint(path: Path) -> NDArray[np.float64]:
+    try:
+        shares = np.loadtxt(path, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
+        raise CalibrationError(
+            f"cannot be read: {error}", fix="give a line a row of numbers with commas between",
+            place=str(path),
+        ) from error  # fmt: skip
+    return shares
+
+
+_SHARES = (0.1, 0.3, 1.0)  # of the largest load: where the uncertainty is stated
+
+
+def describe_laws(
+    found: Calibration, digest: str, name: str
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return a calibration as values, and as lines to read."""
+    alive = ~found.bad
+    most_n = float(np.nanmedian(found.most_n)) if alive.any() else math.nan
+    errors = [_uncertainty(found, share * most_n) for share in _SHARES] if alive.any() else []
+    unsound = {
+        condition.name.lower(): found.condition == condition
+        for condition in Condition
+        if condition != Condition.SOUND
+    }
+    values = {
+        "file": name,
+        "hash": digest,
+        "sensor": found.sensor,
+        "made": found.made,
+        "board": None if found.board is None else found.board.readout,
+        "loads": list(found.loads),
+        "sound": int((found.condition == Condition.SOUND).sum()),
+        **{title: np.argwhere(where) for title, where in unsound.items()},
+        "scatter": found.scatter,
+        "uncertainty": [
+            {"force_n": force, "median": median, "worst_of_95": worst}
+            for force, median, worst in errors
+        ],
+    }
+    lines = {
+        "calibration": name,
+        "hash": digest,
+        "sensor": found.sensor or "not named",
+        "made": found.made or "not dated",
+        "board": "none: counts above the bias" if found.board is None
+        else f"{found.board.readout}, {found.board.bits} bits",
+        "loads": ", ".join(found.loads),
+        "sound": f"{values['sound']} of {alive.size} tactels",
+        **{title: places(where) for title, where in unsound.items() if where.any()},
+        "fit": f"{found.scatter:.2f} (loads miss the law by so many of their errors)",
+    }  # fmt: skip
+    for force, median, worst in errors:
+        lines[f"at {force:.2g} N"] = (
+            f"+-{100 * median:.1f} % in one frame, of 95 % of the tactels +-{100 * worst:.1f} %"
+        )
+    return values, lines
+
+
+def _uncertainty(found: Calibration, force_n: float) -> tuple[float, float, float]:
+    """Return a force, and its relative error in one frame: median, and 95 % of the tactels."""
+    forces = np.full(found.shape, force_n)
+    read = calibrate_image(expected_counts(forces, found), found)
+    errors = (read.sigma / force_n)[~read.bad]
+    if not errors.size:
+        return force_n, math.inf, math.inf
+    return force_n, float(np.median(errors)), float(np.quantile(errors, 0.95))
+
+
+def places(where: NDArray[np.bool_]) -> str:
+    """Return tactels in words; empty if there are none."""
+    return tactel_words(where) if where.any() else ""

@@ -13,7 +13,7 @@ from encoded_objects.base.output import count_of, pairs, write_json
 from encoded_objects.base.sensor_type import SensorType
 from probe.calibration import calibration_hash, read_calibration
 from probe.client.stream import Stream, name_of
-from probe.command.laws import describe_laws
+from probe.command.calibrated import describe_laws
 from probe.port.url import means_port, typed_port
 from probe.recording.read import Recording
 
@@ -28,12 +28,8 @@ def describe(
 ) -> int:
     """Print a description of a port, a recording or a calibration; returns the exit code.
 
-    Raises
-    ------
-    PortError
-        The probe is not there, or it is no probe.
-    RecordingError, CalibrationError
-        The file is none of these, damaged, changed, or not closed.
+    Raises PortError: the probe is not there, or it is no probe; RecordingError, CalibrationError:
+    the file is none of these, damaged, changed, or not closed.
     """
     if means_port(what):
         values, lines = _describe_probe(what, sensor, seconds, sensor_type)

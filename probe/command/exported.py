@@ -12,8 +12,8 @@ from encoded_objects.base.errors import require
 from encoded_objects.base.files import refuse_taken, staged_file
 from encoded_objects.base.output import count_of, write, write_json
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from probe.calibration import Calibration, calibrate_image, read_calibration
-from probe.command.app import ExportOptions
+from probe.calibration import Calibration, calibrate_image, calibration_hash, read_calibration
+from probe.command.options import ExportOptions
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import median_filter
 from probe.recording.read import Recording
@@ -26,10 +26,8 @@ def export_files(options: ExportOptions) -> int:
     ------
     RecordingError
         The recording cannot be read, or has no such frame.
-    CalibrationError
-        The calibration is none, or of another sensor.
-    ContactError
-        The blur of a pad so high cannot be taken back.
+    CalibrationError, ContactError
+        The calibration is of another sensor; the blur of a pad so high cannot be taken back.
     EncodedObjectsError
         A file is there already.
     """
@@ -92,13 +90,8 @@ def report_import(made: Recording, source: Path, *, as_json: bool) -> int:
 def calibration_for(path: Path, recording: Recording) -> Calibration:
     """Read the calibration of the sensor that made a recording.
 
-    Raises
-    ------
-    CalibrationError
-        When the recording names another calibration, or another sensor.
+    Raises CalibrationError: the recording names another calibration, or another sensor.
     """
-    from probe.calibration import calibration_hash
-
     known = read_calibration(path, sensor=recording.origin.sensor or None)
     named = recording.origin.calibration
     if named and named != calibration_hash(known):
@@ -157,7 +150,7 @@ def _newtons(
 def _array(
     recording: Recording, out: Path, known: Calibration | None, pad: SensorType | None
 ) -> None:
-    shape = (len(recording), *recording.block(0, 0).counts.shape[1:])
+    shape = (len(recording), *recording.shape)
     with staged_file(out) as draft, open(draft, "wb") as file:
         dtype = np.dtype("<u2" if known is None else "<f4")
         header = {"descr": dtype.str, "fortran_order": False, "shape": shape}

@@ -17,9 +17,8 @@ from encoded_objects.base.output import message
 from encoded_objects.base.sensor_type import choose_sensor_type
 from probe.calibration.guide import CalibrationGuide
 from probe.client.stream import Stream, name_of
-from probe.command.app import GuideOptions
-from probe.command.calibrated import LawOptions, board_from, calibrate_loads
-from probe.command.loads import LoadRecording, write_list
+from probe.command.calibrated import LoadRecording, board_from, calibrate_loads, write_list
+from probe.command.options import GuideOptions
 from probe.errors import CalibrationError, PortError
 from probe.port.url import typed_port
 from probe.recording.record import Recorder
@@ -31,18 +30,11 @@ _SILENT_S: Final = 5.0  #: without a frame for so long, a load is not read any f
 def guide_loads(options: GuideOptions) -> int:
     """Lead through a calibration; returns the exit code.
 
-    Raises
-    ------
-    PortError
-        The probe is not there, or goes away.
-    CalibrationError
-        The loads do not determine the laws, and no more are given.
+    Raises PortError: the probe is not there, or goes away; CalibrationError: the loads do not
+    determine the laws, and no more are given.
     """
     output, folder = options.output, options.folder or options.output.with_suffix("")
-    laws = LawOptions(
-        output, board_from(options.board), options.sensor_type, options.made, options.replace,
-        options.as_json,
-    )  # fmt: skip
+    board_from(options.board)  # refuses a wrong one before anything is read
     refuse_taken(output, ".json", replace=options.replace)
     folder.mkdir(parents=True, exist_ok=True)
     refuse_taken(folder / LIST, ".csv", replace=options.replace)
@@ -63,7 +55,7 @@ def guide_loads(options: GuideOptions) -> int:
                         recorder.append(frame)
             write_list(folder / LIST, given)
             try:
-                return calibrate_loads(given, laws, sensor)
+                return calibrate_loads(given, options, sensor)
             except CalibrationError as error:
                 message(f"not yet: {error.cause}\n  {error.fix}")
                 more_n = _another_load()
@@ -73,7 +65,7 @@ def guide_loads(options: GuideOptions) -> int:
 
 
 def _lead_through_step(guide: CalibrationGuide, stream: Stream, url: str) -> None:
-    """Have one load put on, read it, and say how it was felt; again if the operator wants."""
+    """Have one load put on, read it, and describe it; again if the operator wants."""
     force, number = guide.newtons, f"{guide.step + 1}/{guide.steps}"
     what = f"put {force:g} N on the whole sensor, evenly" if force else "unload the sensor"
     while True:
@@ -100,13 +92,7 @@ def _lead_through_step(guide: CalibrationGuide, stream: Stream, url: str) -> Non
 
 
 def _ask(prompt: str) -> str:
-    """Return a line of the operator's.
-
-    Raises
-    ------
-    CalibrationError
-        When there is nobody to answer.
-    """
+    """Return a line of the operator's; CalibrationError when there is nobody to answer."""
     sys.stderr.write(prompt)
     sys.stderr.flush()
     line = sys.stdin.readline()

@@ -1,4 +1,9 @@
-"""`probe-sensor live`: on a terminal by `rich.live` and keys, elsewhere a line a second."""
+"""`probe-sensor live`: on a terminal by `rich.live` and keys, elsewhere a line a second.
+
+The picture is one of characters: heat map at the left, counts at the right. A tactel is a block of
+two characters, or, in a terminal that is too low for that, half a character: two rows of tactels
+share a line.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +15,39 @@ import time
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from itertools import groupby
+from textwrap import wrap
 from threading import Event
 
-from rich.console import Console
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.live import Live
+from rich.segment import Segment
+from rich.style import Style
 
 from encoded_objects.base.console import INTERRUPTED, interruption
 from encoded_objects.base.output import message, write, write_json
 from probe.calibration import read_calibration
+from probe.client import ClientStatistics
 from probe.client.stream import Stream, name_of
-from probe.command.app import LiveOptions
 from probe.command.live_state import LiveState
-from probe.command.live_view import line_of, render_frame
+from probe.command.options import LiveOptions
 from probe.port.url import typed_port
+from probe.protocol import IdentPacket
 
+LEVELS = 64
+AROUND = 6  #: lines of the view besides those of the image; in fewer a tactel is half a character
+KEYS = "q quit  space pause  0-7 sensor  b bias  m median  s save  r record"
+#: black, violet, red, orange, pale yellow: rises in brightness, also without hue
+_ANCHORS = ((8, 6, 16), (74, 12, 107), (165, 44, 96), (237, 105, 37), (251, 180, 26),
+            (252, 255, 164))  # fmt: skip
+SHADES = " .:-=+*#%@"
+UPPER_HALF = "\u2580"  # its foreground stands over its background
+GAP = 3  # characters
+BOLD, DIM, YELLOW, RED = map(Style.parse, ("bold", "dim", "yellow", "bold red"))
 _PICTURES_HZ = 15
 KeyReader = Callable[[float], str]
 """Returns what was typed within so many seconds, as soon as something was; else nothing."""
@@ -33,14 +56,8 @@ KeyReader = Callable[[float], str]
 def watch(options: LiveOptions) -> int:
     """Show a probe until the operator quits, a recording ends, or the time is over.
 
-    Raises
-    ------
-    PortError
-        The probe is not there, or went away for good.
-    CalibrationError
-        The calibration is none, or another sensor's.
-    SensorTypeError
-        No such type, or frames of another shape.
+    Raises PortError: the probe is not there, or went away for good; CalibrationError,
+    SensorTypeError: none, or of another sensor.
     """
     url, calibration, seconds = options.url, options.calibration, options.seconds
     known = None if calibration is None else read_calibration(calibration)
@@ -151,5 +168,147 @@ def _keys() -> Iterator[KeyReader]:
 
 
 def _no_keys(timeout_s: float) -> str:
-    select.select([], [], [], max(timeout_s, 0.0))
+    time.sleep(max(timeout_s, 0.0))
     return ""
+
+
+@dataclass(frozen=True, slots=True)
+class LivePicture:
+    """Lines of pieces of text; cheaper to draw than tables."""
+
+    lines: list[list[Segment]]
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        for number, line in enumerate(self.lines):
+            if number:
+                yield Segment.line()
+            yield from line
+
+
+def render_frame(
+    state: LiveState,
+    counts: ClientStatistics,
+    ident: IdentPacket | None,
+    *,
+    height: int,
+    colours: bool,
+) -> LivePicture:
+    """Return the whole view in a terminal of `height` lines.
+
+    Without `colours` readings are characters of rising weight.
+    """
+    image = state.image()
+    if image is None:
+        blocks = [[Segment("waiting for frames ...")]]
+    else:
+        small = height < len(image) + AROUND
+        blocks = heat_map(image / state.scale, small=small, colours=colours)
+    numbers = _numbers(state, image, counts, ident)[: max(height - 5, 4)]
+    wide = max(sum(len(part.text) for part in line) for line in blocks)
+    lines = [_head(state)]
+    for i in range(max(len(blocks), len(numbers))):
+        left = blocks[i] if i < len(blocks) else [Segment(" " * wide)]
+        lines.append([*left, Segment(" " * GAP), *(numbers[i] if i < len(numbers) else ())])
+    lines += [_legend(state, colours), [Segment(KEYS, DIM)]]
+    lines += [[Segment(text, YELLOW)] for text in wrap(state.notice, len(KEYS))]
+    return LivePicture(lines)
+
+
+def heat_map(share: NDArray[np.float64], *, small: bool, colours: bool) -> list[list[Segment]]:
+    """Return readings (rows, columns), 0 ... 1 of the scale, as lines of blocks.
+
+    `small`: two rows of tactels a line, without colours the larger of the two.
+    """
+    if small and len(share) % 2:
+        share = np.pad(share, ((0, 1), (0, 0)))
+    if not colours:
+        shades = np.clip((share * len(SHADES)).astype(int), 0, len(SHADES) - 1)
+        wide, rows = (1, np.maximum(shades[::2], shades[1::2])) if small else (2, shades)
+        return [[Segment("".join(SHADES[shade] * wide for shade in row))] for row in rows.tolist()]
+    levels = np.clip((share * (LEVELS - 1)).round().astype(int), 0, LEVELS - 1)
+    above, under = (levels[::2], levels[1::2]) if small else (levels, levels)
+    block = UPPER_HALF if small else "  "
+    return [
+        [Segment(block * len(list(equal)), _style(*pair))
+         for pair, equal in groupby(zip(*rows, strict=True))]
+        for rows in zip(above.tolist(), under.tolist(), strict=True)
+    ]  # fmt: skip
+
+
+def line_of(state: LiveState, counts: ClientStatistics) -> str:
+    """Return the view in one line, where there is no terminal."""
+    image = state.image()
+    if image is None:
+        return "waiting for frames"
+    return (
+        f"frame {state.frame.seq if state.frame else 0}  {counts.rate:.1f}/s  "
+        f"lost {counts.lost}  failed {counts.failed}  reboots {counts.reboots}  "
+        f"peak {_reading(float(image.max()), state.unit)} at {_place(image)}"
+    )
+
+
+def _head(state: LiveState) -> list[Segment]:
+    head = [Segment("probe-sensor  ", BOLD)]
+    if state.recorder is not None:
+        recorded = f"{state.recorder.path.name}, {state.recorder.frames:,} frames  "
+        head += [Segment("REC ", RED), Segment(recorded)]
+    if state.paused:
+        head += [Segment("PAUSED  ", RED)]
+    return [*head, Segment(state.url)]
+
+
+def _numbers(
+    state: LiveState,
+    image: NDArray[np.float64] | None,
+    counts: ClientStatistics,
+    ident: IdentPacket | None,
+) -> list[list[Segment]]:
+    name = "..." if ident is None else f"{ident.sensor} of {ident.name}, {ident.bits} bits"
+    chosen = [word for word, on in (("bias off the image", state.bias is not None),
+                                    ("taking bias", state.taking_bias),
+                                    ("median 3x3", state.median)) if on]  # fmt: skip
+    trouble = ("lost", "failed", "reboots", "reopenings", "overruns")
+    counted = {title: f"{getattr(counts, title):,}" for title in trouble}
+    rows = {"rate": f"{counts.rate:.1f} frames/s", "frames": f"{counts.frames:,}", **counted}
+    rows |= {"sensor": name, "calibration": state.age()}
+    if image is not None:
+        rows["peak"] = f"{_reading(float(image.max()), state.unit)} at {_place(image)}"
+        rows["sum"] = _reading(float(image.sum()), state.unit)
+    rows["filter"] = ", ".join(chosen) or "none"
+    return [
+        [Segment(f"{title:<13}", DIM),
+         Segment(value, YELLOW if title in trouble and value != "0" else None)]
+        for title, value in rows.items()
+    ]  # fmt: skip
+
+
+def _legend(state: LiveState, colours: bool) -> list[Segment]:
+    scale = [Segment(SHADES)]
+    if colours:
+        scale = [Segment(" ", _style(level, level)) for level in range(0, LEVELS, 4)]
+    return [Segment("0 "), *scale, Segment(f" {_reading(state.scale, state.unit)}")]
+
+
+def _reading(value: float, unit: str) -> str:
+    return f"{value:,.2f} N" if unit == "N" else f"{value:,.0f} counts"
+
+
+def _place(image: NDArray[np.float64]) -> str:
+    row, column = divmod(int(image.argmax()), image.shape[1])
+    return f"({row}, {column})"
+
+
+@lru_cache(maxsize=LEVELS * LEVELS)
+def _style(upper: int, lower: int) -> Style:
+    """Return the colours of a block: foreground of the upper level, background of the lower."""
+    return Style(color=_colour(upper), bgcolor=_colour(lower))
+
+
+def _colour(level: int) -> str:
+    at = level / (LEVELS - 1) * (len(_ANCHORS) - 1)
+    low = min(int(at), len(_ANCHORS) - 2)
+    channels = [
+        round(a + (at - low) * (b - a))
+        for a, b in zip(_ANCHORS[low], _ANCHORS[low + 1], strict=True)
+    ]
+    return "#{:02x}{:02x}{:02x}".format(*channels)

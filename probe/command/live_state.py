@@ -58,12 +58,8 @@ class LiveState:
     def take(self, frames: list[Frame]) -> None:
         """Take the next frames: record them, and show the last.
 
-        Raises
-        ------
-        RecordingError
-            When the disk is full; the recording is closed.
-        SensorTypeError
-            When the first frame is of another shape than the type.
+        Raises RecordingError: the disk is full, the recording is closed; SensorTypeError: the first
+        frame is of another shape than the type.
         """
         if frames and self.frame is None:
             rows, columns = frames[0].counts.shape

@@ -23,7 +23,7 @@ from encoded_objects.base.output import (
 from encoded_objects.base.sensor_type import choose_sensor_type
 from probe.calibration import Calibration, calibration_hash, read_calibration
 from probe.client.stream import Stream, name_of
-from probe.command.app import RecordOptions
+from probe.command.options import RecordOptions
 from probe.errors import PortError, RecordingError
 from probe.frame import Frame
 from probe.port.url import typed_port
@@ -44,10 +44,8 @@ def record_port(options: RecordOptions) -> int:
         The probe is not there, or went away for good; then the file holds the frames that came.
     RecordingError
         The file cannot be written.
-    CalibrationError
-        The calibration is none, or another sensor's.
-    SensorTypeError
-        No such type, or frames of another shape.
+    CalibrationError, SensorTypeError
+        The calibration or the type is none, or of another sensor.
     """
     url, calibration = options.url, options.calibration
     check_output(options.output, replace=options.replace)
@@ -87,13 +85,7 @@ def record_port(options: RecordOptions) -> int:
 
 
 def check_output(output: Path, *, replace: bool) -> None:
-    """Refuse a name for a recording before anything else is done.
-
-    Raises
-    ------
-    RecordingError
-        When it is no name for one, or is taken.
-    """
+    """Refuse a name for a recording (RecordingError), with --replace as the way out."""
     try:
         check_name(output, replace=replace)
     except RecordingError as error:

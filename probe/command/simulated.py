@@ -14,7 +14,7 @@ from encoded_objects.base.console import INTERRUPTED, interruption
 from encoded_objects.base.errors import require
 from encoded_objects.base.files import refuse_taken, staged_file
 from encoded_objects.base.output import message, progress_bar, write, write_json
-from probe.command.app import SimulateOptions
+from probe.command.options import SimulateOptions
 from probe.command.recorded import check_output
 from probe.simulate.simulation import SimulatedProbe, SimulatedTouch, TouchOptions
 
@@ -25,12 +25,8 @@ if TYPE_CHECKING:
 def simulate_touches(options: SimulateOptions) -> int:
     """Simulate and write; returns the exit code. The files of an interrupted run are complete.
 
-    Raises
-    ------
-    ContactError
-        A touch has no equilibrium.
-    RecordingError, EncodedObjectsError
-        A file is there already, or its name is wrong.
+    Raises ContactError: a touch has no equilibrium; RecordingError, EncodedObjectsError: a file is
+    there already, or its name is wrong.
     """
     output, png, truth = options.output, options.png, options.truth
     _check_outputs(options)

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 from html import escape
+from typing import NamedTuple
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.kit import sizes
@@ -22,8 +22,7 @@ LOAD_OHM = 1000  #: of film of 100 uS / N under 20 to 120 N (docs/probe.md, "Whi
 Connection = tuple[str, str, str, str]  # from, its pin, to, its pin
 
 
-@dataclass(frozen=True, slots=True)
-class Item:
+class Item(NamedTuple):
     """A line of the parts list."""
 
     what: str

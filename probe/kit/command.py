@@ -76,11 +76,10 @@ def _text(made: Kit) -> str:
         lines.append(f"  {part.name:16} {x:.1f} x {y:.1f} x {z:.1f} mm, {part.what}")
         if part.bed_hint:
             lines.append(f"  {'':16} {part.bed_hint}")
-    side = made.coupon.side_mm
-    lines.append(f"  {'coupon':16} {side:g} x {side:g} mm, {made.coupon.symbols} symbols, for the "
-                 "first touch")  # fmt: skip
-    if made.reports:
-        lines.append(f"  verified: {len(made.reports)} parts, each one valid closed solid")
+    side, symbols = made.coupon.side_mm, made.coupon.part.symbols
+    lines.append(f"  {'coupon':16} {side:g} x {side:g} mm, {symbols} symbols, for the first touch")
+    if made.verified:
+        lines.append(f"  verified: {made.verified} parts, each one valid closed solid")
     return "\n".join([*lines, f"next: open {made.folder / 'sheet.html'}"])
 
 
@@ -90,9 +89,9 @@ def _json(made: Kit) -> dict[str, Any]:
         "files": [str(file) for file in made.files],
         "parts": [{"name": part.name, "size_mm": part.size_mm, "volume_mm3": part.volume_mm3}
                   for part in made.parts],
-        "coupon": {"face": made.coupon.face, "side_mm": made.coupon.side_mm,
-                   "symbols": made.coupon.symbols, "pitch_mm": made.coupon.pitch_mm},
-        "verified": len(made.reports),
+        "coupon": {"face": made.coupon.part.name, "side_mm": made.coupon.side_mm,
+                   "symbols": made.coupon.part.symbols, "pitch_mm": made.coupon.pitch_mm},
+        "verified": made.verified,
     }  # fmt: skip
 
 

@@ -1,8 +1,7 @@
 """A small encoded plate for the first touch: one panel of a flat box, with a database of its own.
 
 Its lab has a key of its own, the same for everybody: every coupon of a type is alike, and is found
-in `coupon.db` alone. A lab's own parts are made in the lab's own database. The same type gives the
-same bytes of both, so the time in a coupon is a fixed one.
+in `coupon.db` alone. The same type gives the same bytes of both, so the time in it is a fixed one.
 """
 
 from __future__ import annotations
@@ -26,27 +25,13 @@ class Coupon:
     """A printed plate, and its registration."""
 
     part: Part
-    face: str
     side_mm: float
-    symbols: int
     pitch_mm: float
     printer: str
 
 
 def make_coupon(k: KitSizes, pitch_mm: float, printer: str, database: Path) -> Coupon:
-    """Register a coupon, and return its plate.
-
-    Parameters
-    ----------
-    k
-        Sizes of the kit.
-    pitch_mm
-        Of its symbols.
-    printer
-        Of the plate.
-    database
-        File for it.
-    """
+    """Register a coupon of symbols of a pitch in a database file, and return its plate."""
     from build123d import Box
 
     side = k.coupon_mm
@@ -62,7 +47,7 @@ def make_coupon(k: KitSizes, pitch_mm: float, printer: str, database: Path) -> C
     )
     _undate(database)
     best = max(made.parts, key=lambda part: (part.symbols, -part.T_object_part[2, 2]))
-    return Coupon(best, best.name, side, best.symbols, pitch_mm, printer)
+    return Coupon(best, side, pitch_mm, printer)
 
 
 def _undate(database: Path) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,16 +22,9 @@ from generator.export.step import step_chunks
 from generator.export.threemf import print_files, slicer_settings
 from generator.printers import printer_named
 from generator.solid import Mesh, triangles
-from probe.kit.board import (
-    Item,
-    connections,
-    electric_items,
-    has_board,
-    mechanical_items,
-    wiring_svg,
-)
+from probe.kit.board import connections, electric_items, has_board, mechanical_items, wiring_svg
 from probe.kit.coupon import DATABASE, Coupon, make_coupon
-from probe.kit.model import PARTS, KitPartReport, check_part, mesh_of, step_text
+from probe.kit.model import PARTS, check_part, mesh_of, step_text
 from probe.kit.sheet import FILAMENT, RESIN, PrintedPart, sheet_html
 from probe.kit.sizes import KitSizes, kit_sizes
 
@@ -47,7 +40,7 @@ class Kit:
     files: tuple[Path, ...]
     parts: tuple[PrintedPart, ...]
     coupon: Coupon
-    reports: tuple[KitPartReport, ...]  #: none unless it was verified
+    verified: int  #: parts that were read back
 
 
 def make_kit(
@@ -59,16 +52,8 @@ def make_kit(
 ) -> Kit:
     """Make the parts of a probe and everything that is said of them.
 
-    Parameters
-    ----------
-    sensor
-        Its type.
-    folder
-        Made if it is not there; files of these names are replaced.
-    verify
-        Read every STEP and STL back by the CAD kernel and the mesh library before they stay.
-    progress
-        Called with what is being done and the share that is done.
+    Files of these names are replaced. `verify` reads every STEP and STL back by the CAD kernel and
+    the mesh library before they stay; `progress` takes the part in work and the share that is done.
 
     Raises
     ------
@@ -82,7 +67,7 @@ def make_kit(
     require("build123d", extra="cad", purpose="probe-kit")
     pitch = sensor.symbol_pitch_mm
     k = kit_sizes(sensor, pitch)
-    parts, meshes, reports = [], [], []
+    parts, meshes = [], []
     with Staging(folder) as staging, tempfile.TemporaryDirectory() as scratch:
         for number, (name, (what, model, resin)) in enumerate(PARTS.items()):
             progress(name, number / (len(PARTS) + 1))
@@ -93,9 +78,8 @@ def make_kit(
             step = staging.write(f"{name}.step", step_text(solid, name))
             stl = staging.write(f"{name}.stl", stl_chunks(mesh))
             if verify:
-                reports.append(check_part(name, solid, step.staged, stl.staged))
-            size = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)
-            x, y, z = size.tolist()
+                check_part(name, solid, step.staged, stl.staged)
+            x, y, z = np.ptp(mesh.vertices, axis=0).tolist()
             parts.append(PrintedPart(name, what, (x, y, z), float(solid.volume), resin))
             meshes.append((name, mesh, resin))
         progress("coupon", len(PARTS) / (len(PARTS) + 1))
@@ -108,14 +92,15 @@ def make_kit(
             staging.write(name, content)
         items = [*mechanical_items(k), *electric_items(sensor)]
         wiring = wiring_svg(sensor) if has_board(sensor) else ""
-        staging.write("parts-list.csv", _csv(items).encode())
+        staging.write("parts-list.csv", _csv(("part", "value", "quantity", "for"), items))
         if wiring:
             staging.write("wiring.svg", wiring.encode())
-            staging.write("wiring.csv", _wires(sensor).encode())
+            wires = connections(sensor)
+            staging.write("wiring.csv", _csv(("from", "pin", "to", "pin"), wires))
         staging.write("sensor.yaml", sensor_type_text(sensor).encode())
         staging.write("sheet.html", sheet_html(k, parts, items, coupon, wiring).encode())
         files = tuple(file.path for file in staging.commit())
-    return Kit(folder, files, tuple(parts), coupon, tuple(reports))
+    return Kit(folder, files, tuple(parts), coupon, len(parts) if verify else 0)
 
 
 def _is_needed(name: str, k: KitSizes) -> bool:
@@ -154,17 +139,7 @@ def bed_for(meshes: list[Mesh], usual_mm: tuple[float, float]) -> tuple[float, f
     return wide, deep
 
 
-def _csv(items: list[Item]) -> str:
+def _csv(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> bytes:
     out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(("part", "value", "quantity", "for"))
-    table.writerows((i.what, i.value, i.quantity, i.use) for i in items)
-    return out.getvalue()
-
-
-def _wires(sensor: SensorType) -> str:
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(("from", "pin", "to", "pin"))
-    table.writerows(connections(sensor))
-    return out.getvalue()
+    csv.writer(out, lineterminator="\n").writerows([head, *rows])
+    return out.getvalue().encode()

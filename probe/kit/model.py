@@ -2,19 +2,15 @@
 
 Sizes -> solids, mm. Each part is boxes, cylinders and cones, joined and cut, so that its volume can
 be worked out by hand. Lower edge of the sensor at -y: there the film's tail leaves. z up; a part
-stands on z = 0.
-
-STEP text and triangles are the same on every run: the kernel counts products and writes the time
-into its header; both are taken out. Triangles share their vertices by number, so the mesh is as
-closed as the solid.
+stands on z = 0. STEP text and triangles are the same on every run: the kernel's count of products
+and the time in its header are taken out. Triangles share their vertices by number.
 """
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -22,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from generator.errors import SolidError
-from generator.export.check import MeshReport, StepReport, read_step, read_stl
+from generator.export.check import read_step, read_stl
 from generator.solid import Mesh
 from probe.kit import sizes as s
 from probe.kit.sizes import KitSizes
@@ -32,18 +28,20 @@ CHORD_RAD = 0.45  # and against their turn
 
 
 Shape = Any  # a solid of build123d
+Point = tuple[float, float, float]
+ORIGIN = (0.0, 0.0, 0.0)
 
 
 def mould_base(k: KitSizes) -> Shape:
     """Return the plate that closes the tips' ends: flat, a vent along every line of tips."""
     plate = _box(*k.mould_mm, s.PLATE_MM)
-    cut = [*_mould_holes(k, s.PLATE_MM)]
+    cut = _mould_holes(k, s.PLATE_MM)
     if k.tip_mm:
         xs = np.unique(k.sensor.centres_mm()[..., 0].round(9))
-        lines = [*((xs[:-1] + xs[1:]) / 2)]
         size = k.vent_mm, k.mould_mm[1], s.VENT_MM[1]
+        lines = (xs[:-1] + xs[1:]) / 2
         cut += [_box(*size, at=(x, 0.0, s.PLATE_MM - s.VENT_MM[1])) for x in lines]
-    return _cut(plate, cut)
+    return plate.cut(*cut)
 
 
 def mould_plate(k: KitSizes) -> Shape:
@@ -51,6 +49,8 @@ def mould_plate(k: KitSizes) -> Shape:
 
     A pad's pocket has a floor without holes.
     """
+    from build123d import Pos
+
     floor = k.sensor.overlay.height_mm if k.tip_mm else s.PLATE_MM
     deep = s.POCKET_MM if k.tip_mm else k.sensor.overlay.height_mm + s.POCKET_MM - s.WEB_MM
     high = floor + deep
@@ -59,27 +59,23 @@ def mould_plate(k: KitSizes) -> Shape:
     if k.tip_mm:
         cone = _cone(k.tip_mm, k.foot_mm, floor)
         places = k.sensor.centres_mm()[k.sensor.present()]
-        cut += [_at(cone, (float(x), float(y), 0.0)) for x, y in places]
+        cut += [Pos(float(x), float(y), 0.0) * cone for x, y in places]
     posts = [_rod(s.PIN_MM, deep, at=(x, y, floor)) for x, y in k.posts_mm]
-    return _join(_cut(plate, cut), posts)
+    return plate.cut(*cut).fuse(*posts)
 
 
 def mould_lid(k: KitSizes) -> Shape:
     """Return the lid that presses the skin to its thickness: a boss with holes."""
     boss = s.POCKET_MM - s.WEB_MM
     inner = (k.skin_mm[0] - 2 * s.CLEARANCE_MM, k.skin_mm[1] - 2 * s.CLEARANCE_MM)
-    lid = _join(_box(*k.mould_mm, s.PLATE_MM), [_box(*inner, boss, at=(0.0, 0.0, s.PLATE_MM))])
+    lid = _box(*k.mould_mm, s.PLATE_MM).fuse(_box(*inner, boss, at=(0.0, 0.0, s.PLATE_MM)))
     high = s.PLATE_MM + boss
     posts = s.PIN_MM + 2 * s.CLEARANCE_MM
     cut = [_rod(posts, high, at=(x, y, 0.0)) for x, y in k.posts_mm]
-    cut += [_rod(s.RISER_MM, high, at=(x, y, 0.0)) for x, y in riser_places(k)]
-    return _cut(lid, [*cut, *_mould_holes(k, s.PLATE_MM)])
-
-
-def riser_places(k: KitSizes) -> tuple[tuple[float, float], ...]:
-    """Return where silicone rises: in the skin's rim, midway between the posts."""
     (x, y), *_ = k.posts_mm
-    return ((x, 0.0), (-x, 0.0), (0.0, y), (0.0, -y))
+    risers = ((x, 0.0), (-x, 0.0), (0.0, y), (0.0, -y))  # in the skin's rim, between the posts
+    cut += [_rod(s.RISER_MM, high, at=(x, y, 0.0)) for x, y in risers]
+    return lid.cut(*cut, *_mould_holes(k, s.PLATE_MM))
 
 
 def housing_body(k: KitSizes) -> Shape:
@@ -94,7 +90,7 @@ def housing_body(k: KitSizes) -> Shape:
     platform = _box(*k.skin_mm, s.PLATFORM_MM, at=(0.0, 0.0, s.SHOULDER_MM))
     tongue = _box(s.TAIL_MM + 8 * s.TIE_MM[1], s.TONGUE_MM, s.SHOULDER_MM,
                   at=(0.0, -(k.side_mm[1] + s.TONGUE_MM) / 2, 0.0))  # fmt: skip
-    body = _join(block, [_rounded(platform), tongue, *posts])
+    body = block.fuse(_rounded(platform), tongue, *posts)
     bed = _box(*k.film_mm, s.FILM_MM, at=(0.0, 0.0, top - s.FILM_MM))
     reach = (k.skin_mm[1] - k.film_mm[1]) / 2
     leaves = _box(s.TAIL_MM, reach, s.FILM_MM,
@@ -105,7 +101,7 @@ def housing_body(k: KitSizes) -> Shape:
                  -(k.side_mm[1] + s.TONGUE_MM) / 2, 0.0))
         for side in (-1, 1)
     ]  # fmt: skip
-    return _cut(body, [bed, leaves, *ties, *_screws(k, top)])
+    return body.cut(bed, leaves, *ties, *_screws(k, top))
 
 
 def housing_frame(k: KitSizes) -> Shape:
@@ -120,9 +116,9 @@ def housing_frame(k: KitSizes) -> Shape:
     tail = _box(s.TAIL_MM + 1.0, wall, s.FILM_MM + 1.0,
                 at=(0.0, -(room[1] + wall) / 2, high - s.FILM_MM - 1.0))  # fmt: skip
     posts = [_rod(s.PIN_MM, k.lip_mm, at=(x, y, 0.0)) for x, y in k.posts_mm]
-    heads = [_rod(*s.HEAD_MM, at=(x, y, 0.0)) for x, y in screw_places(k)]
+    heads = [_rod(*s.HEAD_MM, at=(x, y, 0.0)) for x, y in k.screws_mm]
     cut = [_box(*room, inner, at=(0.0, 0.0, k.lip_mm)), _box(*opening, k.lip_mm), tail, *posts]
-    return _cut(frame, [*cut, *heads, *_screws(k, high)])
+    return frame.cut(*cut, *heads, *_screws(k, high))
 
 
 def flange_adapter(k: KitSizes) -> Shape:
@@ -133,7 +129,7 @@ def flange_adapter(k: KitSizes) -> Shape:
     deep = s.FLANGE_HEAD_MM[1]
     cut = [_rod(s.FLANGE_SCREW_MM, s.ADAPTER_MM, at=(x, y, 0.0)) for x, y in bolts]
     cut += [_rod(s.FLANGE_HEAD_MM[0], deep, at=(x, y, s.ADAPTER_MM - deep)) for x, y in bolts]
-    return _cut(plate, [*cut, _rod(*s.FLANGE_SPIGOT_MM), *_screws(k, s.ADAPTER_MM)])
+    return plate.cut(*cut, _rod(*s.FLANGE_SPIGOT_MM), *_screws(k, s.ADAPTER_MM))
 
 
 def calibration_cap(k: KitSizes) -> Shape:
@@ -149,18 +145,12 @@ def calibration_cap(k: KitSizes) -> Shape:
     least = pan + 2 * s.RING_MM[0]
     wide = max(outer[0], least), max(outer[1], least)
     plate = _box(*wide, s.PLATE_MM)
-    ring = _cut(_rod(pan, s.RING_MM[1]), [_rod(pan - 2 * s.RING_MM[0], s.RING_MM[1])])
-    sleeve = _cut(_box(*outer, skirt, at=(0.0, 0.0, s.PLATE_MM)),
-                  [_box(*room, skirt, at=(0.0, 0.0, s.PLATE_MM))])  # fmt: skip
+    ring = _rod(pan, s.RING_MM[1]).cut(_rod(pan - 2 * s.RING_MM[0], s.RING_MM[1]))
+    above = (0.0, 0.0, s.PLATE_MM)
+    sleeve = _box(*outer, skirt, at=above).cut(_box(*room, skirt, at=above))
     half = k.sensor.half_mm
-    stamp = _box(2 * half[0], 2 * half[1], foot, at=(0.0, 0.0, s.PLATE_MM))
-    return _join(_cut(plate, [ring]), [sleeve, stamp])
-
-
-def screw_places(k: KitSizes) -> tuple[tuple[float, float], ...]:
-    """Return the housing's screws."""
-    x, y = (side / 2 - s.CORNER_MM for side in k.side_mm)
-    return ((x, y), (-x, y), (-x, -y), (x, -y))
+    stamp = _box(2 * half[0], 2 * half[1], foot, at=above)
+    return plate.cut(ring).fuse(sleeve, stamp)
 
 
 #: Parts that are printed: name, what it is, what makes it, whether it needs resin.
@@ -170,11 +160,7 @@ PARTS: dict[str, tuple[str, Callable[[KitSizes], Shape], bool]] = {
     "mould-lid": ("presses the skin to its thickness", mould_lid, False),
     "housing-body": ("bears film and overlay", housing_body, False),
     "housing-frame": ("holds them down, lower than the tips", housing_frame, False),
-    "flange-adapter": (
-        "between housing and a flange ISO 9409-1-50-4-M6",
-        flange_adapter,
-        False,
-    ),
+    "flange-adapter": ("between housing and a flange ISO 9409-1-50-4-M6", flange_adapter, False),
     "calibration-cap": ("loads all tabs evenly by known weights", calibration_cap, False),
 }
 
@@ -188,7 +174,7 @@ def _mould_holes(k: KitSizes, high: float) -> list[Shape]:
 
 
 def _screws(k: KitSizes, high: float) -> list[Shape]:
-    return [_rod(s.SCREW_MM, high, at=(x, y, 0.0)) for x, y in screw_places(k)]
+    return [_rod(s.SCREW_MM, high, at=(x, y, 0.0)) for x, y in k.screws_mm]
 
 
 def _rounded(platform: Shape) -> Shape:
@@ -199,56 +185,33 @@ def _rounded(platform: Shape) -> Shape:
     return fillet(edge, s.BEND_MM)
 
 
-def _box(x: float, y: float, z: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Shape:
-    """Return a box whose lower face has its middle at a point."""
-    from build123d import Align, Box
-
-    return _at(Box(x, y, z, align=(Align.CENTER, Align.CENTER, Align.MIN)), at)
+def _box(x: float, y: float, z: float, at: Point = ORIGIN) -> Shape:
+    return _standing("Box", x, y, z, at=at)
 
 
-def _rod(diameter: float, high: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Shape:
-    from build123d import Align, Cylinder
-
-    return _at(Cylinder(diameter / 2, high, align=(Align.CENTER, Align.CENTER, Align.MIN)), at)
+def _rod(diameter: float, high: float, at: Point = ORIGIN) -> Shape:
+    return _standing("Cylinder", diameter / 2, high, at=at)
 
 
 def _cone(lower: float, upper: float, high: float) -> Shape:
-    from build123d import Align, Cone, Cylinder
-
-    align = (Align.CENTER, Align.CENTER, Align.MIN)
     if abs(lower - upper) < 1e-9:
-        return Cylinder(lower / 2, high, align=align)
-    return Cone(lower / 2, upper / 2, high, align=align)
+        return _rod(lower, high)
+    return _standing("Cone", lower / 2, upper / 2, high)
 
 
-def _at(shape: Shape, at: tuple[float, float, float]) -> Shape:
-    from build123d import Pos
+def _standing(kind: str, *sizes: float, at: Point = ORIGIN) -> Shape:
+    """Return a solid of build123d whose lower face has its middle at a point."""
+    import build123d
 
-    return Pos(*at) * shape
-
-
-def _cut(shape: Shape, tools: Iterable[Shape]) -> Shape:
-    return shape.cut(*tools)
-
-
-def _join(shape: Shape, tools: Iterable[Shape]) -> Shape:
-    return shape.fuse(*tools)
+    align = build123d.Align
+    shape = getattr(build123d, kind)(*sizes, align=(align.CENTER, align.CENTER, align.MIN))
+    return build123d.Pos(*at) * shape
 
 
 _TIME = datetime(2000, 1, 1)
 _COUNTED = re.compile(rb"Open CASCADE STEP translator [0-9.]+ [0-9]+")
 _WELD_MM = 1e-6  #: corners of neighbouring faces differ by less
 STEP_VOLUME, MESH_VOLUME = 1e-6, 5e-3  #: relative errors: as text; of chords
-
-
-@dataclass(frozen=True, slots=True)
-class KitPartReport:
-    """What other programs read of a part."""
-
-    name: str
-    volume_mm3: float  #: of the solid
-    step: StepReport
-    stl: MeshReport
 
 
 def step_text(solid: Any, name: str) -> bytes:
@@ -262,13 +225,7 @@ def step_text(solid: Any, name: str) -> bytes:
 
 
 def mesh_of(solid: Any) -> Mesh:
-    """Return the triangles of a solid, which share vertices by number.
-
-    Raises
-    ------
-    SolidError
-        The kernel's triangles leave a gap.
-    """
+    """Return the triangles of a solid; raises `SolidError` if the kernel leaves a gap."""
     points, faces = solid.tessellate(CHORD_MM, CHORD_RAD)
     corners = np.array([(p.X, p.Y, p.Z) for p in points])
     grid, numbers = np.unique(np.rint(corners / _WELD_MM), axis=0, return_inverse=True)
@@ -283,7 +240,7 @@ def mesh_of(solid: Any) -> Mesh:
     return Mesh(grid * _WELD_MM, triangles, none, none - 1, none - 1)
 
 
-def check_part(name: str, solid: Any, step: Path, stl: Path) -> KitPartReport:
+def check_part(name: str, solid: Any, step: Path, stl: Path) -> None:
     """Read the files of a part back by other programs.
 
     Raises
@@ -313,4 +270,3 @@ def check_part(name: str, solid: Any, step: Path, stl: Path) -> KitPartReport:
             fix="do not print it; report the sensor type together with this message",
             place=str(step),
         )
-    return KitPartReport(name, volume, found, mesh)

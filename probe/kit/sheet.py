@@ -81,11 +81,7 @@ class PrintedPart:
 
 
 def sheet_html(
-    k: KitSizes,
-    parts: Sequence[PrintedPart],
-    items: Sequence[Item],
-    coupon: Coupon,
-    wiring: str,
+    k: KitSizes, parts: Sequence[PrintedPart], items: Sequence[Item], coupon: Coupon, wiring: str
 ) -> str:
     """Return the page; `wiring` is the picture of the board, empty without one."""
     files = [
@@ -97,7 +93,6 @@ def sheet_html(
         )
         for part in parts
     ]
-    bought = [(i.what, i.value, i.quantity, i.use) for i in items]
     fits = [[field.strip() for field in line.split("|")] for line in _paragraphs(TOLERANCES)]
     return page(
         f"{k.sensor.name}: probe kit",
@@ -107,7 +102,7 @@ def sheet_html(
                 "Print", head=("file", "what it does", "size, mm", "print"), rows=files,
                 notes=[_coupon(coupon)],
             ),
-            Section("Parts list", head=("part", "value", "quantity", "for"), rows=bought),
+            Section("Parts list", head=("part", "value", "quantity", "for"), rows=items),
             Section("Wiring" if wiring else "", drawing=wiring, notes=[_board(k)]),
             Section("Cast the overlay", steps=casting_steps(k)),
             Section("Assemble", steps=assembly_steps(k)),
@@ -221,10 +216,11 @@ def _about(k: KitSizes) -> str:
 
 def _coupon(coupon: Coupon) -> str:
     made_of = "resin" if coupon.printer == "resin" else "filament"
+    part = coupon.part
     return (
         f"coupon.stl: an encoded plate of {coupon.side_mm:g} x {coupon.side_mm:g} mm, "
-        f"{coupon.symbols} symbols of {coupon.pitch_mm:g} mm ({made_of}), lying on its back. It is "
-        f"{coupon.face} in {DATABASE}: read by recognize-object --port URL --database {DATABASE}."
+        f"{part.symbols} symbols of {coupon.pitch_mm:g} mm ({made_of}), lying on its back. It is "
+        f"{part.name} in {DATABASE}: read by recognize-object --port URL --database {DATABASE}."
     )
 
 

@@ -90,8 +90,12 @@ class KitSizes:
     @property
     def posts_mm(self) -> tuple[tuple[float, float], ...]:
         """Places of the posts that register the overlay, in the rim of the skin."""
-        x, y = ((side - RIM_MM) / 2 for side in self.skin_mm)
-        return ((x, y), (-x, y), (-x, -y), (x, -y))
+        return corners(self.skin_mm, RIM_MM / 2)
+
+    @property
+    def screws_mm(self) -> tuple[tuple[float, float], ...]:
+        """Places of the housing's screws."""
+        return corners(self.side_mm, CORNER_MM)
 
     @property
     def silicone_mm3(self) -> float:
@@ -109,6 +113,12 @@ class KitSizes:
         return int(self.sensor.present().sum())
 
 
+def corners(sides_mm: tuple[float, float], inward_mm: float) -> tuple[tuple[float, float], ...]:
+    """Return four places (x, y) inward of the corners of a rectangle about the origin."""
+    x, y = (side / 2 - inward_mm for side in sides_mm)
+    return ((x, y), (-x, y), (-x, -y), (x, -y))
+
+
 def frustum_mm3(one_mm: float, other_mm: float, height_mm: float) -> float:
     """Return the volume between two discs of given diameters."""
     a, b = one_mm / 2, other_mm / 2
@@ -116,15 +126,7 @@ def frustum_mm3(one_mm: float, other_mm: float, height_mm: float) -> float:
 
 
 def kit_sizes(sensor: SensorType, pitch_mm: float) -> KitSizes:
-    """Return the sizes of a probe's parts.
-
-    Parameters
-    ----------
-    sensor
-        Its type.
-    pitch_mm
-        Of the symbols that it will touch.
-    """
+    """Return the sizes of a probe that touches symbols of a pitch."""
     overlay = sensor.overlay
     tip = overlay.tab_diameter_mm if overlay.kind == "tab" else 0.0
     widest = min(sensor.step_mm) - WALL_BETWEEN_MM

@@ -23,15 +23,7 @@ _SETTINGS = {"font.family": "DejaVu Sans", "font.size": 9.0, "svg.hashsalt": "pr
 
 @contextmanager
 def page(path: Path, width_px: int, height_px: int) -> Iterator[Figure]:
-    """Yield a figure; it is written as PNG when the block ends.
-
-    Parameters
-    ----------
-    path
-        File to write.
-    width_px, height_px
-        Size of the picture.
-    """
+    """Yield a figure of that size; it is written as PNG when the block ends."""
     defaults = {
         name: value for name, value in mpl.rcParamsDefault.items() if not name.startswith("backend")
     }

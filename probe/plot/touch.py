@@ -43,25 +43,18 @@ def touch_picture(
     counts: ArrayLike,
     path: Path,
     *,
-    unit: str = "counts",
     title: str = "",
 ) -> None:
-    """Draw the patch of a surface under a sensor, what it feels, and what it reads.
+    """Draw the patch of a surface under a sensor, the force on it, and its readings.
 
     Parameters
     ----------
     surface, sensor, touch
-        What is touched, with what, and where.
-    forces_n
-        (rows, columns) N on each tactel.
-    counts
-        (rows, columns) readings.
-    path
-        PNG to write.
-    unit
-        Of the readings: counts, or what else they are.
-    title
-        Of the picture.
+        The surface, the sensor, and where it stands.
+    forces_n, counts
+        (rows, columns) N on each tactel, and its readings.
+    path, title
+        PNG to write, and its title.
     """
     forces, readings = np.asarray(forces_n, np.float64), np.asarray(counts, np.float64)
     with page(path, 1440, 430) as figure:
@@ -71,7 +64,7 @@ def touch_picture(
         at_mm, above_mm = _heights_under(surface, sensor, touch)
         for axes, values, what, label in (
             (felt, forces, f"force, {forces.sum():.3g} N in all", UNITS["N"]),
-            (read, readings, "reading", UNITS.get(unit, f"reading ({unit})")),
+            (read, readings, "reading", UNITS["counts"]),
         ):
             _image(figure, axes, values, sensor, label)
             in_mm(axes, what)

@@ -22,7 +22,7 @@ class Port(Protocol):
         ...
 
     def read(self, timeout_s: float) -> bytes:
-        """Return what has come, waiting at most `timeout_s` for the first byte; b"" if nothing.
+        """Return the bytes that came, waiting at most `timeout_s` for the first; b"" if nothing.
 
         Raises EOFError at the end of a port that ends (a recording played once).
         """
@@ -48,13 +48,7 @@ class Address:
 
 
 def split_url(url: str) -> Address:
-    """Return the parts of a URL, whatever its scheme.
-
-    Raises
-    ------
-    PortError
-        When its options cannot be read.
-    """
+    """Return the parts of a URL, whatever its scheme; PortError when its options cannot be read."""
     scheme, _, rest = url.partition(":")
     target, mark, query = rest.rpartition("?")
     if not mark or "#" in query:  # a question mark within the address of a database
@@ -69,13 +63,7 @@ def split_url(url: str) -> Address:
 
 
 def number(address: Address, name: str, default: float, least: float = 0.0) -> float:
-    """Return an option that is a finite number, at least `least`.
-
-    Raises
-    ------
-    PortError
-        When it is none.
-    """
+    """Return an option that is a finite number, at least `least`; PortError when it is none."""
     given = address.options.get(name)
     if given is None:
         return default
@@ -93,13 +81,7 @@ def number(address: Address, name: str, default: float, least: float = 0.0) -> f
 
 
 def refuse_unknown(address: Address, known: tuple[str, ...]) -> None:
-    """Refuse options that this scheme does not have.
-
-    Raises
-    ------
-    PortError
-        With the options that it has.
-    """
+    """Refuse options that this scheme does not have (PortError), with those that it has."""
     unknown = sorted(set(address.options) - set(known))
     if unknown:
         raise PortError(

@@ -1,7 +1,6 @@
 """The device's side of the protocol, where there is no device that knows it.
 
-Commands in; what they ask for is kept here, and the answers to them are packed. What is read
-from a port is the subclass's own.
+Commands go in; their wishes are kept here, and the answers to them packed. The subclass reads.
 """
 
 from __future__ import annotations
@@ -12,15 +11,10 @@ from probe.protocol import Command, IdentPacket, Packet, StatisticsPacket, encod
 
 
 class CommandedProbe:
-    """What commands ask of a probe.
+    """The state that commands give a probe.
 
-    Parameters
-    ----------
-    url
-        What opens it again.
-    ident
-        What it says of itself. With `bits` 10 and `adjustable`, it obeys the commands for 8 and
-        10 bits.
+    `url` opens it again; `ident` describes it. With `bits` 10 and `adjustable`, it obeys the
+    commands for 8 and 10 bits.
     """
 
     def __init__(self, url: str, ident: IdentPacket, *, adjustable: bool = False) -> None:

@@ -34,12 +34,8 @@ _PAUSES = 8  #: the last ones that are remembered
 def open_flexitac(address: Address) -> Port:
     """Open a board's line.
 
-    Raises
-    ------
-    PortError
-        When the line is not there, busy or forbidden, or an option is unknown.
-    SensorTypeError
-        The sensor type that the URL names is none.
+    Raises PortError: the line is not there, busy or forbidden, or an option unknown;
+    SensorTypeError.
     """
     refuse_unknown(address, ("sensor_type",))
     named = address.options.get("sensor_type", USUAL_TYPES[address.scheme])
@@ -47,17 +43,7 @@ def open_flexitac(address: Address) -> Port:
 
 
 class FlexiTacPort(CommandedProbe):
-    """A line of images as a `Port`: it answers for the board, which takes no commands.
-
-    Parameters
-    ----------
-    url
-        What opens it again.
-    line
-        Bytes of the board.
-    sensor
-        Rows and columns of its images.
-    """
+    """A line of images of a sensor as a `Port`; it answers for the board, which cannot."""
 
     def __init__(self, url: str, line: Port, sensor: SensorType) -> None:
         ident = IdentPacket(seq=0, t_us=0, bits=10, sensors=1, settling_us=0.0, baud=BAUD,
@@ -107,13 +93,7 @@ class FlexiTacPort(CommandedProbe):
 
 
 class MarkedImages:
-    """Images out of a stream; nothing is passed on whose next marker has not come.
-
-    Parameters
-    ----------
-    length
-        Bytes of an image, without its marker.
-    """
+    """Images of `length` bytes out of a stream; none is passed on before its next marker came."""
 
     def __init__(self, length: int) -> None:
         self.sure = False  #: whether it is known where images begin
@@ -126,10 +106,7 @@ class MarkedImages:
     def feed(self, data: bytes, *, quiet_s: float = 0.0) -> list[bytes]:
         """Return the images that `data` completes.
 
-        Parameters
-        ----------
-        quiet_s
-            How long the line was seen empty before the first byte of `data`.
+        `quiet_s`: how long the line was seen empty before the first byte of `data`.
         """
         if data and quiet_s >= PAUSE_LEAST_S:
             self._paused = [*self._paused[1 - _PAUSES :], self._at + len(self._rest)]

@@ -28,10 +28,7 @@ _WRITE_TIMEOUT_S = 1.0  #: a line that takes no byte for so long is broken
 def open_serial(address: Address) -> Port:
     """Open and lock a serial line.
 
-    Raises
-    ------
-    PortError
-        When it is not there, busy, forbidden, or cannot run at this baud rate.
+    Raises PortError: it is not there, busy, forbidden, or cannot run at this baud rate.
     """
     refuse_unknown(address, ("baud",))
     return open_line(address, int(number(address, "baud", _BAUD, least=1)))
@@ -41,11 +38,7 @@ def open_line(address: Address, baud: int) -> SerialLine:
     """Open and lock the line that an address names, at a speed; see `open_serial`."""
     try:
         line = serial.Serial(
-            address.target,
-            baud,
-            timeout=0,
-            write_timeout=_WRITE_TIMEOUT_S,
-            exclusive=True,
+            address.target, baud, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True
         )
         line.reset_input_buffer()
     except (OSError, ValueError) as failed:  # pyserial's own error is an OSError

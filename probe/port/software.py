@@ -1,25 +1,65 @@
 """A probe in software: frames in, the bytes of a real one out, commands obeyed.
 
-It stands behind `sim:` and `file:`, so that what reads them is what reads a real line. Frames
-leave when their time has come, by the host's clock; a reader that is late makes the device
-wait, as the real one waits for its line. Numbers or times that jump (a recording with lost
-frames) are announced by a statistics packet, so that the client sees that no byte got lost.
+It stands behind `sim:` and `file:`, for one reader of all ports. Frames leave when their time has
+come, by the host's clock; a reader that is late makes the device wait, as the real one waits for
+its line. Numbers or times that jump (a recording with lost frames) are announced by a statistics
+packet: no byte got lost. The wire does not carry the pose of a recording; its times are in whole
+microseconds, from 0 to 71 minutes at its first frame.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from probe.frame import Frame
+from probe.port.address import Address, Port, number, refuse_unknown
 from probe.port.commanded import CommandedProbe
 from probe.protocol import FramePacket, IdentPacket, encode
 
 _BATCH = 64  #: packets of one read at most
 _LATE_S = 0.5  #: a reader later than that makes the device wait
+_PAUSE_NS = 10_000_000  #: between the end of a recording and its repetition
 _STEP_NS = 500_000_000  #: longest time between frames that needs no announcement
+
+
+def open_recording(address: Address) -> Port:
+    """Open a recording for replay; PortError when an option is no number, RecordingError."""
+    from probe.recording.read import Recording
+
+    refuse_unknown(address, ("speed", "loop"))
+    speed = number(address, "speed", 1.0)
+    again = number(address, "loop", 0.0) > 0
+    recording = Recording(address.target)
+    frames = endless_frames(recording.frames) if again else recording.frames()
+    rows, columns = recording.shape
+    # Recordings of other sensors may hold readings of up to 16 bits.
+    ident = IdentPacket(seq=0, t_us=0, bits=16, settling_us=0.0, baud=0, name="replay",
+                        rows=rows, columns=columns)  # fmt: skip
+    return SoftwareProbe(address.url, frames, ident, speed=speed)
+
+
+def endless_frames(opened: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
+    """Yield the frames of a recording again and again, numbers and times rising on.
+
+    A recording without frames ends at once.
+    """
+    seq = t_ns = 0
+    last: Frame | None = None
+    while True:
+        first: Frame | None = None
+        for frame in opened():
+            first = first or frame
+            last = replace(
+                frame, seq=seq + frame.seq - first.seq, t_ns=t_ns + frame.t_ns - first.t_ns
+            )
+            yield last
+        if first is None or last is None:
+            return
+        seq, t_ns = last.seq + 1, last.t_ns + _PAUSE_NS
 
 
 class SoftwareProbe(CommandedProbe):
@@ -27,12 +67,10 @@ class SoftwareProbe(CommandedProbe):
 
     Parameters
     ----------
-    url
-        What opens it again.
+    url, ident
+        Of a `CommandedProbe`; with `bits` 10, it obeys the commands for 8 and 10 bits.
     frames
         In order; their times say when they leave, their numbers are sent.
-    ident
-        What it says of itself. With `bits` 10, it obeys the commands for 8 and 10 bits.
     speed
         1: in real time; 0: as fast as it is read.
     """
@@ -50,10 +88,7 @@ class SoftwareProbe(CommandedProbe):
     def read(self, timeout_s: float) -> bytes:
         """Return the packets that are due, waiting at most `timeout_s` for the first.
 
-        Raises
-        ------
-        EOFError
-            After the last frame.
+        Raises EOFError after the last frame.
         """
         if replies := self.take_replies():
             return replies

@@ -31,7 +31,7 @@ SCHEMES = {
     "serial": ("probe.port.serial_line:open_serial", "device"),
     "flexitac": ("probe.port.flexitac:open_flexitac", "device"),
     "sim": ("probe.port.simulated:open_simulation", ""),
-    "file": ("probe.port.recorded:open_recording", "recording"),
+    "file": ("probe.port.software:open_recording", "recording"),
 }
 
 USUAL_TYPES = {"flexitac": "flexitac-16x32"}  #: scheme: sensor type, where it is of one
@@ -39,19 +39,10 @@ _TYPE_OPTION = "sensor_type"
 
 
 def open_port(url: str) -> Port:
-    """Open a port.
+    """Open a port; its URL as in the table of the module.
 
-    Parameters
-    ----------
-    url
-        See the module's table.
-
-    Raises
-    ------
-    PortError
-        When the URL cannot be read, or the device is not there, busy or forbidden.
-    RecordingError
-        When the file is no recording.
+    Raises PortError: the URL cannot be read, or the device is not there, busy or forbidden;
+    RecordingError: the file is no recording.
     """
     address = address_of(url)
     return _opener(address)(address)
@@ -60,10 +51,7 @@ def open_port(url: str) -> Port:
 def address_of(url: str) -> Address:
     """Read a port URL.
 
-    Raises
-    ------
-    PortError
-        When the scheme is unknown, or what it needs is missing.
+    Raises PortError: the scheme is unknown, or its target is missing.
     """
     scheme, colon, _ = url.partition(":")
     if not is_url(url):
@@ -85,24 +73,12 @@ def address_of(url: str) -> Address:
 def typed_port(url: str, asked: str = "") -> tuple[str, SensorType | None]:
     """Return the URL that opens a port with a type of sensor, and the type if it is known.
 
-    A recording names its own; a simulated probe has the one of its option; `flexitac:` has one.
-    The type behind a serial line is known by its first frame alone.
+    A recording names its own; a simulated probe has the one of its option; `flexitac:` has one. The
+    type behind a serial line is known by its first frame alone. `asked` is a name or a file, as
+    `--sensor-type` gives it; empty: as the port tells.
 
-    Parameters
-    ----------
-    url
-        Of a port.
-    asked
-        Name or file of a type, as `--sensor-type` gives it; empty: as the port tells.
-
-    Raises
-    ------
-    PortError
-        The URL is none.
-    RecordingError
-        It is that of a recording that cannot be read.
-    SensorTypeError
-        No such type, or one of another shape than the recording's images.
+    Raises PortError: the URL is none; RecordingError: of a recording that cannot be read;
+    SensorTypeError: no such type, or one of another shape than the recording's images.
     """
     address = address_of(url)
     if address.scheme == "file":
@@ -135,14 +111,13 @@ def _opener(address: Address) -> Callable[[Address], Port]:
         opener: Callable[[Address], Port] = getattr(import_module(module), name)
         return opener
     try:
-        opener = _other_schemes()[address.scheme]()
+        return _other_schemes()[address.scheme]()
     except (ImportError, AttributeError) as broken:
         raise PortError(
             f"the package that opens {address.scheme}: does not load: {broken}",
             fix="install it again",
             place=address.url,
         ) from broken
-    return opener
 
 
 def _other_schemes() -> dict[str, Callable[[], Callable[[Address], Port]]]:

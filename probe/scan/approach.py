@@ -39,8 +39,6 @@ class Approach:
     reason: Reason  #: "contact": the wanted force is there; otherwise why not
     travel_mm: float  #: where the sensor is now, from the start
     force_n: float  #: the last that was felt there
-    felt_at_mm: float  #: travel at which something was felt first; inf: nothing
-    steps: int  #: readings of the force
 
     def __bool__(self) -> bool:
         return self.reason == "contact"
@@ -51,17 +49,8 @@ def guarded_approach(
 ) -> Approach:
     """Move the sensor on until the wanted force is felt.
 
-    Parameters
-    ----------
-    feel
-        Moves the sensor to a travel (mm from the start, towards the object) and returns the
-        force (N) that is felt there.
-    limits
-        Force and limits.
-
-    Returns
-    -------
-    How it ended. After "no contact" and "force limit" the sensor is back at the start.
+    `feel` moves the sensor to a travel (mm from the start, towards the object) and returns the
+    force (N) there. After "no contact" and "force limit" the sensor is back at the start.
 
     Raises
     ------
@@ -78,27 +67,26 @@ def guarded_approach(
     _check(limits)
     before = low = (0.0, 0.0)  # travel and force; low is the furthest with too little force
     high: tuple[float, float] | None = None  # the nearest with too much
-    at, felt_at, steps = 0.0, math.inf, 0
+    at, touched = 0.0, False
     while True:
-        force, steps = _feel_n(feel, at), steps + 1
-        if force >= limits.felt_n:
-            felt_at = min(felt_at, at)
+        force = _feel_n(feel, at)
+        touched |= force >= limits.felt_n
         if force > limits.most_n:
             feel(0.0)
-            return Approach("force limit", 0.0, force, felt_at, steps)
+            return Approach("force limit", 0.0, force)
         if abs(force - limits.force_n) <= limits.tolerance_n:
-            return Approach("contact", at, force, felt_at, steps)
+            return Approach("contact", at, force)
         if force > limits.force_n:
             high = (at, force)
         else:
             before, low = low, (at, force)
         if high and high[0] - low[0] <= limits.finest_mm:
-            return Approach("too stiff", low[0], _feel_n(feel, low[0]), felt_at, steps + 1)
+            return Approach("too stiff", low[0], _feel_n(feel, low[0]))
         if not high and low[0] >= limits.travel_mm:
-            if math.isfinite(felt_at):
-                return Approach("travel limit", at, force, felt_at, steps)
+            if touched:
+                return Approach("travel limit", at, force)
             feel(0.0)
-            return Approach("no contact", 0.0, force, felt_at, steps)
+            return Approach("no contact", 0.0, force)
         at = (
             _interpolate_travel(low, high, limits) if high else _advance_travel(before, low, limits)
         )

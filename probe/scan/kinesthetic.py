@@ -3,8 +3,7 @@
 Commanded poses of the sensor -> joint angles -> believed and true poses, with the covariance
 that belongs to the errors. The encoders sit before the gears: what the arm believes is what
 was commanded. A joint follows its motor only when the play is used up, so its error depends
-on the way it came; on top there is noise, drawn for each touch. The thesis's reason for
-correlating images: touches are placed by these beliefs.
+on the way it came; on top there is noise, drawn for each touch.
 """
 
 from __future__ import annotations
@@ -40,42 +39,24 @@ class ArmPath:
     believed: NDArray[np.float64]  #: (n, 4, 4) T_base_sensor, mm
     true: NDArray[np.float64]  #: (n, 4, 4) T_base_sensor, mm
     covariance: NDArray[np.float64]  #: (n, 6, 6) of true about believed, as in `probe.arm`
-    angles_rad: NDArray[np.float64]  #: (n, 5) as commanded
-    true_angles_rad: NDArray[np.float64]  #: (n, 5)
 
 
 def follow_poses(
-    arm: Arm,
-    commanded: Sequence[ArrayLike],
-    errors: JointErrors,
-    rng: np.random.Generator,
-    *,
-    wrist: Wrist | None = None,
-    hanging: WristPose | None = None,
+    arm: Arm, commanded: Sequence[ArrayLike], errors: JointErrors, rng: np.random.Generator
 ) -> ArmPath:
-    """Follow commanded poses with an arm that is not perfect.
+    """Follow commanded poses (n, 4, 4) T_base_sensor, mm, with an arm that is not perfect.
 
-    Parameters
-    ----------
-    arm
-        The arm.
-    commanded
-        (n, 4, 4) T_base_sensor, mm, in the order of the scan; lifts between touches may be
-        among them, they decide on which side of its play a joint arrives.
-    errors
-        Of its joints.
-    rng
-        Where the noise comes from, and where in their play the joints start.
-    wrist, hanging
-        How the probe hangs; level and half way by default.
+    They are in the order of the scan; lifts between touches may be among them, they decide on which
+    side of its play a joint arrives. `rng` draws the noise, and where in their play the joints
+    start. The probe hangs level and half way.
 
     Raises
     ------
     PoseError
         A pose that the arm cannot reach.
     """
-    wrist = wrist or Wrist()
-    hanging = hanging or WristPose(sum(wrist.travel_mm) / 2, 0.0, 0.0, np.zeros((3, 3)))
+    wrist = Wrist()
+    hanging = WristPose(sum(wrist.travel_mm) / 2, 0.0, 0.0, np.zeros((3, 3)))
     T_gripper_sensor = gripper_to_plate(wrist, hanging) @ plate_to_sensor(wrist)
     back = np.linalg.inv(T_gripper_sensor)
     angles = joint_path(arm, [np.asarray(T, np.float64) @ back for T in commanded])
@@ -89,8 +70,6 @@ def follow_poses(
         np.array([pose.T_base_sensor for pose in believed]).reshape(-1, 4, 4),
         np.array(true).reshape(-1, 4, 4),
         np.array([pose.covariance for pose in believed]).reshape(-1, 6, 6),
-        angles,
-        actual,
     )
 
 

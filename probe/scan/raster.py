@@ -1,23 +1,23 @@
 """Polygon of a face -> places to press, left to right and top to bottom. Thesis 4.3, figure 4.11.
 
 Neighbours overlap by three quarters of the sensor. The step is 4.25 tactels, not 4: steps of
-whole tactels see every edge at the same place between two tactels, and more touches then tell
-nothing new about it. Places stand on a lattice that may be turned; it is as wide as the face,
-so that its outer touches reach the face's edge or a little beyond. mm, surface frame.
+whole tactels see every edge at the same place between two tactels. Places stand on a lattice that
+may be turned; it is as wide as the face, so that its outer touches reach the face's edge or a
+little beyond. mm, surface frame.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import Touch, WristStiffness
 from probe.errors import SurfaceError
+from probe.surface.polygon import polygon, signed_area
 
 STEP_TACTELS = 4.25  #: between neighbours, which then share three quarters
 
@@ -37,16 +37,11 @@ class RasterPlan:
     def there_and_back(self, least_cover: float = 0.0) -> NDArray[np.float64]:
         """Return the places (n, 2) line by line, every other line back.
 
-        Those that cover less of the face than so much of what the best one covers are left out.
+        Those that cover less than `least_cover` of what the best one covers are left out.
         """
         kept = self.cover >= least_cover * self.cover.max(initial=0.0)
         lines = [self.places_mm[kept & (self.lines == line)] for line in np.unique(self.lines)]
         return np.concatenate([line[:: (-1) ** n] for n, line in enumerate(lines)])
-
-    def touches(self, force_n: float, wrist: WristStiffness | None = None) -> Iterator[Touch]:
-        """Yield what the contact models take, for a level sensor."""
-        for x, y in self.places_mm.tolist():
-            yield Touch(x, y, self.theta_rad, force_n, wrist=wrist or WristStiffness())
 
 
 def raster(
@@ -63,8 +58,6 @@ def raster(
     ----------
     loops
         (n, 2) corners of the face, and of its holes after it, mm, either way round.
-    sensor
-        The sensor; `fsr-16` if not given.
     step_tactels
         Between neighbours, both ways.
     theta_rad
@@ -85,9 +78,7 @@ def raster(
         )
     c, s = math.cos(theta_rad), math.sin(theta_rad)
     turn = np.array([[c, -s], [s, c]])  # from the raster's axes to the surface's
-    polygons = [_polygon(loop) @ turn for loop in loops]
-    if not polygons:
-        raise SurfaceError("a face without a loop", fix="give its corners")
+    polygons = [loop @ turn for loop in polygon(loops).loops()]
     half = np.array(sensor.half_mm)
     low, high = polygons[0].min(axis=0), polygons[0].max(axis=0)
     xs, ys = (
@@ -97,7 +88,9 @@ def raster(
     for line, y in enumerate(ys[::-1]):
         strips = [_clip_polygon(p, 1, y - half[1], y + half[1]) for p in polygons]
         for x in xs:
-            areas = [abs(_area(_clip_polygon(p, 0, x - half[0], x + half[0]))) for p in strips]
+            areas = [
+                abs(signed_area(_clip_polygon(p, 0, x - half[0], x + half[0]))) for p in strips
+            ]
             share = (areas[0] - sum(areas[1:])) / float(4 * half[0] * half[1])
             if share > 0 and share >= least_cover:
                 places.append((x, y))
@@ -119,26 +112,6 @@ def _positions(low: float, high: float, half: float, step: float) -> NDArray[np.
     count = math.ceil(rest / step - 1e-9) + 1
     numbers = np.arange(count, dtype=np.float64) - (count - 1) / 2
     return (low + high) / 2 + numbers * step
-
-
-def _polygon(loop: ArrayLike) -> NDArray[np.float64]:
-    corners = np.asarray(loop, np.float64)
-    if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3:
-        raise SurfaceError(
-            f"a loop of shape {corners.shape}", fix="give three corners (x, y) or more, mm"
-        )
-    extent = float(np.ptp(corners, axis=0).max())
-    if not np.isfinite(corners).all() or abs(_area(corners - corners[0])) <= 1e-12 * extent**2:
-        raise SurfaceError("a loop without an area", fix="check its corners")
-    return corners
-
-
-def _area(polygon: NDArray[np.float64]) -> float:
-    """Return the signed area of a polygon (n, 2), by corners relative to the first one."""
-    if len(polygon) < 3:
-        return 0.0
-    x, y = (polygon - polygon[0]).T
-    return float(x[:-1] @ y[1:] - x[1:] @ y[:-1]) / 2
 
 
 def _clip_polygon(

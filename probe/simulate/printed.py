@@ -46,7 +46,7 @@ class PrintOptions:
     seed: int = 1  #: of what faults leave to chance
 
     def plan(self) -> PrintPlan:
-        """Return the same as values.
+        """Return these options as values.
 
         Raises
         ------
@@ -80,12 +80,7 @@ def parts_to_print(
 ) -> Iterator[PartToPrint]:
     """Yield the parts that bear faces of an object.
 
-    Parameters
-    ----------
-    database, object_name
-        Where it is registered.
-    files
-        For each face with symbols, the part that bears it and its STL file.
+    `files` holds, for each face with symbols, the part that bears it and its STL file.
     """
     held = registered_object(database, object_name)
     parts: dict[str, list[str]] = {}
@@ -100,14 +95,7 @@ def parts_to_print(
 def listing_of(parts: list[PartToPrint], options: PrintOptions, folder: Path, base: Path) -> str:
     """Return the text of a listing: which surface of a folder is which face.
 
-    Parameters
-    ----------
-    parts
-        All that is printed.
-    options
-        How.
-    folder
-        Of the prints; named from `base`, the folder of the listing.
+    The folder of the prints is named from `base`, the folder of the listing.
     """
     plan = options.plan()
     faces: dict[str, dict[str, str]] = {}
@@ -145,13 +133,7 @@ class PrintListing:
 
 @lru_cache(maxsize=4)
 def read_listing(file: str) -> PrintListing:
-    """Return what a listing says.
-
-    Raises
-    ------
-    SurfaceError
-        It is not there, or is none.
-    """
+    """Return what a listing says; raises `SurfaceError` if it is not there, or is none."""
     try:
         values = json.loads(Path(file).read_bytes())
         return PrintListing(
@@ -171,15 +153,6 @@ def read_listing(file: str) -> PrintListing:
 
 def printed_scene(listing: str, database: str, object_name: str, face: str) -> Scene:
     """Return a face as it was printed.
-
-    Parameters
-    ----------
-    listing
-        File that says where the prints are.
-    database
-        Where the object is registered.
-    object_name, face
-        As registered.
 
     Raises
     ------

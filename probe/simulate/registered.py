@@ -47,22 +47,13 @@ class DatabaseUnreadableError(SurfaceError):
 
 
 def registered_surface(database: str, object_name: str, face: str = "") -> Scene:
-    """Return a face of a registered object.
-
-    Parameters
-    ----------
-    database
-        `lab.db`, `sqlite:///lab.db` or `postgresql://host/name`.
-    object_name
-        As registered.
-    face
-        Name of the face; empty for the first one that bears symbols.
+    """Return a face of a registered object; an empty name: the first one that bears symbols.
 
     Raises
     ------
     SurfaceError
-        When the database cannot be read, or holds no such object or face; the message lists
-        those that it holds.
+        When the database (`lab.db`, `sqlite:///lab.db` or `postgresql://host/name`) cannot be read,
+        or holds no such object or face; the message lists those that it holds.
     """
     return scene_of_face(database, registered_object(database, object_name), face)
 
@@ -112,13 +103,7 @@ def _scene(held: RegisteredObject, face: RegisteredFace, surface: HeightMap, nam
 
 
 def registered_object(database: str, name: str) -> RegisteredObject:
-    """Return a registered object; the only one if the name is empty.
-
-    Raises
-    ------
-    SurfaceError
-        As `registered_surface`.
-    """
+    """Return a registered object; the only one if the name is empty."""
     with _connect(database) as connection:
         if name and find_object(connection, name) is not None:
             return read_object(connection, name)
@@ -160,13 +145,7 @@ def _connect(database: str) -> Iterator[Connection]:
 
 
 def face_of(held: RegisteredObject, name: str = "") -> RegisteredFace:
-    """Return a face by its name; the first one that bears symbols if the name is empty.
-
-    Raises
-    ------
-    SurfaceError
-        Listing the object's faces.
-    """
+    """Return a face by its name; the first one that bears symbols if the name is empty."""
     for face in held.faces:
         if face.name == name or (not name and face.placement is not None):
             return face

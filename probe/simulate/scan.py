@@ -23,9 +23,8 @@ from probe.scan.approach import ApproachLimits, guarded_approach
 from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
-from probe.simulate.scene import Scene
-from probe.simulate.touch import pose_of
-from probe.wrist import Wrist, counts_of, distances_at, pose_under_load, stiffness
+from probe.simulate.scene import Scene, pose_of
+from probe.wrist import Wrist, counts_of, distances_at, stiffness, travel_under_load
 
 Array = NDArray[np.float64]
 ScanKind = Literal["raster", "kinesthetic"]
@@ -76,7 +75,7 @@ class ScanPath:
         if self.wrist is None:
             return None
         touch = self.touches[number]
-        z_mm = pose_under_load(self.wrist, touch.force_n).z_mm
+        z_mm = travel_under_load(self.wrist, touch.force_n)
         bent_x = contact.tilt_x_rad - touch.tilt_x_rad
         bent_y = contact.tilt_y_rad - touch.tilt_y_rad
         return counts_of(self.wrist, distances_at(self.wrist, z_mm, bent_x, -bent_y))
@@ -96,10 +95,6 @@ def scan_path(
 
     Parameters
     ----------
-    scene
-        The face.
-    sensor
-        What touches it.
     kind
         Poses as they are, or those that an arm believes.
     rng
@@ -108,8 +103,6 @@ def scan_path(
         Touches; so many that follow each other, all by default.
     theta_rad
         Turn of the sensor, and of the lines.
-    force_n
-        Of every touch.
 
     Raises
     ------
@@ -160,7 +153,7 @@ def scan_path(
 
 
 def _pressed_n(wrist: Wrist, force_n: float, rng: np.random.Generator) -> float:
-    """Return the force at which an approach ends; the wrist's springs give way, not the overlay."""
+    """Return the force at which an approach ends; the wrist gives way, not the overlay."""
     springs_n_mm = 4 * wrist.spring_n_mm + wrist.axial_n_mm
     gap_mm = GAP_MM + rng.uniform(-1.0, 1.0)
     limits = ApproachLimits(

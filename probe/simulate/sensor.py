@@ -50,13 +50,7 @@ class SimulatedSensor:
     quiet: bool = False  #: without the noise of a gel's camera
 
     def press(self, scene: Scene, touch: Touch) -> Contact:
-        """Return the contact of a touch.
-
-        Raises
-        ------
-        ContactError
-            It has no equilibrium.
-        """
+        """Return the contact of a touch; raises `ContactError` if it has no equilibrium."""
         return press(scene.under(touch).surface, self.sensor, touch, accuracy=self.accuracy)
 
     def read(
@@ -112,16 +106,7 @@ def simulated_sensor(
 ) -> SimulatedSensor:
     """Return a sensor of a type, its tactels sound and alike, dead where one is missing.
 
-    Parameters
-    ----------
-    sensor
-        The type.
-    accuracy
-        Of the contact model; see `probe.contact.press`.
-    quiet
-        Without noise.
-    frame_s
-        From frame to frame, s; None: as the board reads.
+    `quiet` leaves the noise out; `frame_s` is from frame to frame, s: None as the board reads.
     """
     board = Electronics(readout=sensor.wiring, bits=sensor.bits, noise=QUIET if quiet else Noise())
     if frame_s is not None:

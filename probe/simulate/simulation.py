@@ -1,9 +1,9 @@
 """Touches of one target in simulation: frames, and the truth where the probe was.
 
 Target + options -> SimulatedProbe -> touches, each with its frames -> Simulation. Touch i draws
-from a generator of (seed, i) alone, so that it does not depend on the number of touches. Its
-frames follow each other at the board's rate under a steady force. Truth stands apart from the
-frames; those of a scan have the pose that the robot believes. Thesis 4.2.
+from a generator of (seed, i) alone. Its frames follow each other at the board's rate under a steady
+force. Truth stands apart from the frames; those of a scan have the pose that the robot believes.
+Thesis 4.2.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -32,10 +32,9 @@ from probe.frame import Frame, frame_from
 from probe.recording.files import check_name
 from probe.recording.record import Recorder
 from probe.simulate.scan import ScanKind, ScanPath, scan_path
-from probe.simulate.scene import Scene
+from probe.simulate.scene import Scene, TouchRanges, pose_of, random_touches
 from probe.simulate.sensor import simulated_sensor
 from probe.simulate.target import surface_of
-from probe.simulate.touch import TouchRanges, pose_of, random_touches
 
 _WAY = 1 << 32  # of the generator that draws a scan's path: no touch has that number
 
@@ -102,8 +101,7 @@ class SimulatedTouch:
         touch, contact = self.touch, self.contact
         touching = math.isfinite(contact.z_mm)
         T_face_probe = pose_of(touch, contact) if touching else None
-        T_object_probe = None
-        T_object_surface = self.scene.T_object_surface
+        T_object_probe, T_object_surface = None, self.scene.T_object_surface
         if T_face_probe is not None and T_object_surface is not None:
             T_object_probe = T_object_surface @ T_face_probe
         T_base = self.T_base_sensor
@@ -123,7 +121,6 @@ class SimulatedTouch:
         }
 
 
-@dataclass(frozen=True, slots=True)
 class SimulatedProbe:
     """A probe over a target, ready to touch it.
 
@@ -154,44 +151,35 @@ class SimulatedProbe:
         A scan's arm does not reach.
     """
 
-    target: str
-    options: TouchOptions = field(default_factory=TouchOptions)
-    sensor_type: str | SensorType | None = field(default=None, kw_only=True)
-    overlay: str = field(default="", kw_only=True)
-    accuracy: str = field(default="auto", kw_only=True)
-    noise: Literal["typical", "quiet"] = field(default="typical", kw_only=True)
-    sensor: SensorType = field(init=False)
-    level: str = field(init=False)  #: of the contact model
-    scene: Scene = field(init=False)
-    path: ScanPath | None = field(init=False)  #: None: no scan
-
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        target: str,
+        options: TouchOptions | None = None,
+        *,
+        sensor_type: str | SensorType | None = None,
+        overlay: str = "",
+        accuracy: str = "auto",
+        noise: Literal["typical", "quiet"] = "typical",
+    ) -> None:
         for name, given, known in (
-            ("overlay", self.overlay, ("tab", "pad", "")),
-            ("noise", self.noise, ("typical", "quiet")),
-        ):  # fmt: skip
+            ("overlay", overlay, ("tab", "pad", "")),
+            ("noise", noise, ("typical", "quiet")),
+        ):
             if given not in known:
                 raise SurfaceError(f"{name} {given!r}", fix=f"give {known[0]} or {known[1]}")
-        chosen = choose_sensor_type(self.sensor_type, "", None, self.target)
-        sensor = chosen.with_overlay(self.overlay)
-        object.__setattr__(self, "sensor", sensor)
-        object.__setattr__(self, "overlay", sensor.overlay.kind)
-        object.__setattr__(self, "level", level_for(sensor, accuracy_of(self.accuracy)))
-        object.__setattr__(self, "scene", surface_of(self.target))
-        object.__setattr__(self, "path", self._scan_path())
+        self.target, self.options, self.noise = target, options or TouchOptions(), noise
+        self.sensor = choose_sensor_type(sensor_type, "", None, target).with_overlay(overlay)
+        self.overlay = self.sensor.overlay.kind
+        self.level = level_for(self.sensor, accuracy_of(accuracy))  #: of the contact model
+        self.scene = surface_of(target)
+        self.path = self._scan_path()  #: None: no scan
 
     def __len__(self) -> int:
         """Return the number of touches."""
         return (self.options.touches or 1) if self.path is None else len(self.path)
 
     def touches(self) -> Iterator[SimulatedTouch]:
-        """Yield the touches, one after another.
-
-        Raises
-        ------
-        ContactError
-            A touch has no equilibrium.
-        """
+        """Yield the touches; raises `ContactError` for one that has no equilibrium."""
         options, path = self.options, self.path
         quiet = self.noise == "quiet"
         sensor = simulated_sensor(self.sensor, accuracy=self.level, quiet=quiet)
@@ -223,17 +211,11 @@ class SimulatedProbe:
             error_mm, error_rad = self.path.error
             attributes |= {"scan": self.options.scan, "pose_error_mm": error_mm,
                            "pose_error_deg": math.degrees(error_rad)}  # fmt: skip
-        sensor = f"simulated/{self.overlay}"
         with (
             staged_file(out) as draft,
-            Recorder(
-                draft,
-                sensor=sensor,
-                sensor_type=self.sensor,
-                attributes=attributes,
-                roll_over_s=math.inf,
-            ) as writer,
-        ):
+            Recorder(draft, sensor=f"simulated/{self.overlay}", sensor_type=self.sensor,
+                     attributes=attributes, roll_over_s=math.inf) as writer,
+        ):  # fmt: skip
             yield writer
 
     def truth(self, touches: list[dict[str, Any]]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,23 +47,10 @@ _WORDS = ("accuracy", "sensor_type")
 NAMES = ("x", "y", "theta", "force", *_DEFAULTS, *_CHOICES, *_WORDS)
 
 
-@dataclass(frozen=True, slots=True)
-class MotionOptions:
-    """How a simulated probe moves, and its sensor; the table above."""
-
-    numbers: dict[str, float]  #: x, y and theta only where given
-    sensor: SimulatedSensor
-
-
 def frames_of(target: str, options: Mapping[str, str] | None = None) -> Iterator[Frame]:
     """Yield frames of a probe over a surface, numbered and timed from 0.
 
-    Parameters
-    ----------
-    target
-        See `probe.simulate.target`.
-    options
-        See above; text, as it stands in a port's URL. Read before the first frame.
+    `options` are those above, text as it stands in a port's URL; read before the first frame.
 
     Raises
     ------
@@ -72,13 +59,15 @@ def frames_of(target: str, options: Mapping[str, str] | None = None) -> Iterator
     ContactError
         When the accuracy is no level, or no touch has an equilibrium.
     """
-    given = options_of(options or {}, place=target)
-    rng = np.random.default_rng(int(given.numbers["seed"]))
-    return given.sensor.frames(_forces(surface_of(target), given, rng), rng)
+    numbers, sensor = options_of(options or {}, place=target)
+    rng = np.random.default_rng(int(numbers["seed"]))
+    return sensor.frames(_forces(surface_of(target), numbers, sensor, rng), rng)
 
 
-def options_of(values: Mapping[str, str], *, place: str = "") -> MotionOptions:
-    """Read options from text.
+def options_of(
+    values: Mapping[str, str], *, place: str = ""
+) -> tuple[dict[str, float], SimulatedSensor]:
+    """Read options from text: the numbers (x, y, theta only where given) and the sensor.
 
     Raises
     ------
@@ -107,9 +96,9 @@ def options_of(values: Mapping[str, str], *, place: str = "") -> MotionOptions:
     quiet = values.get("noise") == "quiet"
     accuracy = accuracy_of(values.get("accuracy", "auto"))
     level_for(sensor, accuracy)
-    frame_s = 1 / numbers["rate"]
-    simulated = simulated_sensor(sensor, accuracy=accuracy, quiet=quiet, frame_s=frame_s)
-    return MotionOptions(numbers, simulated)
+    return numbers, simulated_sensor(
+        sensor, accuracy=accuracy, quiet=quiet, frame_s=1 / numbers["rate"]
+    )
 
 
 def _number(name: str, text: str, place: str) -> float:
@@ -124,17 +113,18 @@ def _number(name: str, text: str, place: str) -> float:
     return value
 
 
-def _forces(scene: Scene, options: MotionOptions, rng: np.random.Generator) -> Iterator[Image]:
+def _forces(
+    scene: Scene, numbers: dict[str, float], sensor: SimulatedSensor, rng: np.random.Generator
+) -> Iterator[Image]:
     """Yield the forces (rows, columns) of touch after touch, frame by frame."""
-    numbers = options.numbers
     beats = max(1, round(numbers["period"] * numbers["rate"]))
-    for touch in _random_walk(scene, options, rng):
+    for touch in _random_walk(scene, numbers, sensor, rng):
         images: dict[float, Image] = {}
         for beat in range(beats):
             share = round(load(beat / beats) * LEVELS) / LEVELS
             if share not in images:
                 pressed = replace(touch, force_n=touch.force_n * share)
-                images[share] = options.sensor.press(scene, pressed).forces_n
+                images[share] = sensor.press(scene, pressed).forces_n
             yield images[share]
 
 
@@ -149,9 +139,10 @@ def load(share: float) -> float:
     return 0.0
 
 
-def _random_walk(scene: Scene, options: MotionOptions, rng: np.random.Generator) -> Iterator[Touch]:
+def _random_walk(
+    scene: Scene, numbers: dict[str, float], sensor: SimulatedSensor, rng: np.random.Generator
+) -> Iterator[Touch]:
     """Yield touches that have an equilibrium: at the given place, or step after step."""
-    numbers = options.numbers
     fixed = "x" in numbers or "y" in numbers
     middle = scene.centre_mm()
     at = np.array([numbers.get("x", middle[0]), numbers.get("y", middle[1])])
@@ -168,7 +159,7 @@ def _random_walk(scene: Scene, options: MotionOptions, rng: np.random.Generator)
             tilt_y_rad=tilt * math.sin(towards),
         )
         try:
-            options.sensor.press(scene, touch)
+            sensor.press(scene, touch)
         except ContactError:
             refused += 1
             if fixed or refused > TRIES:

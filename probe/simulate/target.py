@@ -35,12 +35,6 @@ def surface_of(target: str) -> Scene:
     ------
     SurfaceError
         When nothing stands behind it; the message lists the objects or faces that are known.
-
-    Examples
-    --------
-    >>> scene = surface_of("lab.db#Cube/F1")
-    >>> scene.object_name, scene.face, scene.surface.top_mm
-    ('Cube', 'F1', 1.0)
     """
     if target == WASHER:
         return _washer()
@@ -67,12 +61,10 @@ def surface_of(target: str) -> Scene:
 def part_surface(
     file: str | os.PathLike[str], *, database: str = "", object_name: str = "", face: str = ""
 ) -> Scene:
-    """Return the surface of a written part.
+    """Return the surface of a written part (STL), in its face's frame or its own.
 
     Parameters
     ----------
-    file
-        STL.
     database
         Where it is registered; empty: the part as it lies, whoever it belongs to.
     object_name
@@ -80,11 +72,6 @@ def part_surface(
     face
         Which face lies up; empty: the face of a panel, or the first face of a whole body
         that bears symbols.
-
-    Returns
-    -------
-    Scene
-        In the face frame, or in the part's frame without a database.
 
     Raises
     ------

@@ -47,15 +47,10 @@ def written_triangles(file: str | os.PathLike[str]) -> Array:
 
 
 def part_mesh(file: str | os.PathLike[str], T_surface_part: ArrayLike | None = None) -> MeshSurface:
-    """Return the height field of a written part.
+    """Return the height field of a written part (STL).
 
-    Parameters
-    ----------
-    file
-        STL.
-    T_surface_part
-        (4, 4) from the part's frame to the surface frame, whose z axis points at the
-        sensor; without it, the part as it lies in the file.
+    `T_surface_part` (4, 4) leads to the surface frame, whose z points at the sensor; without it the
+    part is as it lies in the file.
 
     Raises
     ------

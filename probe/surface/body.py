@@ -1,26 +1,27 @@
 """Triangles of surfaces: closed bodies, meshes of heights, symbols and faces.
 
 Triangles (n, 3, 3) mm, counter-clockwise from outside <-> Manifold, which cuts them. Written parts
-are bodies; faces of the database and a printer's beads are heights alone.
+are bodies (their surface has `solid_mm`); faces of the database and a printer's beads are heights.
 
 Heights on a square grid -> a closed body of few triangles, within a stated error, by a
 right-triangulated irregular network (Evans, Kirkpatrick and Townsend, Algorithmica 30, 2001):
 the square is two right triangles, and each is halved from its right angle to the middle of its
 longest side as long as a height that lies within it would be missed by more than the tolerance.
-No crack opens, since two triangles at a side are halved together. mm.
+No crack opens, since two triangles at a side are halved together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import SurfaceError
 from probe.surface.contract import HeightMap
+from probe.surface.polygon import signed_area
 from probe.surface.symbols import SymbolReliefs
 
 Array = NDArray[np.float64]
@@ -31,18 +32,6 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 
-class Solid(Protocol):
-    """A surface that may be known as a closed body, too."""
-
-    @property
-    def solid_mm(self) -> Array | None:
-        """(n, 3, 3) corners of the triangles, counter-clockwise from outside, surface frame.
-
-        None where what it rests on is heights alone.
-        """
-        ...
-
-
 def body_of(surface: HeightMap) -> Array | None:
     """Return the triangles (n, 3, 3) of a surface's body, mm, surface frame; None: no body."""
     body: Array | None = getattr(surface, "solid_mm", None)
@@ -50,13 +39,7 @@ def body_of(surface: HeightMap) -> Array | None:
 
 
 def manifold_of(triangles_mm: Array) -> Manifold:
-    """Return a body that can be cut.
-
-    Raises
-    ------
-    SurfaceError
-        The triangles close no body.
-    """
+    """Return a body that can be cut; raises `SurfaceError` if the triangles close none."""
     corners, index = np.unique(triangles_mm.reshape(-1, 3), axis=0, return_inverse=True)
     return manifold_from(corners, index.reshape(-1, 3))
 
@@ -77,26 +60,15 @@ def manifold_from(corners_mm: Array, triangles: NDArray[np.int64]) -> Manifold:
 def indexed_triangles(body: Manifold) -> tuple[Array, NDArray[np.int64]]:
     """Return corners (n, 3) mm and triangles (m, 3) of a body; both empty if nothing is left."""
     mesh = body.to_mesh()
-    corners = np.asarray(mesh.vert_properties, dtype=np.float64).reshape(
-        -1, mesh.vert_properties.shape[1]
-    )
-    return corners[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64).reshape(-1, 3)
+    corners = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]
+    return corners, np.asarray(mesh.tri_verts, dtype=np.int64).reshape(-1, 3)
 
 
 def mesh_heights(heights_mm: Array, tolerance_mm: float) -> Index:
-    """Return triangles over a grid whose planes miss none of its heights by more.
+    """Return triangles over a grid whose planes miss none of its heights by more than a tolerance.
 
-    Parameters
-    ----------
-    heights_mm
-        (n + 1, n + 1), n a power of two; all finite.
-    tolerance_mm
-        Largest error of a height.
-
-    Returns
-    -------
-    (m, 3) places of the corners in the flat grid, counter-clockwise where x runs along columns
-    and y along rows.
+    The grid is (n + 1, n + 1), n a power of two, all finite. The triangles (m, 3) are places of the
+    corners in the flat grid, counter-clockwise where x runs along columns and y along rows.
 
     Raises
     ------
@@ -161,23 +133,10 @@ def _errors(h: Array) -> Array:
 def close_below(
     heights_mm: Array, triangles: Index, step_mm: float, bottom_mm: float
 ) -> tuple[Array, Index]:
-    """Return the body between triangles over a grid and a level below all of them.
+    """Return corners (k, 3) and triangles (m, 3) of the body between a grid and a level below it.
 
-    Parameters
-    ----------
-    heights_mm, triangles
-        As `mesh_heights` takes and gives them.
-    step_mm
-        Between two places of the grid; its middle is the origin.
-    bottom_mm
-        Height of the body's underside.
-
-    Returns
-    -------
-    corners_mm
-        (k, 3).
-    triangles
-        (m, 3) counter-clockwise from outside.
+    `heights_mm` and `triangles` are as `mesh_heights` takes and gives them; places of the grid are
+    `step_mm` apart, its middle is the origin, and `bottom_mm` is the height of the underside.
     """
     side = len(heights_mm)
     places, index = np.unique(triangles, return_inverse=True)
@@ -219,24 +178,20 @@ def symbol_triangles(symbols: SymbolReliefs, label: int) -> Array:
 
 
 def triangulate(loops_mm: Sequence[Array]) -> NDArray[np.int64]:
-    """Return triangles (m, 3) over the points of all loops, one loop after the other.
-
-    Parameters
-    ----------
-    loops_mm
-        (k, 2) each: the outer one counter-clockwise, holes clockwise.
+    """Return triangles (m, 3) over the points of all loops (k, 2), one loop after the other.
 
     Raises
     ------
     SurfaceError
-        When the triangles do not have the area of the loops: they cross, or run the wrong way.
+        When the triangles do not have the area of the loops: they cross, or run the wrong way
+        (the outer one runs counter-clockwise, holes clockwise).
     """
     from manifold3d import triangulate
 
     points = np.concatenate(list(loops_mm))
     found = np.asarray(triangulate(list(loops_mm), allow_convex=False), dtype=np.int64)
-    areas = [_area(triangle) for triangle in points[found.reshape(-1, 3)]]
-    covered, wanted = sum(areas), sum(map(_area, loops_mm))
+    areas = [signed_area(triangle) for triangle in points[found.reshape(-1, 3)]]
+    covered, wanted = sum(areas), sum(map(signed_area, loops_mm))
     eps = 1e-9 * float(np.ptp(points, axis=0).max()) ** 2
     if abs(covered - wanted) > eps or min(areas, default=0.0) < -eps:
         raise SurfaceError(
@@ -244,8 +199,3 @@ def triangulate(loops_mm: Sequence[Array]) -> NDArray[np.int64]:
             fix="give loops that do not cross, the outer one counter-clockwise, holes clockwise",
         )
     return found
-
-
-def _area(loop: Array) -> float:
-    x, y = (loop - loop[0]).T
-    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2

@@ -3,8 +3,7 @@
 Surface frame: a plane near the touched material, z out of it; for a part's face it is the
 face frame (origin at the face's first vertex, x along its first edge). The sensor looks
 along -z, so at each (x, y) only the highest matter counts: neighbouring faces beyond an edge
-are lower parts of the same surface, and where there is nothing the height is -inf.
-mm throughout.
+are lower parts of the same surface. mm throughout.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 
 class HeightMap(Protocol):
-    """A height field. Cost is per point, not per face."""
+    """A height field; its cost is per point, not per face."""
 
     @property
     def top_mm(self) -> float:
@@ -24,15 +23,5 @@ class HeightMap(Protocol):
         ...
 
     def heights_mm(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the height at each point.
-
-        Parameters
-        ----------
-        points_mm
-            (n, 2) x and y, surface frame.
-
-        Returns
-        -------
-        (n,) z of the highest matter at (x, y); -inf where there is none.
-        """
+        """Return z (n,) of the highest matter at points (n, 2); -inf where there is none."""
         ...

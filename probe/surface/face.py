@@ -12,9 +12,9 @@ anchor cell, at
 
 and the cell in column c and row r, counted from the anchor, has its centre at
 u = (c + 1/2) p, v = -(r + 1/2) p. Cost is per point, not per symbol: `HeightTemplate` cuts one
-cell into fine square bins. A bin that no edge of the symbol crosses lies under one planar piece;
-the table names that piece, and the height is its plane's, exact. The few bins that an edge crosses
-ask `SymbolReliefs`. No interpolation anywhere. A bin is filled at its first use.
+cell into fine square bins, each filled at its first use. A bin that no edge of the symbol crosses
+lies under one planar piece, whose height is exact; the few that an edge crosses ask
+`SymbolReliefs`. No interpolation anywhere.
 """
 
 from __future__ import annotations
@@ -89,10 +89,6 @@ def endless_face(
         (n,), any whole numbers. Cell (r, c) has its centre at ((c + 1/2) p, -(r + 1/2) p).
     glyphs
         Strokes of each label, between nodes in units of `unit_mm`.
-    pitch_mm, unit_mm
-        Distance of symbols, and of two nodes, mm.
-    relief
-        Height, stroke and draft of the symbols.
 
     Raises
     ------
@@ -147,14 +143,7 @@ _BELOW_ONE = np.nextafter(1.0, 0.0)
 
 
 def list_lookup(rows: ArrayLike, columns: ArrayLike, labels: ArrayLike) -> LabelAt:
-    """Return the look-up of a finite list of symbols; every other cell is empty.
-
-    Parameters
-    ----------
-    rows, columns
-        (n,) cells, counted from the anchor, not wrapped.
-    labels
-        (n,) labels.
+    """Return the look-up of symbols in cells (n,) counted from the anchor; others are empty.
 
     Raises
     ------
@@ -163,7 +152,7 @@ def list_lookup(rows: ArrayLike, columns: ArrayLike, labels: ArrayLike) -> Label
     """
     r, c, q = (np.asarray(values, dtype=np.int64) for values in (rows, columns, labels))
     if not len(r):
-        return _empty
+        return lambda rows, _columns: np.full(len(rows), -1, dtype=np.int64)
     first = np.array([r.min(), c.min()])
     size = np.array([r.max(), c.max()]) - first + 1
     if size.prod() > 1 << 26:
@@ -201,13 +190,7 @@ def tile_lookup(labels: ArrayLike) -> LabelAt:
 
 
 def call_lookup(label: Callable[[Index, Index], ArrayLike]) -> LabelAt:
-    """Return the look-up of an array that is a function; it is called once for each cell in view.
-
-    Parameters
-    ----------
-    label
-        Rows (n,) and columns (n,) -> labels (n,).
-    """
+    """Return the look-up of a function of rows and columns (n,), called once a cell in view."""
 
     def label_at(rows: Index, columns: Index) -> Index:
         if not len(rows):
@@ -222,10 +205,6 @@ def call_lookup(label: Callable[[Index, Index], ArrayLike]) -> LabelAt:
         return found
 
     return label_at
-
-
-def _empty(rows: Index, _columns: Index) -> Index:
-    return np.full(len(rows), -1, dtype=np.int64)
 
 
 _CROSSED, _OPEN = -1, -2
@@ -243,14 +222,9 @@ class HeightTemplate:
     first: Index  #: (labels,) by which a label's pieces stand later in `planes`
 
     def heights_mm(self, labels: Index, right: Array, down: Array) -> Array:
-        """Return the height over the face at a place each.
+        """Return the height over the face at places (n,) in cells of labels (n,).
 
-        Parameters
-        ----------
-        labels
-            (n,) labels of the cells, -1 for none.
-        right, down
-            (n,) place in the cell from its upper left corner, shares of the pitch in [0, 1).
+        `right` and `down` count from the cell's upper left corner, shares of the pitch in [0, 1).
         """
         cell = (down * BINS).astype(np.int64)
         cell += labels * BINS
@@ -316,7 +290,7 @@ def template(symbols: SymbolReliefs, pitch_mm: float) -> HeightTemplate:
 
 
 def _middles() -> Array:
-    """Return the places (bins,) of the bins' middles in a cell, from its middle, over the pitch."""
+    """Return the places (bins,) of the bins' middles from the cell's middle, over the pitch."""
     middles: Array = (np.arange(BINS) + 0.5) / BINS - 0.5
     return middles
 

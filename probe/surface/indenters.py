@@ -2,8 +2,7 @@
 
 Every one stands with its highest level at z = 0 (the rough one has its mean there), its
 centre at the origin, and matter on the closed set, so a point on an outline is touched.
-Around it the height is `floor_mm`, by default -inf: nothing. A touch moves and turns them.
-Thesis 4.2, figures 4.9 and 4.10 (the washer).
+Around it the height is `floor_mm`, by default -inf: nothing. Thesis 4.2, figures 4.9, 4.10.
 """
 
 from __future__ import annotations
@@ -24,27 +23,18 @@ class _TopAtZero:
     """A surface whose highest point lies at 0."""
 
     __slots__ = ()
-
-    @property
-    def top_mm(self) -> float:
-        """0."""
-        return 0.0
+    top_mm = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class FlatPlate:
     """An endless flat plate."""
 
-    height_mm: float = 0.0
-
-    @property
-    def top_mm(self) -> float:
-        """The plate's height."""
-        return self.height_mm
+    top_mm: float = 0.0
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return the same height everywhere."""
-        return np.full(len(points_mm), self.height_mm)
+        return np.full(len(points_mm), self.top_mm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +105,8 @@ class Washer(_TopAtZero):
 class RoughSurface:
     """A random surface of stated rms height and shortest wave: a sum of plane waves.
 
-    The same seed is the same surface, everywhere in the plane. Wave lengths run over one
-    decade up from the shortest, amplitudes grow with the wave length.
+    The same seed is the same surface. Wave lengths run over one decade up from the shortest,
+    amplitudes grow with the wave length.
     """
 
     seed: int = 0
@@ -135,28 +125,25 @@ class RoughSurface:
     @property
     def top_mm(self) -> float:
         """Sum of all amplitudes: what the height can never exceed."""
-        return float(self._waves()[2].sum())
+        return float(_waves(self)[2].sum())
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return the sum of the waves."""
-        vectors, phases, amplitudes = self._waves()
+        vectors, phases, amplitudes = _waves(self)
         at = points_mm @ vectors.T
         at += phases
         heights: Array = np.cos(at, out=at) @ amplitudes
         return heights
 
-    def _waves(self) -> tuple[Array, Array, Array]:
-        return _waves(self.seed, self.rms_mm, self.shortest_mm, self.waves)
-
 
 @lru_cache(maxsize=16)
-def _waves(seed: int, rms_mm: float, shortest_mm: float, n: int) -> tuple[Array, Array, Array]:
+def _waves(rough: RoughSurface) -> tuple[Array, Array, Array]:
     """Return wave vectors (n, 2) in rad/mm, phases (n,) and amplitudes (n,) in mm."""
-    rng = np.random.default_rng(seed)
-    length = shortest_mm * 10 ** rng.random(n)
+    rng, n = np.random.default_rng(rough.seed), rough.waves
+    length = rough.shortest_mm * 10 ** rng.random(n)
     direction = 2 * math.pi * rng.random(n)
     vectors = (2 * math.pi / length)[:, None] * np.stack(
         [np.cos(direction), np.sin(direction)], axis=1
     )
-    amplitudes = length * (rms_mm * math.sqrt(2) / math.hypot(*length))
+    amplitudes = length * (rough.rms_mm * math.sqrt(2) / math.hypot(*length))
     return vectors, 2 * math.pi * rng.random(n), amplitudes

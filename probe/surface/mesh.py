@@ -3,8 +3,8 @@
 Triangles (mm) + frame -> `MeshSurface`. Triangles are sorted into square bins once; a point asks
 its bin's triangles alone, in C (heights.c; its form in numpy is in tests/reference). The side of an
 edge is computed from the edge's lower corner for both triangles that share it, so a point on an
-edge lies in at least one of them and nothing falls through. Walls that stand upright cover no area
-and are left out, as are the undersides of a closed mesh.
+edge lies in at least one of them. Walls that stand upright cover no area and are left out, as are
+the undersides of a closed mesh.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ BIN_SLACK = 1e-6
 class MeshSurface:
     """A height field of triangles.
 
-    Corners of a triangle are in rising order (x, then y), so that a shared edge has the same
-    direction in both of its triangles.
+    Their corners are in rising order (x, then y), so that a shared edge has the same direction in
+    both of its triangles.
     """
 
     corners: Array = field(repr=False)  #: (n, 3, 3) mm, surface frame; all cover an area
@@ -77,24 +77,16 @@ class MeshSurface:
 def mesh(
     triangles_mm: ArrayLike, T_surface_part: ArrayLike | None = None, *, place: str = ""
 ) -> MeshSurface:
-    """Return the height field of triangles.
+    """Return the height field of triangles (n, 3, 3), mm, counter-clockwise from outside.
 
-    Parameters
-    ----------
-    triangles_mm
-        (n, 3, 3) corners; those of closed parts counter-clockwise seen from outside.
-    T_surface_part
-        (4, 4) from their frame to the surface frame.
-    place
-        Named in errors.
+    `T_surface_part` (4, 4) leads from their frame to the surface frame; `place` is named in errors.
 
     Raises
     ------
     SurfaceError
-        When no triangle covers an area seen along -z.
+        When a corner is no number, or no triangle covers an area seen along -z.
     """
-    part = triangle_mesh(triangles_mm, place=place)
-    corners, across = part.corners_mm, part.across
+    corners, outward, across = _read_triangles(triangles_mm, place)
     if T_surface_part is not None:
         # Term by term: the same corner gives the same bits in all its triangles.
         T = np.asarray(T_surface_part, dtype=np.float64)
@@ -104,7 +96,7 @@ def mesh(
     a, b, c = (corners[:, i, :2] for i in range(3))
     solid = corners
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    seen = (area > 0) | ((area < 0) & ~part.outward)
+    seen = (area > 0) | ((area < 0) & ~outward)
     if not seen.any():
         raise SurfaceError(
             "no triangle covers an area seen along -z",
@@ -131,25 +123,11 @@ def kernels() -> ctypes.CDLL:
     return load_library(FOLDER, {"look_up_heights": (None, arguments)})
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TriangleMesh:
-    """Triangles of a part."""
+def _read_triangles(triangles_mm: ArrayLike, place: str) -> tuple[Array, Mask, Index | None]:
+    """Return corners (n, 3, 3), which look out of a closed body, and triangles beyond edges (n, 3).
 
-    corners_mm: Array = field(repr=False)  #: (n, 3, 3) frame of the part
-    outward: NDArray[np.bool_]  #: (n,) of a closed body, and looking out of it
-    across: Index | None  #: (n, 3) triangle beyond each edge, a-b, b-c, c-a; None: not closed
-
-
-def triangle_mesh(triangles_mm: ArrayLike, *, place: str = "") -> TriangleMesh:
-    """Return a part of triangles (n, 3, 3), mm; `place` is named in errors.
-
-    In a closed mesh every edge is met once each way, by exactly equal corners. A body (or a
-    cavity) whose volume is negative looks inward.
-
-    Raises
-    ------
-    SurfaceError
-        A corner is no number.
+    In a closed mesh every edge is met once each way, by exactly equal corners; otherwise the last
+    is None. A body (or a cavity) whose volume is negative looks inward.
     """
     corners = np.array(triangles_mm, dtype=np.float64).reshape(-1, 3, 3)
     if not np.isfinite(corners).all():
@@ -162,12 +140,12 @@ def triangle_mesh(triangles_mm: ArrayLike, *, place: str = "") -> TriangleMesh:
     index = number.reshape(-1, 3)
     across = _find_across(index)
     if across is None:
-        return TriangleMesh(corners, np.zeros(len(corners), dtype=np.bool_), None)
+        return corners, np.zeros(len(corners), dtype=np.bool_), None
     body = _bodies(index, order)
     moved = corners - points.mean(axis=0)
     volume = np.einsum("ij,ij->i", moved[:, 0], np.cross(moved[:, 1], moved[:, 2]))
-    outward: NDArray[np.bool_] = (np.bincount(body, volume) > 0)[body]
-    return TriangleMesh(corners, outward, across)
+    outward: Mask = (np.bincount(body, volume) > 0)[body]
+    return corners, outward, across
 
 
 def _find_across(index: Index) -> Index | None:
@@ -233,15 +211,10 @@ class TriangleBins:
 
 
 def bin_triangles(corners_mm: Array, level: Mask) -> TriangleBins:
-    """Sort triangles into bins of a quarter of the usual triangle: two or three in each.
+    """Sort triangles (n, 3, 3), corners rising in x, into bins of a quarter of the usual triangle.
 
-    Parameters
-    ----------
-    corners_mm
-        (n, 3, 3) whose corners rise in x.
-    level
-        (n,) which of them lie at z = 0 and have others beyond each of their edges: bins that
-        these alone meet need none of them.
+    Two or three lie in each. Those of `level` (n,) lie at z = 0 and have others beyond each of
+    their edges: bins that these alone meet need none of them.
     """
     x, y = corners_mm.transpose(2, 1, 0)[:2]
     south, north = (end(end(y[0], y[1]), y[2]) for end in (np.minimum, np.maximum))

@@ -78,12 +78,7 @@ class FaceRegion:
 
 
 def polygon(loops_mm: Sequence[ArrayLike]) -> FaceRegion:
-    """Return the region inside the first loop and outside the others.
-
-    Parameters
-    ----------
-    loops_mm
-        Each (k, 2), k >= 3, mm; any sense of turning.
+    """Return the region inside the first loop and outside the others; each (k, 2), k >= 3, mm.
 
     Raises
     ------
@@ -100,10 +95,7 @@ def polygon(loops_mm: Sequence[ArrayLike]) -> FaceRegion:
     along = ends - starts
     kept = np.hypot(*along.T) > 0
     starts, ends, along = starts[kept], ends[kept], along[kept]
-    outer = rings[0] - rings[0][0]
-    area = float(
-        np.sum(outer[:, 0] * np.roll(outer[:, 1], -1) - outer[:, 1] * np.roll(outer[:, 0], -1))
-    )
+    area = signed_area(rings[0])
     if area == 0.0:
         raise SurfaceError("a face's outline encloses no area", fix="give a polygon with an area")
     if area < 0 and len(rings) == 1:
@@ -113,3 +105,11 @@ def polygon(loops_mm: Sequence[ArrayLike]) -> FaceRegion:
     angles = np.arctan2(turns, np.einsum("ij,ij->i", before, along))
     convex = len(rings) == 1 and bool((turns >= 0).all()) and abs(angles.sum() - 2 * np.pi) < 1e-6
     return FaceRegion(starts, ends, convex)
+
+
+def signed_area(loop: Array) -> float:
+    """Return the area of a polygon (n, 2), positive if it runs counter-clockwise."""
+    if len(loop) < 3:
+        return 0.0
+    x, y = (loop - loop[0]).T
+    return float(x[:-1] @ y[1:] - x[1:] @ y[:-1]) / 2

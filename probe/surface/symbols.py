@@ -57,10 +57,7 @@ class Relief:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SymbolReliefs:
-    """The symbols of an alphabet, in the order of their labels.
-
-    Shorter outlines are filled up with edges far away.
-    """
+    """The symbols of an alphabet by label; shorter outlines are filled up with edges far away."""
 
     relief: Relief
     rings: tuple[tuple[Ring, ...], ...]  #: per label
@@ -138,16 +135,7 @@ class SymbolReliefs:
 
 @lru_cache(maxsize=32)
 def emboss(glyphs: tuple[Strokes, ...], unit_mm: float, relief: Relief) -> SymbolReliefs:
-    """Return the symbols of an alphabet.
-
-    Parameters
-    ----------
-    glyphs
-        Strokes of each label, between nodes in lattice units.
-    unit_mm
-        Length of one lattice unit, mm.
-    relief
-        Height, stroke, draft and chamfer.
+    """Return the symbols of an alphabet, whose strokes join nodes in units of `unit_mm`.
 
     Raises
     ------
@@ -242,14 +230,9 @@ class _Hull:
 
 
 def outline(strokes_mm: ArrayLike, stroke_mm: float) -> tuple[Ring, ...]:
-    """Return the rings that bound what the nib covers.
+    """Return the rings that bound what a nib covers along strokes (s, 2, 2), mm.
 
-    Parameters
-    ----------
-    strokes_mm
-        (s, 2, 2) end points of straight strokes, mm.
-    stroke_mm
-        Distance of two opposite flats of the nib, mm.
+    `stroke_mm` is the distance of two opposite flats of the nib.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Answers as the page gets them: what was read, what was seen, and which window it was.
+"""Recognition + Lab -> JSON for the page.
 
-Recognition + Lab -> JSON: the plain values of `Recognition.as_json`, the symbols of the face
-that lie under the sensor (sensor frame), and the sensor's outline on the array.
+It holds the plain values of `Recognition.as_json`, the symbols of the face that lie under the
+sensor (sensor frame), and the sensor's outline on the array.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from recognizer.touch.recognition import Recognition
 
 Array = NDArray[np.float64]
 
-#: What the operator can do about a touch that is not answered.
+#: what the operator can do about a touch that is not answered
 ADVICE = {
     "no contact": "nothing is touched",
     "too few symbols": "press harder, or move further onto the face",
@@ -47,20 +47,18 @@ def answer_json(recognition: Recognition, lab: Lab, sensor: SensorType) -> dict[
     if pose is None or found is None or recognition.covariance is None:
         return answer | {"place": None, "symbols": [], "window": None}
     number, encoding, face = found
-    theta = math.atan2(pose[1, 0], pose[0, 0])
+    (x, y), theta = pose[:2, 3].tolist(), math.atan2(pose[1, 0], pose[0, 0])
     spread = np.sqrt(np.diag(recognition.covariance))
     return answer | {
         "place": {
-            "x_mm": round(float(pose[0, 3]), 3),
-            "y_mm": round(float(pose[1, 3]), 3),
-            "theta_deg": round(math.degrees(theta), 2),
+            "x_mm": round(x, 3), "y_mm": round(y, 3), "theta_deg": round(math.degrees(theta), 2),
             "sigma_mm": round(float(spread[:2].max()), 3),
             "sigma_deg": round(math.degrees(float(spread[2])), 3),
         },
         "symbols": _symbols_in_view(encoding, face, sensor, pose),
         "turn": round(-face.rotation_rad - theta, 5),
         "window": {"encoding": number, "corners": _corners(encoding, face, sensor, pose)},
-    }
+    }  # fmt: skip
 
 
 def _face(lab: Lab, recognition: Recognition) -> tuple[int, EmbossedArray, EncodedFace] | None:
@@ -94,5 +92,5 @@ def _corners(
     away = (corners - face.centres_mm[0]) / encoding.style.pitch_mm
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
     u, v = c * away[:, 0] - s * away[:, 1], s * away[:, 0] + c * away[:, 1]
-    rows, columns = face.rows[0] + 0.5 - v, face.columns[0] + 0.5 + u
-    return [[round(float(r), 3), round(float(q), 3)] for r, q in zip(rows, columns, strict=True)]
+    at = np.stack([face.rows[0] + 0.5 - v, face.columns[0] + 0.5 + u], axis=1)
+    return [[round(value, 3) for value in corner] for corner in at.tolist()]

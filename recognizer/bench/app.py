@@ -14,7 +14,6 @@ import json
 from collections.abc import AsyncIterator
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 from fastapi.exceptions import RequestValidationError
@@ -29,8 +28,6 @@ from recognizer.bench.routes import Ports, api_routes
 from recognizer.bench.session import Session
 
 _BAD, _FULL = 1008, 1013  # codes of a line that is closed
-
-
 PAGES = 80  #: open at once; 64 that never read leave room for those that do
 MESSAGE = 1024  #: bytes of a message from a page
 
@@ -120,11 +117,8 @@ def _filter_name(text: str) -> str | None:
 
 
 async def _error_response(_request: Request, error: Exception) -> JSONResponse:
-    values: dict[str, Any] = {
-        "cause": getattr(error, "cause", str(error)),
-        "fix": getattr(error, "fix", ""),
-        "place": getattr(error, "place", ""),
-    }
+    assert isinstance(error, EncodedObjectsError)
+    values = {"cause": error.cause, "fix": error.fix, "place": error.place}
     return JSONResponse({"error": values}, status_code=getattr(error, "status", 400))
 
 
@@ -132,9 +126,6 @@ async def _invalid_response(_request: Request, error: Exception) -> JSONResponse
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     where = ".".join(str(part) for part in first["loc"][1:])
-    values = {
-        "cause": f"{where}: {first['msg']}",
-        "fix": "see recognizer.bench.routes",
-        "place": "",
-    }
+    fix = "see recognizer.bench.routes"
+    values = {"cause": f"{where}: {first['msg']}", "fix": fix, "place": ""}
     return JSONResponse({"error": values}, status_code=422)

@@ -10,16 +10,11 @@ from __future__ import annotations
 import asyncio
 import json
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
-
-class BinaryTopic(Protocol):
-    """A frame or a mosaic, as bytes in the way that a page wants it."""
-
-    def as_bytes(self, filter_name: str, /) -> bytes:
-        """Return the message for a page that wants this filter."""
-        ...
+Picture = bytes | Callable[[str], bytes]  #: a message, or what makes it by the name of a filter
 
 
 @dataclass(slots=True, eq=False)
@@ -35,7 +30,7 @@ class Broker:
     """The board; `publish` from any thread, the rest on the server's loop."""
 
     def __init__(self) -> None:
-        self._topics: dict[str, tuple[int, str | BinaryTopic]] = {}
+        self._topics: dict[str, tuple[int, str | Picture]] = {}
         self._turn = threading.Lock()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._waking = False
@@ -47,10 +42,10 @@ class Broker:
         with self._turn:
             self._loop = loop
 
-    def publish(self, topic: str, content: dict[str, Any] | BinaryTopic) -> None:
+    def publish(self, topic: str, content: dict[str, Any] | Picture) -> None:
         """Replace a topic."""
         if isinstance(content, dict):
-            message: str | BinaryTopic = json.dumps({"topic": topic, **content}, allow_nan=False)
+            message: str | Picture = json.dumps({"topic": topic, **content}, allow_nan=False)
         else:
             message = content
         with self._turn:
@@ -59,11 +54,6 @@ class Broker:
             if self._loop is not None and not self._waking:
                 self._waking = True
                 self._loop.call_soon_threadsafe(self._wake)
-
-    def newest(self, topic: str) -> str | BinaryTopic | None:
-        """Return what a topic says now."""
-        with self._turn:
-            return self._topics.get(topic, (0, None))[1]
 
     def news(self, subscriber: Subscriber) -> list[str | bytes]:
         """Return what a page has not seen yet, oldest first."""
@@ -75,7 +65,7 @@ class Broker:
             )
         subscriber.seen.update({topic: number for number, topic, _ in fresh})
         return [
-            content if isinstance(content, str) else content.as_bytes(subscriber.filter_name)
+            content(subscriber.filter_name) if callable(content) else content
             for _, _, content in fresh
         ]
 

@@ -1,17 +1,16 @@
-"""What the page asks of calibration, sensor and print; each works on the session under its lock.
+"""Calibration, sensor and print of a session, as the page works them, under the session's lock.
 
 Flips bring readings back to where the sensor has them, before anything else is done with a frame
 but recording it. What is learned is kept in the folder, `NAME.state.json`, as `recognize-object
---learn` keeps it.
+--learn` keeps it. A request that cannot be met is refused with a `BenchError`.
 """
 
 from __future__ import annotations
 
-import datetime
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from encoded_objects.base.errors import EncodedObjectsError
 from generator.database.as_built import AsBuilt
@@ -21,10 +20,10 @@ from probe.recording.files import next_free
 from recognizer.as_built.estimate import ENOUGH_TOUCHES, estimate_parts, keep_prints
 from recognizer.as_built.touches import WIDE_SCALE, measure_prints
 from recognizer.as_built.verdict import as_built_entry, as_built_sizes
-from recognizer.bench.calibration import PageGuide, page_guide
-from recognizer.bench.errors import BenchError, BusyError
-from recognizer.bench.feed import ProbeFeed
-from recognizer.bench.files import find_file, list_files
+from recognizer.bench.errors import BusyError
+from recognizer.bench.files import find_file
+from recognizer.bench.frames import PageGuide, page_guide
+from recognizer.bench.session import STATE, Session
 from recognizer.sensor.file import read_state, state_words, write_state
 from recognizer.sensor.learn import LEAST_TOUCHES, learn_sensor
 from recognizer.sensor.wiring import (
@@ -38,217 +37,142 @@ from recognizer.sensor.wiring import (
 from recognizer.touch.reader import Reader
 from recognizer.touch.source import TouchImage
 
-if TYPE_CHECKING:
-    from recognizer.bench.session import Session
-
-STATE = ".state.json"
-LOAD_S = (0.2, 60.0)  #: to read one load of a calibration
 MOST = 200  #: newest touches to learn from; `recognize-object --learn` takes as many
 
 
-class CalibrationController:
-    """The calibration of the sensor that a session reads."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
-
-    def bias(self, *, on: bool) -> None:
-        """Take the bias of the unloaded sensor, or do without it."""
-        session = self._session
-        with session.lock:
-            session.note(session.frames.state.switch_bias(on=on))
-            session.report()
-
-    def begin(self, forces_n: list[float], seconds: float, *, simulated_board: bool) -> None:
-        """Begin a calibration.
-
-        Raises
-        ------
-        BenchError, BusyError
-            Loads or times that are none, or no probe.
-        """
-        low, high = LOAD_S
-        if not low <= seconds <= high:
-            raise BenchError(f"{seconds:g} s for a load", fix=f"give {low:g} to {high:g} s")
-        now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+def begin_calibration(
+    session: Session, forces_n: list[float], seconds: float, *, simulated_board: bool
+) -> None:
+    """Begin a calibration by loads that are read for some seconds each."""
+    with session.changed():
+        session.probe()
         board = Electronics() if simulated_board else None
-        session = self._session
-        with session.lock:
-            if not isinstance(session.feed, ProbeFeed):
-                raise BusyError("no probe is connected", fix="choose a port first")
-            name = session.sensor_name()
-            session.frames.guide = page_guide(name, forces_n, seconds, board, now)
-            session.report()
-
-    @contextmanager
-    def guide(self) -> Iterator[PageGuide]:
-        """Work on the calibration that is being made.
-
-        Raises
-        ------
-        BusyError
-            None is being made.
-        """
-        session = self._session
-        with session.lock:
-            if session.frames.guide is None:
-                raise BusyError("no calibration is being made", fix="begin one first")
-            yield session.frames.guide
-            session.report()
-
-    def finish(self) -> dict[str, Any]:
-        """Fit the laws, write and use them; returns what they say of the sensor."""
-        with self.guide() as guide:
-            return self._session.frames.finish_calibration(guide, self._session.folder)
-
-    def cancel(self) -> None:
-        """Forget the calibration that is being made."""
-        session = self._session
-        with session.lock:
-            session.frames.guide = None
-            session.report()
-
-    def use(self, name: str) -> None:
-        """Read newtons by a calibration of the folder; counts if the name is empty.
-
-        Raises
-        ------
-        CalibrationError
-            It is none, or another sensor's.
-        """
-        session = self._session
-        with session.lock:
-            found = None
-            if name:
-                path = find_file(session.folder, name, ".json")
-                found = read_calibration(path, sensor=session.sensor_name() or None)
-            session.note(session.frames.state.use(found, name))
-            session.report()
+        session.frames.guide = page_guide(session.sensor_name(), forces_n, seconds, board)
 
 
-class SensorController:
-    """Mounting and learned state of the sensor that a session reads."""
+@contextmanager
+def guide_of(session: Session) -> Iterator[PageGuide]:
+    """Work on the calibration that is being made; refused if none is."""
+    with session.changed():
+        if session.frames.guide is None:
+            raise BusyError("no calibration is being made", fix="begin one first")
+        yield session.frames.guide
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
-        self._share: float | None = None  #: of the learning that is done; None: nothing is learned
-        self._name = self._text = ""  #: of the state in use
 
-    def flip(self, changes: str) -> None:
-        """Read images with changes undone, as `columns,values`; empty: as they come.
+def finish_calibration(session: Session) -> dict[str, Any]:
+    """Fit the laws, write and use them; returns what they say of the sensor."""
+    with guide_of(session) as guide:
+        return session.frames.finish_calibration(guide, session.folder)
 
-        Raises
-        ------
-        WiringError
-            A change that is none, or that does not fit the sensor.
-        """
-        session = self._session
-        wiring = wiring_named(changes)
-        wiring.check(session.sensor.shape)
-        with session.lock:
-            session.frames.wiring = wiring
-            session.note(f"images are flipped: {changes}" if changes else "images as they come")
-            session.report()
 
-    def mounting(self, number: int, object_name: str, face: str) -> dict[str, Any]:
-        """Say how the sensor is mounted, from a touch that was placed by hand on a face.
+def cancel_calibration(session: Session) -> None:
+    """Forget the calibration that is being made."""
+    with session.changed():
+        session.frames.guide = None
 
-        Raises
-        ------
-        BusyError, UnknownError
-            Nothing can be read, or there is no such touch.
-        """
-        session = self._session
-        frame = session.recognition.touches.frame(number)
-        known = session.frames.state.calibration
-        found = find_mounting(
-            _reader(session), frame.counts, (object_name, face), calibration=known
-        )
-        if not isinstance(found, FoundMounting):
-            return {"found": False, "words": str(found)}
-        both = simplify_turns(
-            Wiring((*session.frames.wiring.changes, *found.wiring.changes)), session.sensor.shape
-        )
-        return {
-            "found": True,
-            "as_drawn": not found.wiring.changes,
-            "words": f"the sensor is mounted {WORDS[found.wiring.changes]}",
-            "turn_deg": round(found.turn_deg, 1),
-            "flip": ",".join(both.changes),
-        }
 
-    def learn(self) -> None:
-        """Learn the sensor from the touches of the session, in a thread; then read by it.
+def use_calibration(session: Session, name: str) -> None:
+    """Read newtons by a calibration of the folder; counts if the name is empty.
 
-        Raises
-        ------
-        BusyError
-            There are too few touches, no reader, or it is being done.
-        """
-        session = self._session
-        reader = _reader(session)
-        frames = session.recognition.touches.frames()[-MOST:]
-        if len(frames) < LEAST_TOUCHES:
-            raise BusyError(
-                f"{len(frames)} touches were read, {LEAST_TOUCHES} are the least to learn from",
-                fix="touch other places of registered faces first",
-            )
-        with session.lock:
-            if self._share is not None:
-                raise BusyError("the sensor is being learned already", fix="wait")
-            self._share = 0.0
-        images = [frame.counts for frame in frames]
-        threading.Thread(target=self._learn, args=(reader, images), daemon=True).start()
-
-    def use(self, name: str) -> None:
-        """Read by what was learned, a file of the folder; by the sensor's type if it is empty.
-
-        Raises
-        ------
-        SensorStateError
-            The file is no state of this sensor.
-        """
-        session = self._session
-        state = None
+    Raises
+    ------
+    CalibrationError
+        It is none, or another sensor's.
+    """
+    with session.changed():
+        found = None
         if name:
-            names = tuple(filter(None, (session.sensor_name(), session.sensor.name)))
-            state = read_state(find_file(session.folder, name, STATE), sensors=names)
-        session.recognition.use_state(state)
+            path = find_file(session.folder, name, ".json")
+            found = read_calibration(path, sensor=session.sensor_name() or None)
+        session.note(session.frames.state.use(found, name))
+
+
+def flip_images(session: Session, changes: str) -> None:
+    """Read images with changes undone, as `columns,values`; empty: as they come.
+
+    Raises
+    ------
+    WiringError
+        A change that is none, or that does not fit the sensor.
+    """
+    wiring = wiring_named(changes)
+    wiring.check(session.sensor.shape)
+    with session.changed():
+        session.frames.wiring = wiring
+        session.note(f"images are flipped: {changes}" if changes else "images as they come")
+
+
+def check_mounting(session: Session, number: int, object_name: str, face: str) -> dict[str, Any]:
+    """Say how the sensor is mounted, from a touch that was placed by hand on a face."""
+    counts = session.recognition.touches.frame(number).counts
+    known = session.frames.state.calibration
+    found = find_mounting(_reader(session), counts, (object_name, face), calibration=known)
+    if not isinstance(found, FoundMounting):
+        return {"found": False, "words": str(found)}
+    both = (*session.frames.wiring.changes, *found.wiring.changes)
+    return {
+        "found": True,
+        "as_drawn": not found.wiring.changes,
+        "words": f"the sensor is mounted {WORDS[found.wiring.changes]}",
+        "turn_deg": round(found.turn_deg, 1),
+        "flip": ",".join(simplify_turns(Wiring(both), session.sensor.shape).changes),
+    }
+
+
+def learn_from_touches(session: Session) -> None:
+    """Learn the sensor from the touches of the session, in a thread; then read by it."""
+    reader = _reader(session)
+    frames = session.recognition.touches.frames()[-MOST:]
+    if len(frames) < LEAST_TOUCHES:
+        raise BusyError(
+            f"{len(frames)} touches were read, {LEAST_TOUCHES} are the least to learn from",
+            fix="touch other places of registered faces first",
+        )
+    with session.lock:
+        if session.learning is not None:
+            raise BusyError("the sensor is being learned already", fix="wait")
+        session.learning = 0.0
+    images = [frame.counts for frame in frames]
+    threading.Thread(target=_learn, args=(session, reader, images), daemon=True).start()
+
+
+def _learn(session: Session, reader: Reader, images: list[Any]) -> None:
+    def report(share: float) -> None:
+        session.learning = round(share, 2)
+
+    try:
+        state = learn_sensor(
+            reader, images, calibration=session.frames.state.calibration,
+            name=session.sensor_name(), done=report,
+        )  # fmt: skip
+        session.folder.mkdir(parents=True, exist_ok=True)
+        path = next_free(session.folder, "sensor", STATE)
+        write_state(state, path)
+        use_learned(session, path.name)
+    except EncodedObjectsError as error:
         with session.lock:
-            self._name, self._text = name, "" if state is None else state_words(state)
-            session.note(f"read by {name}" if name else "read by the sensor's type alone")
-            session.report()
+            session.note(f"nothing was learned: {error.cause}")
+    finally:
+        session.learning = None
 
-    def as_json(self) -> dict[str, Any]:
-        """Return what the pages show."""
-        return {
-            "flip": ",".join(self._session.frames.wiring.changes),
-            "learning": self._share,
-            "learned": {"name": self._name, "words": self._text} if self._name else None,
-            "states": list_files(self._session.folder, STATE),
-            "least": LEAST_TOUCHES,
-        }
 
-    def _learn(self, reader: Reader, images: list[Any]) -> None:
-        session = self._session
+def use_learned(session: Session, name: str) -> None:
+    """Read by what was learned, a file of the folder; by the sensor's type if it is empty.
 
-        def report(share: float) -> None:
-            self._share = round(share, 2)
-
-        try:
-            state = learn_sensor(
-                reader, images, calibration=session.frames.state.calibration,
-                name=session.sensor_name(), done=report,
-            )  # fmt: skip
-            session.folder.mkdir(parents=True, exist_ok=True)
-            path = next_free(session.folder, "sensor", STATE)
-            write_state(state, path)
-            self.use(path.name)
-        except EncodedObjectsError as error:
-            with session.lock:
-                session.note(f"nothing was learned: {error.cause}")
-        finally:
-            self._share = None
+    Raises
+    ------
+    SensorStateError
+        The file is no state of this sensor.
+    """
+    state, learned = None, None
+    if name:
+        names = tuple(filter(None, (session.sensor_name(), session.sensor.name)))
+        state = read_state(find_file(session.folder, name, STATE), sensors=names)
+        learned = {"name": name, "words": state_words(state)}
+    session.recognition.use_state(state)
+    with session.changed():
+        session.learned = learned
+        session.note(f"read by {name}" if name else "read by the sensor's type alone")
 
 
 class PrintController:
@@ -264,8 +188,6 @@ class PrintController:
 
         Raises
         ------
-        BusyError
-            Nothing is read.
         AsBuiltError
             The touches do not suffice.
         """
@@ -282,11 +204,11 @@ class PrintController:
             prints = measure_prints(reader, touches, calibration=session.frames.state.calibration)
             estimates, few = estimate_parts(prints, session.database, material)
             self._found = tuple(found for found, _ in estimates)
-        parts = [
-            {key: value for key, value in as_built_entry(found, verdict).items()
-             if key != "covariance"} | {"sizes": as_built_sizes(found)}
-            for found, verdict in estimates
-        ]  # fmt: skip
+        parts = []
+        for found, verdict in estimates:
+            entry = as_built_entry(found, verdict) | {"sizes": as_built_sizes(found)}
+            del entry["covariance"]
+            parts.append(entry)
         return {"object": prints[0].object, "touches": len(touches), "parts": parts, "few": few}
 
     def store(self) -> dict[str, Any]:
@@ -294,8 +216,6 @@ class PrintController:
 
         Raises
         ------
-        BusyError
-            There is none.
         DatabaseError
             The database cannot be written.
         """

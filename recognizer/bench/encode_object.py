@@ -28,12 +28,7 @@ PROMISE_S = 60.0  #: longest time that `encode-object show` may take
 def make_example(folder: Path, database: str) -> str:
     """Make the example in a folder and register it; returns the object's name.
 
-    Parameters
-    ----------
-    folder
-        Gets `example.yaml` and `out/`.
-    database
-        URL, or a file's name in the folder.
+    The folder gets `example.yaml` and `out/`; the database is a URL, or a file's name in it.
 
     Raises
     ------
@@ -68,15 +63,6 @@ def face_promises(
     """Return the expected recognition rate of each face by its name, as `encode-object show`.
 
     Faces of which nothing is said are left out.
-
-    Parameters
-    ----------
-    database
-        URL or file.
-    name, registered
-        Of the object, and when it was registered.
-    sensor
-        What touches it.
 
     Raises
     ------

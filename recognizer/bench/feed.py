@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from itertools import islice
 from math import prod
@@ -12,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from encoded_objects.base.errors import EncodedObjectsError
 from probe.client.receiver import ClientStatistics
@@ -32,48 +30,34 @@ FAINT = 2048.0  #: counts of all tactels; a recording of noise alone looks like 
 PAUSE_S = 0.5  #: longer pauses in a recording are shortened to it
 
 
-class Feed(ABC):
-    """Where frames come from."""
+class Feed:
+    """Where frames come from; this one is connected to nothing."""
 
-    url: str = ""
-
-    @abstractmethod
     def take(self, timeout_s: float) -> list[Frame]:
         """Return the frames that wait, or wait for one."""
-
-    @abstractmethod
-    def as_json(self) -> dict[str, Any]:
-        """Return the state for the page: state, cause, fix, and the time line if there is one."""
-
-    def notices(self) -> list[str]:
-        """Return what happened since the last call."""
-        return []
-
-    def rest(self, *, wanted: bool) -> None:  # noqa: B027, most feeds do nothing
-        """Stop frames that nobody wants, or let them come again."""
-
-    def close(self) -> None:  # noqa: B027
-        """Release the port."""
-
-
-class NoFeed(Feed):
-    """Nothing is connected."""
-
-    def take(self, timeout_s: float) -> list[Frame]:
-        """Return nothing, after a while."""
         time.sleep(timeout_s)
         return []
 
     def as_json(self) -> dict[str, Any]:
-        """Return that there is nothing."""
+        """Return the state for the page: state, cause, fix, and the time line if there is one."""
         return {"state": "none"}
+
+    def notices(self) -> list[str]:
+        """Return notices since the last call."""
+        return []
+
+    def rest(self, *, wanted: bool) -> None:
+        """Stop frames that nobody wants, or let them come again."""
+
+    def close(self) -> None:
+        """Release the port."""
 
 
 class ProbeFeed(Feed):
     """A probe behind a port; one that is not there is tried again for as long as it is wanted."""
 
     def __init__(self, url: str, sensor: int | None = None) -> None:
-        self.url = url
+        self._url = url
         self._sensor = sensor
         self._stream: Stream | None = None
         self._notices: list[str] = []
@@ -90,11 +74,16 @@ class ProbeFeed(Feed):
             time.sleep(timeout_s)
             return frames
         try:
-            stream = self._opened(began_s)
-            if stream is not None:
-                frames = stream.take(timeout_s)
+            if self._stream is None and not self._closed and began_s - self._tried_s > RETRY_S:
+                self._tried_s = began_s
+                self._stream = Stream(self._url, sensor=self._sensor)
+            if self._stream is not None:
+                frames = self._stream.take(timeout_s)
         except EncodedObjectsError as gone:
-            self._lose(gone)
+            self._end_stream()
+            if self._state == "live" or self._cause != gone.cause:
+                self._notices.append(gone.cause)
+            self._state, self._cause, self._fix = "gone", gone.cause, gone.fix
         self._note_state(frames)
         if not frames:  # an ended stream does not wait
             time.sleep(max(0.0, min(timeout_s, began_s + timeout_s - time.monotonic())))
@@ -108,22 +97,17 @@ class ProbeFeed(Feed):
         ident = None if stream is None else stream.client.ident
         counts = self._counts
         return {
-            "state": self._state,
-            "cause": self._cause,
-            "fix": self._fix,
+            "state": self._state, "cause": self._cause, "fix": self._fix,
             "device": "" if ident is None else ident.name,
             "sensor": None if ident is None else ident.sensor,
             "rate": round(counts.rate, 1) if self._state == "live" else 0.0,
-            "frames": counts.frames,
-            "lost": counts.lost,
-            "damaged": counts.failed + counts.doubtful,
-            "late": counts.overruns,
-            "restarts": counts.reboots,
-            "returns": counts.reopenings,
-        }
+            "frames": counts.frames, "lost": counts.lost,
+            "damaged": counts.failed + counts.doubtful, "late": counts.overruns,
+            "restarts": counts.reboots, "returns": counts.reopenings,
+        }  # fmt: skip
 
     def notices(self) -> list[str]:
-        """Return what happened since the last call."""
+        """Return notices since the last call."""
         stream = self._stream
         notices, self._notices = self._notices, []
         return notices + ([] if stream is None else stream.client.notices())
@@ -152,23 +136,11 @@ class ProbeFeed(Feed):
         self._closed = True
         self._end_stream()
 
-    def _opened(self, now_s: float) -> Stream | None:
-        if self._stream is None and not self._closed and now_s - self._tried_s > RETRY_S:
-            self._tried_s = now_s
-            self._stream = Stream(self.url, sensor=self._sensor)
-        return self._stream
-
     def _end_stream(self) -> None:
         if self._stream is not None:
             self._counts = self._stream.client.statistics()
             self._stream.__exit__(None, None, None)
             self._stream = None
-
-    def _lose(self, gone: EncodedObjectsError) -> None:
-        self._end_stream()
-        if self._state == "live" or self._cause != gone.cause:
-            self._notices.append(gone.cause)
-        self._state, self._cause, self._fix = "gone", gone.cause, gone.fix
 
     def _note_state(self, frames: list[Frame]) -> None:
         now_s = time.monotonic()
@@ -187,26 +159,20 @@ class ProbeFeed(Feed):
 class ReplayFeed(Feed):
     """A recording with a time line: it plays at once, pauses, and goes to any place.
 
-    Pauses of the recording are shortened, and a clock that was set back stands still, so that the
-    time line has no empty stretch. Only times and strengths are kept in memory.
-
-    Parameters
-    ----------
-    url
-        Its port.
-    recording
-        Read once as a whole, for the time line.
-    ending
-        Whether the server ends; reading then ends, too.
+    It is read once as a whole for the time line, until `ending` says that the server ends. Only
+    times and strengths are kept. Pauses are shortened, and a clock that was set back stands still,
+    so that the time line has no empty stretch.
     """
 
-    def __init__(
-        self, url: str, recording: Recording, ending: Callable[[], bool] = lambda: False
-    ) -> None:
-        self.url = url
+    def __init__(self, recording: Recording, ending: Callable[[], bool] = lambda: False) -> None:
         self.recording = recording
         self._turn = threading.Lock()
-        t_ns, self.strength = _times_and_strengths(playable_blocks(recording, ending))
+        times, strengths = [np.zeros(0, np.int64)], [np.zeros(0)]
+        for block in playable_blocks(recording, ending):
+            times.append(block.t_ns)
+            over = block.counts.reshape(len(block), -1).astype(np.float64)
+            strengths.append(over.sum(axis=1) - over.shape[1] * np.quantile(over, 0.05, axis=1))
+        t_ns, self._strength = np.concatenate(times), np.concatenate(strengths)
         pauses = np.clip(np.diff(t_ns, prepend=t_ns[:1]) * 1e-9, 0.0, PAUSE_S)
         self._at_s = np.cumsum(pauses)
         self.began_ns = int(t_ns[0]) if len(t_ns) else 0  #: time of the first frame
@@ -233,13 +199,7 @@ class ReplayFeed(Feed):
         return frames
 
     def play(self, *, playing: bool | None, speed: float | None, at_s: float | None) -> None:
-        """Play or pause, faster or slower, from a place on the time line.
-
-        Raises
-        ------
-        BenchError
-            For a speed or a place that is none.
-        """
+        """Play or pause, faster or slower, from a place on the time line (s)."""
         if speed is not None and not 0.1 <= speed <= 20:
             raise BenchError(f"a speed of {speed:g}", fix="give 0.1 to 20")
         with self._turn:
@@ -260,14 +220,11 @@ class ReplayFeed(Feed):
         with self._turn:
             place_s = self._advance()
             return {
-                "state": "replay",
-                "device": self.recording.origin.sensor,
+                "state": "replay", "device": self.recording.origin.sensor,
                 "frames": len(self.recording),
-                "at": round(place_s, 3),
-                "seconds": round(self.seconds, 3),
-                "playing": self._playing,
-                "speed": self._speed,
-            }
+                "at": round(place_s, 3), "seconds": round(self.seconds, 3),
+                "playing": self._playing, "speed": self._speed,
+            }  # fmt: skip
 
     def overview(self) -> list[float]:
         """Return how strong the touches are along the time line, at even places, 0 ... 1."""
@@ -276,7 +233,7 @@ class ReplayFeed(Feed):
         bins = min(POINTS, len(self._at_s))
         place = np.minimum(self._at_s / max(self.seconds, 1e-9) * bins, bins - 1).astype(int)
         top = np.zeros(bins)
-        np.maximum.at(top, place, self.strength)
+        np.maximum.at(top, place, self._strength)
         return [round(float(v), 3) for v in top / max(float(top.max()), FAINT)]
 
     def close(self) -> None:
@@ -328,15 +285,3 @@ def playable_blocks(recording: Recording, ending: Callable[[], bool]) -> Iterato
         if ending():
             raise BusyError("open-bench ends", fix="start it again")
         yield block
-
-
-def _times_and_strengths(
-    blocks: Iterator[FrameBlock],
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return times (ns) and strengths of all frames."""
-    times, strengths = [np.zeros(0, np.int64)], [np.zeros(0)]
-    for block in blocks:
-        times.append(block.t_ns)
-        over = block.counts.reshape(len(block), -1).astype(np.float64)
-        strengths.append(over.sum(axis=1) - over.shape[1] * np.quantile(over, 0.05, axis=1))
-    return np.concatenate(times), np.concatenate(strengths)

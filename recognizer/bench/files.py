@@ -1,20 +1,20 @@
 """What the page may read and write: recordings and calibrations of one folder, printed parts.
 
-A name is a name: no path, no link that leads out. Parts are those that the database names, and
-only where they lie in its folder. Uploaded recordings are written as they come, bounded in number,
-time and space; the guard bounds the length of one.
+A name is no path, and no link that leads out. Parts are those that the database names and that lie
+in its folder. Uploaded recordings are written as they come, bounded in number, time and space; the
+guard bounds the length of one.
 """
 
 from __future__ import annotations
 
 import asyncio
 import re
-import tempfile
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 from fastapi.concurrency import run_in_threadpool
 
+from encoded_objects.base.files import staged_file
 from generator.database.open import normal_url, part_path
 from generator.database.registered import RegisteredPart
 from probe.errors import RecordingError
@@ -31,13 +31,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}")
 
 
 def find_file(folder: Path, name: str, suffix: str) -> Path:
-    """Return a file of the folder.
-
-    Raises
-    ------
-    UnknownError
-        When the name is none, or no such file is there.
-    """
+    """Return a file of the folder; `UnknownError` if it is none or not there."""
     path = folder / checked_name(name, suffix)
     if not path.is_file() or path.resolve().parent != folder.resolve():
         raise UnknownError(f"there is no file {name}", fix="choose one from the list")
@@ -45,13 +39,7 @@ def find_file(folder: Path, name: str, suffix: str) -> Path:
 
 
 def checked_name(name: str, suffix: str) -> str:
-    """Return a name that can only mean a file of its folder.
-
-    Raises
-    ------
-    UnknownError
-        When it can mean something else.
-    """
+    """Return a name that can only mean a file of its folder; `UnknownError` for another."""
     if not _NAME.fullmatch(name) or not name.endswith(suffix) or ".." in name:
         raise UnknownError(
             f"{name[:60]!r} is no name of a file here",
@@ -64,14 +52,11 @@ def list_files(folder: Path, suffix: str) -> list[str]:
     """Return the names of the newest files with this ending, newest first."""
     if not folder.is_dir():
         return []
-    found = [
-        path
-        for path in folder.iterdir()
-        if path.name.endswith(suffix)
-        and not path.stem.endswith(".part")
-        and _NAME.fullmatch(path.name)
-    ]
-    dated = sorted((-path.stat().st_mtime, path.name) for path in found)
+    dated = sorted(
+        (-path.stat().st_mtime, path.name)
+        for path in folder.glob(f"*{suffix}")
+        if not path.stem.endswith(".part") and _NAME.fullmatch(path.name)
+    )
     return [name for _, name in dated[:LISTED]]
 
 
@@ -84,13 +69,7 @@ def part_folder(database: str) -> Path | None:
 
 
 def part_to_send(database: str, folder: Path | None, part: RegisteredPart) -> Path:
-    """Return the file of a part, if it lies in the part folder.
-
-    Raises
-    ------
-    UnknownError
-        When it does not, or is not there.
-    """
+    """Return the file of a part; `UnknownError` if it does not lie in the part folder."""
     path = part_path(normal_url(database), part.file).resolve()
     if folder is None or not path.is_relative_to(folder) or not path.is_file():
         raise UnknownError(
@@ -105,7 +84,7 @@ class Uploads:
 
     def __init__(self, folder: Path, ending: Callable[[], bool] = lambda: False) -> None:
         self._folder, self._ending = folder, ending
-        self._coming = 0
+        self._coming: set[str] = set()
 
     async def take(self, name: str, chunks: AsyncIterator[bytes]) -> int:
         """Keep a recording, if it is one; returns its frames.
@@ -121,19 +100,20 @@ class Uploads:
             It is no recording; nothing is kept.
         """
         path = self._folder / checked_name(name, ".h5")
-        if path.exists():
+        if path.exists() or name in self._coming:
             raise BenchError(f"there is a recording {name} already", fix="give another name")
-        if self._coming >= AT_ONCE:
-            raise BusyError(f"{self._coming} recordings are being sent in", fix="wait for them")
-        self._coming += 1
+        if len(self._coming) >= AT_ONCE:
+            raise BusyError(
+                f"{len(self._coming)} recordings are being sent in", fix="wait for them"
+            )
+        self._coming.add(name)
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(prefix=".coming-", dir=self._folder) as place:
-                draft = Path(place) / path.name
+            with staged_file(path) as draft:
                 await self._write(draft, chunks)
-                return await run_in_threadpool(_keep, draft, path, self._ending)
+                return await run_in_threadpool(_count_frames, draft, name, self._ending)
         finally:
-            self._coming -= 1
+            self._coming.discard(name)
 
     async def _write(self, draft: Path, chunks: AsyncIterator[bytes]) -> None:
         room = QUOTA - folder_bytes(self._folder)
@@ -157,15 +137,14 @@ class Uploads:
                 file.write(chunk)
 
 
-def _keep(draft: Path, path: Path, ending: Callable[[], bool]) -> int:
-    """Give an uploaded file its name if it is a recording; returns its frames."""
+def _count_frames(draft: Path, name: str, ending: Callable[[], bool]) -> int:
+    """Return the frames of an uploaded file, of which every value is looked at."""
     try:
         recording = Recording(draft)
-        for _ in playable_blocks(recording, ending):  # every value is looked at
+        for _ in playable_blocks(recording, ending):
             pass
-    except RecordingError as error:
-        raise RecordingError(error.cause, fix=error.fix, place=path.name) from error
-    draft.rename(path)
+    except (RecordingError, BenchError) as error:
+        raise type(error)(error.cause, fix=error.fix, place=name) from error
     return len(recording)
 
 

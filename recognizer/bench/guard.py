@@ -5,10 +5,9 @@ foreign name can be led here; elsewhere every request needs the token. Whatever 
 something, and the live line, must come from the page itself (`Origin`). Bodies are bounded,
 and the page may load nothing from anywhere else.
 
-Requests and answers are those of starlette. The rules stand here because no library holds
-them: its `TrustedHostMiddleware` answers in plain text and, in versions that fastapi still
-admits, cuts a host at its first colon ([::1] becomes [); its CORS answers what a browser asks
-but refuses no request; and neither starlette nor uvicorn bounds a body.
+No library holds these rules: starlette's `TrustedHostMiddleware` answers in plain text and, in
+versions that fastapi still admits, cuts a host at its first colon ([::1] becomes [); its CORS
+refuses no request; and neither starlette nor uvicorn bounds a body.
 """
 
 from __future__ import annotations

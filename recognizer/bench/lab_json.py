@@ -2,15 +2,13 @@
 
 An object is its faces (triangles on the object, places on the face), its symbols (label, place
 on their face, pose on the object), and once per label the triangles of a symbol. A round face is
-drawn as the facets that stand for it; what is picked on them is a place of the unrolled plane,
-and each of its symbols stands in the plane that is tangent there. An array is the cells that
-objects hold, whatever its size. mm, rad. Thesis 6.3.
+drawn as its facets; a place on them is one of the unrolled plane, and each of its symbols stands in
+the plane that is tangent there. An array is the cells that objects hold. mm, rad. Thesis 6.3.
 """
 
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any
 
@@ -38,18 +36,13 @@ def objects_json(connection: Connection) -> list[dict[str, Any]]:
     """Return the list of objects."""
     return [
         {
-            "name": entry.name,
-            "type": entry.object_type,
-            "faces": entry.faces,
-            "symbols": entry.symbols,
-            "profile": entry.profile,
-            "array": [entry.rows, entry.columns],
-            "pitch_mm": entry.pitch_mm,
-            "registered": entry.utc,
-            "retired": bool(entry.retired_utc),
+            "name": entry.name, "type": entry.object_type, "faces": entry.faces,
+            "symbols": entry.symbols, "profile": entry.profile,
+            "array": [entry.rows, entry.columns], "pitch_mm": entry.pitch_mm,
+            "registered": entry.utc, "retired": bool(entry.retired_utc),
         }
         for entry in list_objects(connection)
-    ]
+    ]  # fmt: skip
 
 
 def object_json(connection: Connection, name: str) -> dict[str, Any]:
@@ -58,72 +51,63 @@ def object_json(connection: Connection, name: str) -> dict[str, Any]:
     Raises
     ------
     DatabaseError
-        When no object has this name.
+        No object has this name.
     """
     held = read_object(connection, name)
     return {
-        "name": held.entry.name,
-        "type": held.entry.object_type,
-        "profile": held.entry.profile,
+        "name": held.entry.name, "type": held.entry.object_type, "profile": held.entry.profile,
         "registered": held.entry.utc,
-        "pitch_mm": held.style.pitch_mm,
-        "height_mm": held.style.height_mm,
+        "pitch_mm": held.style.pitch_mm, "height_mm": held.style.height_mm,
         "faces": [_face(held, number) for number in drawn_faces(held)],
         "glyphs": _glyphs(held),
         "parts": [
             {"number": i, "name": part.name, "format": part.format}
             for i, part in enumerate(held.parts)
         ],
-    }
+    }  # fmt: skip
 
 
 def arrays_json(lab: Lab) -> list[dict[str, Any]]:
     """Return the arrays with the strokes of their alphabets, mm in the symbol's axes."""
     return [
         {
-            "rows": encoding.array.rows,
-            "columns": encoding.array.columns,
-            "alphabet": encoding.alphabet.name,
-            "pitch_mm": encoding.style.pitch_mm,
-            "stroke_mm": encoding.style.stroke_mm,
-            "cells": len(encoding.keys),
+            "rows": encoding.array.rows, "columns": encoding.array.columns,
+            "alphabet": encoding.alphabet.name, "pitch_mm": encoding.style.pitch_mm,
+            "stroke_mm": encoding.style.stroke_mm, "cells": len(encoding.keys),
             "objects": len(encoding.names),
             "strokes": [
-                [[[float(v) * unit for v in node] for node in stroke] for stroke in glyph.strokes]
+                (np.array(glyph.strokes, float) * unit).tolist()
                 for glyph in encoding.alphabet.glyphs
             ],
         }
         for encoding in lab.arrays
         for unit in (encoding.alphabet.reach * encoding.style.pitch_mm,)
-    ]
+    ]  # fmt: skip
 
 
 def map_json(connection: Connection, encoding: EmbossedArray) -> dict[str, Any]:
     """Return the cells of an array that objects hold, face by face."""
-    columns = np.uint64(encoding.array.columns)
     owners, labels = encoding.owners[:-1], encoding.labels[:-1]
     order = np.argsort(owners, kind="stable")
     bounds = np.searchsorted(owners[order], np.arange(len(encoding.faces) + 1))
-    names = _face_names(connection)
-    faces = []
+    faces = tables.faces.c
+    found = connection.execute(select(faces.object_id, faces.face_id, faces.name))
+    names = {(object_id, face_id): name for object_id, face_id, name in found}
+    held = []
     for number, (object_id, face_id) in enumerate(encoding.faces.tolist()):
         mine = order[bounds[number] : bounds[number + 1]]
-        rows, columns_at = np.divmod(encoding.keys[mine], columns)
-        faces.append(
+        rows, columns = np.divmod(encoding.keys[mine], np.uint64(encoding.array.columns))
+        held.append(
             {
-                "object": encoding.names[object_id],
-                "face": names[object_id].get(face_id, ""),
-                "rows": rows.tolist(),
-                "columns": columns_at.tolist(),
+                "object": encoding.names[object_id], "face": names.get((object_id, face_id), ""),
+                "rows": rows.tolist(), "columns": columns.tolist(),
                 "labels": labels[mine].tolist(),
             }
-        )
+        )  # fmt: skip
     return {
-        "rows": encoding.array.rows,
-        "columns": encoding.array.columns,
-        "order": encoding.alphabet.order,
-        "faces": faces,
-    }
+        "rows": encoding.array.rows, "columns": encoding.array.columns,
+        "order": encoding.alphabet.order, "faces": held,
+    }  # fmt: skip
 
 
 def object_svg(held: RegisteredObject) -> str:
@@ -133,16 +117,13 @@ def object_svg(held: RegisteredObject) -> str:
     right /= np.linalg.norm(right)
     axes = np.stack([right, -np.cross(look, right), look], axis=1)  # x right, y down, z near
     seen = [
-        (float(depth), text, corners)
+        drawing
         for number in drawn_faces(held)
-        for depth, text, corners in _drawings(held, held.faces[number], number, axes)
+        for drawing in _drawings(held, held.faces[number], number, axes)
     ]
-    corners = np.concatenate([np.zeros((1, 2)), *(each for _, _, each in seen)])[1:]
-    low, high = (
-        (corners.min(axis=0), corners.max(axis=0)) if len(corners) else (np.zeros(2), np.ones(2))
-    )
-    x, y = low - 1.0
-    w, h = high - low + 2.0
+    corners = np.concatenate([points for _, _, points in seen])
+    x, y = corners.min(axis=0) - 1.0
+    w, h = np.ptp(corners, axis=0) + 2.0
     body = "".join(text for _, text, _ in sorted(seen, key=lambda one: one[0]))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{x:.1f} {y:.1f} {w:.1f} {h:.1f}" '
@@ -177,11 +158,9 @@ def face_sheets(face: RegisteredFace) -> Iterator[list[Array]]:
         yield [_seated(face.T_object_face, loop) for loop in face.polygon_mm]
         return
     d = face.round.development
-    for T, low, high in zip(
-        d.T_object_flat, np.stack([d.low[:-1], d.low[1:]], axis=1),
-        np.stack([d.high[1:], d.high[:-1]], axis=1), strict=True,
-    ):  # fmt: skip
-        yield [_seated(T, np.concatenate([low, high]))]
+    quads = np.stack([d.low[:-1], d.low[1:], d.high[1:], d.high[:-1]], axis=1)
+    for T, quad in zip(d.T_object_flat, quads, strict=True):
+        yield [_seated(T, quad)]
 
 
 def _face(held: RegisteredObject, number: int) -> dict[str, Any]:
@@ -212,14 +191,10 @@ def _mesh_json(held: RegisteredObject, face: RegisteredFace) -> dict[str, Any]:
         outlines = [_seated(face.T_object_face, loop) for loop in face.polygon_mm]
     else:
         d = face.round.development
-        low, high = d.low, d.high
-        places = np.stack(
-            [np.stack([low[:-1], low[1:], high[1:]], axis=1),
-             np.stack([low[:-1], high[1:], high[:-1]], axis=1)], axis=1
-        )  # fmt: skip
-        corners = np.stack(
-            [_seated(T, two) for T, two in zip(d.T_object_flat, places, strict=True)]
-        )
+        quads = np.stack([d.low[:-1], d.low[1:], d.high[1:], d.high[:-1]], axis=1)
+        places = quads[:, [[0, 1, 2], [0, 2, 3]]]
+        seats = zip(d.T_object_flat, places, strict=True)
+        corners = np.stack([_seated(T, triangles) for T, triangles in seats])
         outlines = [held.polyhedron.vertices[ends] for ends in d.vertices.T]
     return {
         "corners": _rounded(corners.ravel()),
@@ -235,20 +210,7 @@ def _glyphs(held: RegisteredObject) -> list[list[float]]:
     glyphs = held.alphabet["glyphs"]
     strokes = tuple(tuple((tuple(a), tuple(b)) for a, b in glyph["strokes"]) for glyph in glyphs)
     symbols = emboss(strokes, held.alphabet["reach"] * style.pitch_mm, relief)
-    return [
-        np.round(symbol_triangles(symbols, label), DIGITS).ravel().tolist()
-        for label in range(len(strokes))
-    ]
-
-
-def _face_names(connection: Connection) -> dict[int, dict[int, str]]:
-    found: dict[int, dict[int, str]] = defaultdict(dict)
-    faces = tables.faces.c
-    for object_id, face_id, name in connection.execute(
-        select(faces.object_id, faces.face_id, faces.name)
-    ):
-        found[object_id][face_id] = name
-    return found
+    return [_rounded(symbol_triangles(symbols, label).ravel()) for label in range(len(strokes))]
 
 
 def _drawings(
@@ -257,13 +219,13 @@ def _drawings(
     """Yield depth, drawing and corners of the sheets of a face that are seen, then its symbols."""
     nearest = -np.inf
     for sheet in face_sheets(face):
-        normal = np.cross(sheet[0][1] - sheet[0][0], sheet[0][2] - sheet[0][1])
-        if face.round is None:
-            normal = face.T_object_face[:3, 2]
-        normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
+        normal = face.T_object_face[:3, 2]
+        if face.round is not None:
+            normal = np.cross(sheet[0][1] - sheet[0][0], sheet[0][2] - sheet[0][1])
+            normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
         if normal @ axes[:, 2] < 1e-6:
             continue
-        shade = DARK + (LIGHT - DARK) * max(0.0, float(normal @ SUN) / float(np.linalg.norm(SUN)))
+        shade = DARK + (LIGHT - DARK) * max(0.0, float(normal @ SUN / np.linalg.norm(SUN)))
         loops = [loop @ axes for loop in sheet]
         path = "".join(f"M{_path(loop[:, :2])}z" for loop in loops)
         fill = f"hsl(210 16% {shade:.0f}%)"
@@ -280,11 +242,8 @@ def _drawings(
     if len(dots):
         path = "".join(f"M{u:.1f} {v:.1f}h0" for u, v in dots.tolist())
         size = DOT * held.style.pitch_mm
-        yield (
-            nearest + 1e-3,
-            (f'<path d="{path}" stroke="hsl(210 22% 40%)" stroke-width="{size:.1f}"/>'),
-            dots,
-        )
+        drawing = f'<path d="{path}" stroke="hsl(210 22% 40%)" stroke-width="{size:.1f}"/>'
+        yield nearest + 1e-3, drawing, dots
 
 
 def _path(points: Array) -> str:

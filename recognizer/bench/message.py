@@ -58,18 +58,7 @@ class FrameMessage:
         return self._made[filter_name]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MosaicMessage:
-    """A mosaic for the pages."""
-
-    made: bytes
-
-    def as_bytes(self, _filter_name: str, /) -> bytes:
-        """Return the message, the same for every page."""
-        return self.made
-
-
-def mosaic_message(image: GlobalImage, touches: int) -> MosaicMessage:
+def mosaic_message(image: GlobalImage, touches: int) -> bytes:
     """Return a mosaic's image, thinned where it is large."""
     thin = max(1, -(-max(image.values.shape, default=0) // MOSAIC_CELLS))
     values, known = image.values[::thin, ::thin], image.known[::thin, ::thin]
@@ -78,26 +67,16 @@ def mosaic_message(image: GlobalImage, touches: int) -> MosaicMessage:
     head = _MOSAIC.pack(
         b"M", 0, 0, 0, *values.shape, touches, image.step_mm * thin, *image.corner_mm, top
     )
-    return MosaicMessage(head + np.where(known, scaled + 1, 0).astype(np.uint8).tobytes())
+    return head + np.where(known, scaled + 1, 0).astype(np.uint8).tobytes()
 
 
 def filter_image(
     readings: Array, sensor: SensorType, filter_name: str, bias: Array | None = None
 ) -> Array:
-    """Return an image through a filter.
+    """Return an image (rows, columns), counts or newtons, through one of `FILTERS`.
 
-    Parameters
-    ----------
-    readings
-        (rows, columns) counts or newtons.
-    filter_name
-        One of `FILTERS`.
-    bias
-        (rows, columns) reading at rest; the lowest twentieth of the image if not given.
-
-    Returns
-    -------
-    (rows, columns) in the same unit; Sobel: its slope per mm.
+    `bias` is the reading at rest; the lowest twentieth of the image if not given. The result has
+    the same unit; that of Sobel is a slope per mm.
     """
     if filter_name == "raw":
         return readings

@@ -27,10 +27,9 @@ from probe.errors import ProbeError
 from probe.frame import Frame
 from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker
-from recognizer.bench.message import MosaicMessage, mosaic_message
+from recognizer.bench.message import mosaic_message
 from recognizer.bench.touch_log import TouchLog
-from recognizer.scan.mosaic.grow import add_touch
-from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
+from recognizer.scan.mosaic.mosaic import Mosaic, add_touch, no_touches
 from recognizer.scan.mosaic.planar import PlacedTouch, decoded_place
 from recognizer.scan.session import Scan
 from recognizer.touch.lab import open_lab
@@ -68,16 +67,9 @@ class ReadTrigger:
     _answered: bool = False
 
     def phase(self, forces: Array, *, contact: bool, now_s: float) -> Phase:
-        """Return what a frame is.
+        """Return what a frame is, by its forces (rows, columns) over the background.
 
-        Parameters
-        ----------
-        forces
-            (rows, columns) over the background.
-        contact
-            Whether anything is touched.
-        now_s
-            Any clock, s.
+        `now_s` is any clock, s.
         """
         before, self._before = self._before, forces if contact else None
         if not contact:
@@ -139,36 +131,28 @@ class ScanMode:
             answer = scan.add(signal, seq=number)
             self._answer = answer_json(answer, reader.lab, self._sensor)
             places = scan.places
-            shares = [place.share for place in places]
-            entropy = -sum(share * math.log(share) for share in shares if share > 0)
-            self._steps.append(
-                {
-                    "touch": number,
-                    "places": round(math.exp(entropy), 2) if places else None,
-                    "likeliest": [
-                        {"object": one.object, "face": one.face, "index": list(one.index),
-                         "share": round(one.share, 4)}
-                        for one in places[: LIKELIEST]
-                    ],
-                    "answered": bool(answer),
-                    "doubt": answer.doubt,
-                }
-            )  # fmt: skip
+            entropy = -sum(one.share * math.log(one.share) for one in places if one.share > 0)
+            self._steps.append({
+                "touch": number,
+                "places": round(math.exp(entropy), 2) if places else None,
+                "likeliest": [
+                    {"object": one.object, "face": one.face, "index": list(one.index),
+                     "share": round(one.share, 4)}
+                    for one in places[:LIKELIEST]
+                ],
+                "answered": bool(answer), "doubt": answer.doubt,
+            })  # fmt: skip
             del self._steps[:-STEPS]
             self._publish()
 
     def _publish(self) -> None:
         scan = self._scan
-        self._broker.publish(
-            "scan",
-            {
-                "on": self._on,
-                "touches": 0 if scan is None else scan.touches,
-                "changes": 0 if scan is None else scan.changes,
-                "answer": self._answer,
-                "steps": self._steps,
-            },
-        )
+        self._broker.publish("scan", {
+            "on": self._on,
+            "touches": 0 if scan is None else scan.touches,
+            "changes": 0 if scan is None else scan.changes,
+            "answer": self._answer, "steps": self._steps,
+        })  # fmt: skip
 
 
 class FaceMosaics:
@@ -212,7 +196,7 @@ class FaceMosaics:
                 face: len(one) for (held, face), one in self._mosaics.items() if held == object_name
             }
 
-    def picture(self, object_name: str, face: str) -> MosaicMessage | None:
+    def picture(self, object_name: str, face: str) -> bytes | None:
         """Return the mosaic of a face; None where it was not touched."""
         with self._turn:
             mosaic = self._mosaics.get((object_name, face))

@@ -16,11 +16,11 @@ from __future__ import annotations
 import tempfile
 import time
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import FileResponse
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from encoded_objects.base.sensor_type import usual_force_n
 from generator.database.open import open_database
@@ -28,13 +28,13 @@ from generator.database.read import object_entry, read_object, read_parts
 from generator.database.transaction import read_transaction
 from probe.port.listing import list_ports
 from probe.recording.record import Recorder
-from recognizer.bench.command import LAB
-from recognizer.bench.controllers import PrintController
+from recognizer.bench import controllers
 from recognizer.bench.encode_object import face_promises, make_example
 from recognizer.bench.errors import BusyError, UnknownError
 from recognizer.bench.files import Uploads, find_file, part_folder, part_to_send
 from recognizer.bench.lab_json import arrays_json, map_json, object_json, object_svg, objects_json
 from recognizer.bench.message import FILTERS
+from recognizer.bench.options import LAB
 from recognizer.bench.session import Session
 from recognizer.bench.simulated import TOUCH
 from recognizer.bench.touch_log import NAME_LENGTH
@@ -46,117 +46,88 @@ KEPT = {"cache-control": "private, max-age=86400"}  #: its address holds the tim
 DATABASE_S = 2.0  #: wait for other users of the database; then the page shows who holds it
 
 
-class _Request(BaseModel):
-    """A body."""
+Name = Annotated[str, Field(max_length=200)]
 
+
+class _Body(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class PortRequest(_Request):
-    """Which port to read; empty: none."""
-
-    url: str = Field(max_length=400)
+class _Port(_Body):
+    url: str = Field(max_length=400)  #: empty: none
     sensor: int | None = Field(default=None, ge=0, le=7)
 
 
-class SensorRequest(_Request):
-    """Which sensor of the board."""
-
-    sensor: int = Field(ge=0, le=7)
+class _Sensor(_Body):
+    sensor: int = Field(ge=0, le=7)  #: of the board
 
 
-class SwitchRequest(_Request):
-    """On or off."""
-
+class _Switch(_Body):
     on: bool
 
 
-class ReplayRequest(_Request):
-    """A recording to play, or what to do on its time line."""
-
-    name: str = Field(default="", max_length=200)
+class _Replay(_Body):
+    name: Name = ""  #: of a recording to play; empty: work on the time line
     playing: bool | None = None
-    speed: float | None = Field(default=None, allow_inf_nan=False)
-    at_s: float | None = Field(default=None, allow_inf_nan=False)
+    speed: FiniteFloat | None = None
+    at_s: FiniteFloat | None = None
 
 
-class TouchRequest(_Request):
-    """Where the simulated probe comes down: face frame."""
-
-    object: str = Field(max_length=200)
-    face: str = Field(max_length=200)
-    x_mm: float = Field(allow_inf_nan=False)
-    y_mm: float = Field(allow_inf_nan=False)
-    theta_deg: float = Field(default=0.0, allow_inf_nan=False)
-    force_n: float | None = Field(default=None, allow_inf_nan=False)  #: None: as its type takes
+class _Touch(_Body):
+    object: Name
+    face: Name
+    x_mm: FiniteFloat  #: face frame
+    y_mm: FiniteFloat
+    theta_deg: FiniteFloat = 0.0
+    force_n: FiniteFloat | None = None  #: None: as its type takes
 
 
-class LoadRequest(_Request):
-    """An even load on the simulated probe."""
-
-    newtons: float = Field(allow_inf_nan=False)
+class _Load(_Body):
+    newtons: FiniteFloat
 
 
-class UnplugRequest(_Request):
-    """How long the simulated probe is away."""
-
-    seconds: float = Field(allow_inf_nan=False)
+class _Unplug(_Body):
+    seconds: FiniteFloat
 
 
-class CalibrationRequest(_Request):
-    """A step of a calibration."""
-
+class _Calibration(_Body):
     do: Literal["begin", "read", "again", "finish", "cancel", "use"]
     newtons: list[float] = Field(default_factory=list, max_length=64)
-    seconds: float = Field(default=3.0, allow_inf_nan=False)
+    seconds: FiniteFloat = 3.0
     simulated_board: bool = False
-    name: str = Field(default="", max_length=200)
+    name: Name = ""
 
 
-class FlipRequest(_Request):
-    """Changes that are undone in every image, as `columns,values`; empty: none."""
-
-    changes: str = Field(max_length=100)
+class _Flip(_Body):
+    changes: str = Field(max_length=100)  #: undone in every image, as `columns,values`
 
 
-class MountingRequest(_Request):
-    """A touch that was placed by hand on a face."""
-
-    touch: int
-    object: str = Field(max_length=200)
-    face: str = Field(max_length=200)
+class _Mounting(_Body):
+    touch: int  #: placed by hand on a face
+    object: Name
+    face: Name
 
 
-class LearnedRequest(_Request):
-    """Learn the sensor, or read by what was learned; an empty name: by its type alone."""
-
+class _Learned(_Body):
     do: Literal["learn", "use"]
-    name: str = Field(default="", max_length=200)
+    name: Name = ""  #: to read by; empty: by the sensor's type alone
 
 
-class PrintRequest(_Request):
-    """Estimate a print from the touches after one, or keep the estimate."""
-
+class _Print(_Body):
     do: Literal["estimate", "store"]
-    after: int = 0
+    after: int = 0  #: touch, from whose successors a print is estimated
     material: str = Field(default="", max_length=80)
 
 
-class NameRequest(_Request):
-    """How a touch is called."""
-
+class _TouchName(_Body):
     name: str = Field(max_length=NAME_LENGTH)
 
 
 def api_routes(session: Session, ports: Ports, parts: Path | None) -> APIRouter:
     """Return the routes of a session.
 
-    Parameters
-    ----------
-    ports
-        URLs and labels that are always offered.
-    parts
-        Folder of the files that may be downloaded; None: the database's.
+    `ports` are URLs and labels that are always offered, `parts` is the folder of the files that may
+    be downloaded; None: the database's.
     """
     routes = APIRouter(prefix="/api")
     _add_session_routes(routes, session, ports)
@@ -183,20 +154,16 @@ def _add_session_routes(routes: APIRouter, session: Session, ports: Ports) -> No
             "folder": str(session.folder),
             "filters": FILTERS,
             "sensor": {
-                "rows": sensor.rows,
-                "columns": sensor.columns,
-                "pitch_mm": sensor.pitch_mm,
-                "row_pitch_mm": sensor.step_mm[1],
-                "type": sensor.name,
-                "overlay": sensor.overlay.kind,
-                "overlay_mm": sensor.overlay.height_mm,
+                "rows": sensor.rows, "columns": sensor.columns, "type": sensor.name,
+                "pitch_mm": sensor.pitch_mm, "row_pitch_mm": sensor.step_mm[1],
+                "overlay": sensor.overlay.kind, "overlay_mm": sensor.overlay.height_mm,
                 "force_n": usual_force_n(sensor),
             },
             "margin": (reader.options if reader else DEFAULTS).margin,
-        }
+        }  # fmt: skip
 
     @routes.post("/port")
-    def port(body: PortRequest) -> dict[str, Any]:
+    def port(body: _Port) -> dict[str, Any]:
         if body.url and body.url not in {entry["url"] for entry in port_list()}:
             raise UnknownError(
                 f"{body.url[:80]} is none of the ports that are offered",
@@ -206,22 +173,22 @@ def _add_session_routes(routes: APIRouter, session: Session, ports: Ports) -> No
         return session.as_json()
 
     @routes.post("/sensor")
-    def sensor(body: SensorRequest) -> dict[str, Any]:
+    def sensor(body: _Sensor) -> dict[str, Any]:
         session.select(body.sensor)
         return session.as_json()
 
     @routes.post("/bias")
-    def bias(body: SwitchRequest) -> dict[str, Any]:
-        session.calibrations.bias(on=body.on)
+    def bias(body: _Switch) -> dict[str, Any]:
+        session.switch_bias(on=body.on)
         return session.as_json()
 
     @routes.post("/record")
-    def record(body: SwitchRequest) -> dict[str, Any]:
+    def record(body: _Switch) -> dict[str, Any]:
         session.record(on=body.on)
         return session.as_json()
 
     @routes.post("/replay")
-    def replay(body: ReplayRequest) -> dict[str, Any]:
+    def replay(body: _Replay) -> dict[str, Any]:
         if body.name:
             session.replay(body.name)
         else:
@@ -239,49 +206,49 @@ def _add_session_routes(routes: APIRouter, session: Session, ports: Ports) -> No
 
 
 def _add_sensor_routes(routes: APIRouter, session: Session) -> None:
-    prints = PrintController(session)
+    prints = controllers.PrintController(session)
 
     @routes.post("/calibration")
-    def calibration(body: CalibrationRequest) -> dict[str, Any]:
+    def calibration(body: _Calibration) -> dict[str, Any]:
         if body.do == "begin":
-            session.calibrations.begin(
-                body.newtons, body.seconds, simulated_board=body.simulated_board
+            controllers.begin_calibration(
+                session, body.newtons, body.seconds, simulated_board=body.simulated_board
             )
         elif body.do == "finish":
-            return session.calibrations.finish()
+            return controllers.finish_calibration(session)
         elif body.do == "cancel":
-            session.calibrations.cancel()
+            controllers.cancel_calibration(session)
         elif body.do == "use":
-            session.calibrations.use(body.name)
+            controllers.use_calibration(session, body.name)
         else:
-            with session.calibrations.guide() as guide:
+            with controllers.guide_of(session) as guide:
                 guide.read() if body.do == "read" else guide.guide.again()
         return session.as_json()
 
     @routes.post("/scan")
-    def scan(body: SwitchRequest) -> dict[str, Any]:
+    def scan(body: _Switch) -> dict[str, Any]:
         session.recognition.scan.switch(on=body.on)
         return {"on": body.on}
 
     @routes.post("/flip")
-    def flip(body: FlipRequest) -> dict[str, Any]:
-        session.mounting.flip(body.changes)
-        return session.mounting.as_json()
+    def flip(body: _Flip) -> dict[str, Any]:
+        controllers.flip_images(session, body.changes)
+        return session.sensor_json()
 
     @routes.post("/mounting")
-    def mounting(body: MountingRequest) -> dict[str, Any]:
-        return session.mounting.mounting(body.touch, body.object, body.face)
+    def mounting(body: _Mounting) -> dict[str, Any]:
+        return controllers.check_mounting(session, body.touch, body.object, body.face)
 
     @routes.post("/learned")
-    def learned(body: LearnedRequest) -> dict[str, Any]:
+    def learned(body: _Learned) -> dict[str, Any]:
         if body.do == "learn":
-            session.mounting.learn()
+            controllers.learn_from_touches(session)
         else:
-            session.mounting.use(body.name)
-        return session.mounting.as_json()
+            controllers.use_learned(session, body.name)
+        return session.sensor_json()
 
     @routes.post("/as-built")
-    def as_built(body: PrintRequest) -> dict[str, Any]:
+    def as_built(body: _Print) -> dict[str, Any]:
         if body.do == "store":
             return prints.store()
         return prints.estimate(body.after, body.material)
@@ -289,7 +256,7 @@ def _add_sensor_routes(routes: APIRouter, session: Session) -> None:
 
 def _add_simulation_routes(routes: APIRouter, session: Session) -> None:
     @routes.post("/touch")
-    def touch(body: TouchRequest) -> dict[str, Any]:
+    def touch(body: _Touch) -> dict[str, Any]:
         force_n = usual_force_n(session.sensor) if body.force_n is None else body.force_n
         session.simulated().touch(
             body.object, body.face, body.x_mm, body.y_mm, body.theta_deg, force_n
@@ -302,12 +269,12 @@ def _add_simulation_routes(routes: APIRouter, session: Session) -> None:
         return {"touched": True}
 
     @routes.post("/load")
-    def load(body: LoadRequest) -> dict[str, Any]:
+    def load(body: _Load) -> dict[str, Any]:
         session.simulated().load(body.newtons)
         return {"newtons": body.newtons}
 
     @routes.post("/unplug")
-    def unplug(body: UnplugRequest) -> dict[str, Any]:
+    def unplug(body: _Unplug) -> dict[str, Any]:
         session.simulated().unplug(body.seconds)
         return {"seconds": body.seconds}
 
@@ -329,12 +296,7 @@ def _add_recording_routes(routes: APIRouter, session: Session) -> None:
     def frame() -> Response:
         newest, values, unit = session.newest()
         rows = "".join(",".join(f"{value:g}" for value in row) + "\r\n" for row in values)
-        name = f"frame-{newest.seq}-{unit}.csv"
-        return Response(
-            rows,
-            media_type="text/csv",
-            headers={"content-disposition": f'attachment; filename="{name}"'},
-        )
+        return _download(rows.encode(), f"frame-{newest.seq}-{unit}.csv", "text/csv")
 
 
 def _add_touch_routes(routes: APIRouter, session: Session) -> None:
@@ -349,7 +311,7 @@ def _add_touch_routes(routes: APIRouter, session: Session) -> None:
         return log.one(number)
 
     @routes.post("/touches/{number}")
-    def rename(number: int, body: NameRequest) -> dict[str, Any]:
+    def rename(number: int, body: _TouchName) -> dict[str, Any]:
         return log.rename(number, body.name)
 
     @routes.delete("/touches/{number}")
@@ -387,7 +349,7 @@ def _add_touch_routes(routes: APIRouter, session: Session) -> None:
         found = session.recognition.mosaics.picture(name, face)
         if found is None:
             raise UnknownError(f"{name} {face} was not touched yet", fix="touch it first")
-        return Response(found.as_bytes(""), media_type="application/octet-stream")
+        return Response(found, media_type="application/octet-stream")
 
 
 def _add_lab_routes(routes: APIRouter, session: Session, parts: Path | None) -> None:

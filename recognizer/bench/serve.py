@@ -10,7 +10,6 @@ import secrets
 import signal
 import socket
 import sys
-from collections.abc import Callable
 from contextlib import suppress
 from types import FrameType
 from typing import Any
@@ -24,9 +23,9 @@ from generator.database.open import database_exists
 from probe.errors import ProbeError
 from recognizer.bench.app import application
 from recognizer.bench.broker import Broker
-from recognizer.bench.command import BenchOptions
 from recognizer.bench.errors import BenchError
 from recognizer.bench.guard import RequestGuard, access_rules, is_loopback
+from recognizer.bench.options import LAB, BenchOptions
 from recognizer.bench.session import Session
 
 SOFTWARE = ("sim:touch", "Simulated probe: click on the part")
@@ -44,7 +43,7 @@ def serve(options: BenchOptions) -> int:
     Raises
     ------
     BenchError, DatabaseError, ProbeError
-        When an option cannot be met.
+        An option cannot be met.
     """
     if options.token and not _TOKEN.fullmatch(options.token):
         raise BenchError(
@@ -60,7 +59,8 @@ def serve(options: BenchOptions) -> int:
     broker = Broker()
     session = Session(database, options.folder, sensor, broker)
     try:
-        _begin(session, options.port)
+        if options.port or session.database:
+            session.open(options.port or SOFTWARE[0])
         app = application(session, broker, _ports(options.port), options.parts)
         config = uvicorn.Config(
             RequestGuard(app, access_rules(options.host, token)),
@@ -70,7 +70,13 @@ def serve(options: BenchOptions) -> int:
             http=_IdleTimeout,
         )  # fmt: skip
         server = uvicorn.Server(config)
-        server.handle_exit = _mark_ending(session, server.handle_exit)
+        end = server.handle_exit
+
+        def mark_ending(number: int, frame: FrameType | None) -> None:
+            session.ending = True  # the reading of a recording, which `end` waits for
+            end(number, frame)
+
+        server.handle_exit = mark_ending
         sys.stdout.write(_address(options.host, line.getsockname()[1], token) + "\n")
         sys.stdout.flush()
         server.run(sockets=[line])
@@ -86,7 +92,7 @@ def serve(options: BenchOptions) -> int:
 class _IdleTimeout(H11Protocol):  # type: ignore[misc]  # uvicorn has no types
     """Close connections that send no request within `FIRST_REQUEST_S` (slow loris).
 
-    uvicorn bounds the pauses between requests, but not the wait for the first one.
+    uvicorn bounds the pauses between requests alone.
     """
 
     _deadline: asyncio.TimerHandle | None = None
@@ -121,36 +127,16 @@ def _end(_number: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-def _mark_ending(
-    session: Session, end: Callable[[int, FrameType | None], None]
-) -> Callable[[int, FrameType | None], None]:
-    """Return a signal handler that first ends the reading of a recording, which `end` waits for."""
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        session.ending = True
-        end(number, frame)
-
-    return handle
-
-
-def _begin(session: Session, port: str) -> None:
-    """Open the port that was asked for, or else the simulated probe."""
-    if port:
-        session.open(port)
-    elif session.database:
-        session.open(SOFTWARE[0])
-
-
 def _database(url: str) -> str:
     """Return the database, or nothing if none was named and the usual one is not there."""
     try:
         if database_exists(url):
             return url
     except DatabaseError:
-        if url != "lab.db":
+        if url != LAB:
             raise
-    if url == "lab.db":
-        sys.stderr.write("open-bench: there is no lab.db here; images are shown, not recognised\n")
+    if url == LAB:
+        sys.stderr.write(f"open-bench: there is no {LAB} here; images are shown, not recognised\n")
         return ""
     raise DatabaseError(
         "there is no such database", fix="register an object with encode-object first", place=url
@@ -163,19 +149,15 @@ def _ports(port: str) -> tuple[tuple[str, str], ...]:
 
 
 def _open_socket(host: str, port: int) -> socket.socket:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    line = socket.socket(family, socket.SOCK_STREAM)
-    line.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    six = ":" in host
+    family = socket.AF_INET6 if six else socket.AF_INET
     try:
-        line.bind((host, port))
-        line.listen(128)  # who knows the address may come, and waits
+        return socket.create_server((host, port), family=family, backlog=128, dualstack_ipv6=six)
     except OSError as error:
-        line.close()
         raise ProbeError(
             f"cannot listen on {host} port {port}: {os.strerror(error.errno or 0)}",
             fix="give another --web-port; 0 takes any free one",
         ) from error
-    return line
 
 
 def _address(host: str, port: int, token: str) -> str:

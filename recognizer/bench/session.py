@@ -9,6 +9,8 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +22,17 @@ from probe.frame import Frame
 from probe.port.url import address_of
 from probe.recording.read import Recording
 from recognizer.bench.broker import Broker
-from recognizer.bench.calibration import CalibrationState
-from recognizer.bench.controllers import STATE, CalibrationController, SensorController
 from recognizer.bench.errors import BusyError
-from recognizer.bench.feed import Feed, NoFeed, ProbeFeed, ReplayFeed
+from recognizer.bench.feed import Feed, ProbeFeed, ReplayFeed
 from recognizer.bench.files import find_file, list_files
-from recognizer.bench.frames import FrameHandler
+from recognizer.bench.frames import CalibrationState, FrameHandler
 from recognizer.bench.reading import RecognitionThread
 from recognizer.bench.simulated import TouchProbe, is_simulation
+from recognizer.sensor.learn import LEAST_TOUCHES
 
 Array = NDArray[np.float64]
 
+STATE = ".state.json"  #: ending of the files of learned sensors
 WAIT_S = 0.05  #: of the thread for a frame
 STATUS_S = 0.25  #: between two reports
 NOTICES = 40  #: that are kept for the page
@@ -38,18 +40,10 @@ IDLE_S = 5.0  #: without page, recording and calibration, after which the port i
 
 
 class Session:
-    """The bench's state.
+    """The bench's state, which is published at a broker.
 
-    Parameters
-    ----------
-    database
-        Of the objects; empty: none.
-    folder
-        For recordings and calibrations; made when something is written.
-    sensor
-        What the probe is.
-    broker
-        Where everything is published.
+    Objects are those of `database`; empty: none. The folder of recordings and calibrations is made
+    when something is written.
     """
 
     def __init__(self, database: str, folder: Path, sensor: SensorType, broker: Broker) -> None:
@@ -58,13 +52,14 @@ class Session:
         self.simulation: TouchProbe | None = None
         self._broker = broker
         self.lock = threading.RLock()
-        self.feed: Feed = NoFeed()
+        self.feed: Feed = Feed()
         self._url = ""
         self.frames = FrameHandler(sensor, broker, self.recognition, self.note)
         self._notices: deque[tuple[int, float, str]] = deque(maxlen=NOTICES)
         self._noted = 0
         self._started_ms = time.time() * 1e3
-        self.calibrations, self.mounting = CalibrationController(self), SensorController(self)
+        self.learning: float | None = None  #: share of the learning that is done; None: none is
+        self.learned: dict[str, str] | None = None  #: name and words of the state in use
         self.ending = False  #: set by a signal: what reads a whole recording ends
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
@@ -78,15 +73,22 @@ class Session:
             self._leave()
         self.recognition.close()
 
+    @contextmanager
+    def changed(self) -> Iterator[None]:
+        """Hold the lock, and publish the state after a change."""
+        with self.lock:
+            yield
+            self.report()
+
     def open(self, url: str, sensor: int | None = None) -> None:
         """Read another port.
 
         Raises
         ------
         BenchError, PortError, RecordingError, SensorTypeError
-            When the URL cannot be read, names no recording, or one of another sensor type.
+            The URL cannot be read, names no recording, or one of another sensor type.
         """
-        with self.lock:
+        with self.changed():
             self._leave()
             if is_simulation(url):
                 self.simulation = TouchProbe(url, self.database, self.sensor)
@@ -95,49 +97,44 @@ class Session:
                 target = address_of(url).target
                 recording = Recording(target)
                 recording.sensor_type(self.sensor)  # of another shape: refused
-                self.feed = feed = ReplayFeed(url, recording, lambda: self.ending)
+                self.feed = feed = ReplayFeed(recording, lambda: self.ending)
                 self.frames.replayed = (Path(target).name, feed.began_ns)
             elif url:
                 address_of(url)
                 self.feed = ProbeFeed(url, sensor)
             self._url = url
-            self.report()
 
     def replay(self, name: str) -> None:
         """Play a recording of the folder."""
-        path = find_file(self.folder, name, ".h5")
-        self.open(f"file:{path}")
+        self.open(f"file:{find_file(self.folder, name, '.h5')}")
 
     def timeline(self) -> ReplayFeed:
-        """Return the recording that is played.
-
-        Raises
-        ------
-        BusyError
-            None is played.
-        """
+        """Return the recording that is played; refused if none is."""
         feed = self.feed
         if not isinstance(feed, ReplayFeed):
             raise BusyError("no recording is played", fix="choose a recording first")
         return feed
 
+    def probe(self) -> ProbeFeed:
+        """Return the probe that is connected; refused if none is."""
+        feed = self.feed
+        if not isinstance(feed, ProbeFeed):
+            raise BusyError("no probe is connected", fix="choose a port first")
+        return feed
+
     def select(self, sensor: int) -> None:
         """Read another sensor of the board."""
-        with self.lock:
-            if not isinstance(self.feed, ProbeFeed):
-                raise BusyError("no probe is connected", fix="choose a port first")
-            self.feed.select(sensor)
+        with self.changed():
+            self.probe().select(sensor)
             self.frames.state = CalibrationState()
-            self.report()
+
+    def switch_bias(self, *, on: bool) -> None:
+        """Take the bias of the unloaded sensor, or do without it."""
+        with self.changed():
+            self.note(self.frames.state.switch_bias(on=on))
 
     def simulated(self) -> TouchProbe:
-        """Return the simulated probe.
-
-        Raises
-        ------
-        BusyError
-            When another one is connected.
-        """
+        """Return the simulated probe; refused if another one is connected."""
         if self.simulation is None:
             raise BusyError(
                 "the probe that is connected is not simulated",
@@ -147,20 +144,13 @@ class Session:
 
     def use_database(self, database: str) -> None:
         """Read the objects of a database from now on."""
-        with self.lock:
+        with self.changed():
             self.database = self.recognition.database = database
             self.recognition.reload()
             self.note(f"objects are those of {database}")
-            self.report()
 
     def touch_next(self) -> None:
-        """Let the simulated probe make the step that the newest answer proposes.
-
-        Raises
-        ------
-        BusyError
-            It proposes none, or the probe is not simulated.
-        """
+        """Let the simulated probe make the step that the newest answer proposes."""
         proposed = (self.recognition.touches.newest_answer() or {}).get("next")
         if not proposed:
             raise BusyError("no next touch is proposed", fix="touch the part first")
@@ -174,25 +164,17 @@ class Session:
         Raises
         ------
         BusyError, RecordingError
-            When there is nothing to record, or no place for it.
+            There is nothing to record, or no place for it.
         """
-        with self.lock:
-            if not on:
-                self.frames.end_recording()
-            elif not isinstance(self.feed, ProbeFeed):
-                raise BusyError("no probe is connected", fix="choose a port first")
-            else:
+        with self.changed():
+            if on:
+                self.probe()
                 self.frames.start_recording(self.folder, self.sensor_name(), self._url)
-            self.report()
+            else:
+                self.frames.end_recording()
 
     def newest(self) -> tuple[Frame, Array, str]:
-        """Return the newest frame, what is shown of it, and its unit.
-
-        Raises
-        ------
-        BusyError
-            When none came yet.
-        """
+        """Return the newest frame, its readings, and their unit; refused if none came yet."""
         with self.lock:
             return self.frames.newest()
 
@@ -208,13 +190,23 @@ class Session:
                 "calibrations": [
                     name for name in list_files(self.folder, ".json") if not name.endswith(STATE)
                 ],
-                **self.mounting.as_json(),
+                **self.sensor_json(),
                 "notices": [
                     {"number": n, "at_ms": at_ms, "text": text} for n, at_ms, text in self._notices
                 ],
                 "pages": len(self._broker.subscribers),
                 "started_ms": self._started_ms,
             }  # fmt: skip
+
+    def sensor_json(self) -> dict[str, Any]:
+        """Return mounting and learned state of the sensor for the page."""
+        return {
+            "flip": ",".join(self.frames.wiring.changes),
+            "learning": self.learning,
+            "learned": self.learned,
+            "states": list_files(self.folder, STATE),
+            "least": LEAST_TOUCHES,
+        }
 
     def _run(self) -> None:
         due_s, wanted_s = 0.0, time.monotonic()
@@ -237,7 +229,7 @@ class Session:
     def _leave(self) -> None:
         """Close what is connected."""
         self.frames.leave()
-        feed, self.feed = self.feed, NoFeed()
+        feed, self.feed = self.feed, Feed()
         feed.close()
         if self.simulation is not None:
             self.simulation.close()

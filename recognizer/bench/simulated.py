@@ -2,9 +2,13 @@
 
     sim:touch
 
-Options: rate (frames a second, 100), noise (typical, quiet), hold (s, 2), seed. It is a device
-on a serial line, which can be unplugged, and its frames say nothing of where it stands. `touch:`
-is the old spelling.
+Options: rate (frames a second, 100), noise (typical, quiet), hold (s, 2), seed. `touch:` is the old
+spelling. It is a device on a serial line, which can be unplugged, and its frames say nothing of
+where it stands.
+
+Touch on a face -> forces -> counts at the board's rate. The probe rests, comes down, holds, and
+lifts; on the way down and up, a beat each, the forces are taken in proportion. The film remembers
+(hysteresis, creep), and the board is noisy, as in `probe.simulate`. Thesis 4.2.
 """
 
 from __future__ import annotations
@@ -18,8 +22,13 @@ import tty
 from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from urllib.parse import parse_qsl
+
+import numpy as np
+from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
@@ -29,8 +38,8 @@ from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
 from probe.simulate.registered import registered_object, registered_surface
 from probe.simulate.scene import Scene
+from probe.simulate.sensor import simulated_sensor
 from recognizer.bench.errors import BenchError
-from recognizer.bench.press_sequence import PressSequence, SimulationSettings
 
 TOUCH, FORMERLY = "sim:touch", "touch:"
 WAIT_S = 0.005  #: of the probe for its next frame, and so of a command for its answer
@@ -39,25 +48,106 @@ AT_ONCE = 4096  #: bytes read
 LOST = 65536  #: bytes that wait for a reader; more are thrown away, as on a real line
 SCENES = 32  #: surfaces that are kept
 UNPLUGGED_S = 60.0  #: at most
-_OPTIONS = ("rate", "noise", "hold", "seed")
+STEPS = (0.5,)  #: shares of the force on the way down, a frame each
+APART_S = 0.08  #: between two touches
+LOADED_S = 0.1  #: that a load is on before it counts as put on
+UNREAD_S = 5.0  #: longest wait for that
+LARGEST_N = 400.0  #: of a touch; a load may be ten times as large
+#: default, least and most of the numbers among the options
+RANGES = {"rate": (100.0, 1.0, 500.0), "hold": (2.0, 0.1, 3600.0), "seed": (0.0, 0.0, 2.0**31)}
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationSettings:
+    """How the simulated probe is built and moves."""
+
+    rate: float = 100.0  #: frames per second
+    noise: str = "typical"  #: or quiet
+    hold_s: float = 2.0  #: how long a touch lasts
+    seed: int = 0
+
+
+class PressSequence:
+    """The probe's state; `touch`, `load` and `lift` may be called from any thread."""
+
+    def __init__(self, sensor: SensorType, manner: SimulationSettings) -> None:
+        self.sensor, self.manner = sensor, manner
+        quiet = manner.noise == "quiet"
+        self._sensor = simulated_sensor(sensor, quiet=quiet, frame_s=1 / manner.rate)
+        self._rest = np.zeros(sensor.shape)
+        self._turn = threading.Condition()
+        self._felt = 0  #: beats so far
+        self._coming: list[tuple[int, Array]] = []  #: beats to stay at these forces
+        self._now = self._rest
+
+    def touch(self, scene: Scene, touch: Touch) -> None:
+        """Come down on a surface, hold, and lift.
+
+        Raises
+        ------
+        ContactError, BenchError
+            The touch has no equilibrium, or a force that no operator would use.
+        """
+        if not 0 < touch.force_n <= LARGEST_N:
+            raise BenchError(
+                f"a force of {touch.force_n:g} N", fix=f"give more than 0, at most {LARGEST_N:g} N"
+            )
+        full = self._sensor.press(scene, touch).forces_n
+        held = self._beats(self.manner.hold_s)
+        steps = [(1, share * full) for share in STEPS]
+        self._play([*steps, (held, full), *reversed(steps), (1, self._rest)])
+
+    def load(self, newtons: float) -> None:
+        """Put an even load on, newtons; 0 takes it off. It stays.
+
+        Returns when it was read for `LOADED_S`, or nobody reads the sensor.
+        """
+        if not 0 <= newtons <= 10 * LARGEST_N:
+            raise BenchError(f"a load of {newtons:g} N", fix=f"give 0 to {10 * LARGEST_N:g} N")
+        self._play([(1, np.full(self._rest.shape, newtons / self._rest.size))])
+        with self._turn:
+            then = self._felt + self._beats(LOADED_S)
+            self._turn.wait_for(lambda: self._felt >= then, UNREAD_S)
+
+    def lift(self) -> None:
+        """Lift at once."""
+        self._play([(1, self._rest)])
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield frames without end, numbered and timed from 0."""
+        rng = np.random.default_rng(self.manner.seed)
+        return self._sensor.frames((self._beat() for _ in count()), rng)
+
+    def _beats(self, seconds: float) -> int:
+        return max(1, round(seconds * self.manner.rate))
+
+    def _play(self, coming: list[tuple[int, Array]]) -> None:
+        with self._turn:
+            if self._now.any() and len(coming) > 1:
+                coming = [(self._beats(APART_S), self._rest), *coming]
+            self._coming = coming
+
+    def _beat(self) -> Array:
+        with self._turn:
+            if self._coming:
+                left, self._now = self._coming[0]
+                self._coming[0] = (left - 1, self._now)
+                if left <= 1:
+                    self._coming.pop(0)
+            self._felt += 1
+            self._turn.notify_all()
+            return self._now
 
 
 class TouchProbe:
-    """The simulated probe, running; `url` is its serial line.
-
-    Parameters
-    ----------
-    url
-        See the module.
-    database
-        Whose objects it touches.
-    sensor
-        What it is.
+    """The simulated probe, running, over the objects of a database; `url` is its serial line.
 
     Raises
     ------
     BenchError
-        When an option is unknown or no number.
+        An option is unknown or no number.
     """
 
     def __init__(self, url: str, database: str, sensor: SensorType) -> None:
@@ -79,7 +169,7 @@ class TouchProbe:
         Raises
         ------
         SurfaceError, ContactError, BenchError
-            When there is no such face, or no such touch.
+            There is no such face, or no such touch.
         """
         if not all(map(math.isfinite, (x_mm, y_mm, theta_deg, force_n))):
             raise BenchError("a touch at what is no number", fix="give mm, degrees and N")
@@ -89,13 +179,7 @@ class TouchProbe:
             self._last = (object_name, face, x_mm, y_mm, theta_deg, force_n)
 
     def step(self, dx_mm: float, dy_mm: float, turn_deg: float, force_n: float) -> None:
-        """Touch again, a step further in the axes of the sensor as it stood; force 0: as before.
-
-        Raises
-        ------
-        BenchError
-            Nothing was touched yet. Otherwise as `touch`.
-        """
+        """Touch again, a step further in the axes of the sensor as it stood; force 0: as before."""
         if self._last is None:
             raise BenchError("nothing was touched yet", fix="touch the part first")
         object_name, face, x, y, theta_deg, force = self._last
@@ -119,10 +203,6 @@ class TouchProbe:
     def load(self, newtons: float) -> None:
         """Put an even load on; see `PressSequence.load`."""
         self._presses.load(newtons)
-
-    def lift(self) -> None:
-        """Lift at once."""
-        self._presses.lift()
 
     def unplug(self, seconds: float) -> None:
         """Pull the plug, and put it in again after so many seconds."""
@@ -211,8 +291,7 @@ class SoftwareLine:
                 waiting = b""
             with suppress(BlockingIOError):
                 self._probe.write(os.read(self._near, AT_ONCE))
-            asked = self._probe.streaming
-            waiting += self._probe.read(WAIT_S if asked else IDLE_S)
+            waiting += self._probe.read(WAIT_S if self._probe.streaming else IDLE_S)
             with suppress(BlockingIOError):
                 waiting = waiting[os.write(self._near, waiting) :] if waiting else b""
             if len(waiting) > LOST:  # nobody listens: as on a real line
@@ -224,16 +303,16 @@ def parse_simulation(url: str) -> SimulationSettings:
     """Read the options of a URL: how the probe moves."""
     _, _, query = url.partition("?")
     given = dict(parse_qsl(query, keep_blank_values=True))
-    unknown = sorted(set(given) - set(_OPTIONS))
+    unknown = sorted(set(given) - {*RANGES, "noise"})
     noise = given.get("noise", "typical")
     if unknown or noise not in ("typical", "quiet"):
         raise BenchError(
             f"the simulated probe cannot be had with {query}",
-            fix=f"its options are {', '.join(_OPTIONS)}; noise=typical or quiet",
+            fix="its options are rate, noise, hold, seed; noise=typical or quiet",
             place=url,
         )
     numbers = {}
-    for name, (default, low, high) in _RANGES.items():
+    for name, (default, low, high) in RANGES.items():
         try:
             value = float(given.get(name, default))
         except ValueError:
@@ -244,6 +323,3 @@ def parse_simulation(url: str) -> SimulationSettings:
     return SimulationSettings(
         rate=numbers["rate"], noise=noise, hold_s=numbers["hold"], seed=int(numbers["seed"])
     )
-
-
-_RANGES = {"rate": (100.0, 1.0, 500.0), "hold": (2.0, 0.1, 3600.0), "seed": (0.0, 0.0, 2.0**31)}

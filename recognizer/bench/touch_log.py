@@ -14,9 +14,6 @@ from collections import OrderedDict
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from probe.frame import Frame
 from recognizer.bench.broker import Broker
 from recognizer.bench.errors import BenchError, UnknownError
@@ -45,25 +42,15 @@ class TouchRecord:
     def as_json(self) -> dict[str, Any]:
         """Return all but the image, for the page."""
         return {
-            "number": self.number,
-            "felt_ms": self.felt_ms,
-            "time_s": self.frame.t_ns * 1e-9,
-            "state": self.state,
-            "contact": self.contact,
-            "moving": self.moving,
-            "answer": self.answer,
-            "name": self.name,
-            "recording": self.recording,
-            "at_s": round(self.at_s, 3),
-        }
-
-    def image_json(self) -> dict[str, Any]:
-        """Return the record with its image, (rows, columns) counts."""
-        return self.as_json() | {"counts": self.frame.counts.tolist()}
+            "number": self.number, "felt_ms": self.felt_ms, "time_s": self.frame.t_ns * 1e-9,
+            "state": self.state, "contact": self.contact, "moving": self.moving,
+            "answer": self.answer, "name": self.name,
+            "recording": self.recording, "at_s": round(self.at_s, 3),
+        }  # fmt: skip
 
 
 class TouchLog:
-    """The records; any thread may call."""
+    """The records; any thread may call. A number without a record is an `UnknownError`."""
 
     def __init__(self, broker: Broker) -> None:
         self._broker = broker
@@ -127,24 +114,13 @@ class TouchLog:
             return [record.as_json() for record in self._records.values()]
 
     def one(self, number: int) -> dict[str, Any]:
-        """Return a record with its image.
-
-        Raises
-        ------
-        UnknownError
-            There is none of this number.
-        """
+        """Return a record with its image, (rows, columns) counts."""
         with self._turn:
-            return self._known(number).image_json()
+            record = self._known(number)
+            return record.as_json() | {"counts": record.frame.counts.tolist()}
 
     def rename(self, number: int, name: str) -> dict[str, Any]:
-        """Give a touch a name.
-
-        Raises
-        ------
-        BenchError, UnknownError
-            The name is too long, or there is no such touch.
-        """
+        """Give a touch a name; `BenchError` for one that is too long."""
         if len(name) > NAME_LENGTH:
             raise BenchError(f"a name of {len(name)} characters",
                              fix=f"give at most {NAME_LENGTH}")  # fmt: skip
@@ -154,26 +130,14 @@ class TouchLog:
             return record.as_json()
 
     def delete(self, number: int) -> None:
-        """Forget a touch.
-
-        Raises
-        ------
-        UnknownError
-            There is none of this number.
-        """
+        """Forget a touch."""
         with self._turn:
             self._known(number)
             del self._records[number]
             self._publish_change()
 
     def frame(self, number: int) -> Frame:
-        """Return the frame of a touch that was read.
-
-        Raises
-        ------
-        UnknownError
-            There is none of this number.
-        """
+        """Return the frame of a touch that was read."""
         with self._turn:
             return self._known(number).frame
 
@@ -228,11 +192,9 @@ COLUMNS = (
 def _row(record: TouchRecord) -> list[Any]:
     answer = record.answer or {}
     place = answer.get("place") or {}
-    where = [place.get(key, "") for key in ("x_mm", "y_mm", "theta_deg", "sigma_mm", "sigma_deg")]
-    counts: NDArray[np.uint16] = record.frame.counts
     return [
         record.number, record.name, round(record.felt_ms), round(record.frame.t_ns * 1e-9, 4),
-        record.state, answer.get("object") or "", answer.get("face") or "", *where,
-        answer.get("margin", ""), answer.get("doubt", ""), answer.get("reason", ""),
-        int(counts.sum()),
+        record.state, answer.get("object") or "", answer.get("face") or "",
+        *(place.get(key, "") for key in COLUMNS[7:12]),
+        *(answer.get(key, "") for key in COLUMNS[12:15]), int(record.frame.counts.sum()),
     ]  # fmt: skip

@@ -6,7 +6,7 @@
 
 ::
 
-    app           options
+    app, options  the command and its options
     recognize     touches -> answers, printed and drawn as they come
     scanning      several touches as one belief; how the probe moved
     port          a port -> touches, the sensor, its calibration
@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, NoReturn
 from encoded_objects.base import console
 
 if TYPE_CHECKING:
-    from typer import Typer
+    from encoded_objects.base.options import Application
 
 NAME = "recognize-object"
 
@@ -46,7 +46,7 @@ def run(arguments: list[str]) -> int:
     return console.run(NAME, application, arguments)
 
 
-def application(arguments: list[str]) -> Typer:
+def application(arguments: list[str]) -> Application:
     """Return the application that reads the arguments; a recording needs no command's name."""
     if arguments[:1] == ["as-built"]:
         from recognizer.command.as_built import app

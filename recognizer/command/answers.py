@@ -50,12 +50,9 @@ class Answer:
         return entry
 
     def sentence(self, needed: int) -> str:
-        """Return it in a line: what and where, or why not and what to do.
+        """Return it in a line: object and place, or the reason and the way out.
 
-        Parameters
-        ----------
-        needed
-            About how many touches an answer of a scan takes.
+        An answer of a scan takes about `needed` touches.
         """
         text = f"{self.touch.seq}: {self.found}"
         text += "" if self.in_base is None else f"; {self.in_base}"
@@ -94,15 +91,13 @@ class AnswerSink(ABC):
 def _edge_json(edge: Edge, found: Recognition) -> dict[str, Any]:
     """Return an edge in the sensor frame, and on the object if it is known.
 
-    Positions are of the middle of what is seen, mm; the face lies left of the direction.
+    Positions are those of its middle, mm; the face lies left of the direction.
     """
     value: dict[str, Any] = {
-        "position_mm": edge.middle_mm,
-        "direction_deg": edge.direction_deg,
+        "position_mm": edge.middle_mm, "direction_deg": edge.direction_deg,
         "length_mm": edge.length_mm,
-        "position_sd_mm": edge.across_mm,
-        "direction_sd_deg": edge.turn_deg,
-    }
+        "position_sd_mm": edge.across_mm, "direction_sd_deg": edge.turn_deg,
+    }  # fmt: skip
     if found.T_object_probe is not None:
         T, angle = found.T_object_probe, edge.angle_rad
         value["object_position_mm"] = T[:3, :2] @ edge.middle_mm + T[:3, 3]

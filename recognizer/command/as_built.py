@@ -11,7 +11,6 @@ from encoded_objects.base.options import Argument, Json, Option, command
 from recognizer.command.options import Calibration, Database
 
 if TYPE_CHECKING:
-    from encoded_objects.base.output import ProgressBar
     from recognizer.as_built.estimate import MeasuredPrint
     from recognizer.touch.source import TouchImage
 
@@ -22,12 +21,7 @@ part's file. With [bold]--store[/] the database keeps it, and every later pose o
 on parts of the same printer that nobody has touched so, is corrected by it.
 """
 
-app = console.application()
-
-
-@app.callback()
-def _commands() -> None:
-    """Say what a print is like."""
+app = console.application(named=True)
 
 
 @command(app, "as-built", help=HELP)
@@ -100,11 +94,13 @@ def _touched_prints(
         warning(source.notice)
     reader = Reader(lab, source.sensor, WIDE_SCALE)
     with progress_bar("reading", source.frames) as bar:
-        touches = _counted(source.touches(opened.frames(), reader.options), bar)
-        return measure_prints(reader, touches, calibration=source.calibration, place=str(recording))
 
+        def counted() -> Iterator[TouchImage]:
+            touches = source.touches(opened.frames(), reader.options)
+            for number, touch in enumerate(touches, start=1):
+                yield touch
+                bar.show(touch.seq + touch.frames, f"{number:,} touches")
 
-def _counted(touches: Iterator[TouchImage], bar: ProgressBar) -> Iterator[TouchImage]:
-    for number, touch in enumerate(touches, start=1):
-        yield touch
-        bar.show(touch.seq + touch.frames, f"{number:,} touches")
+        return measure_prints(
+            reader, counted(), calibration=source.calibration, place=str(recording)
+        )

@@ -23,12 +23,7 @@ RECORDING holds such touches; with --port the next touch is taken.
 """
 EPILOG = "Exit codes: 0 as drawn, 1 otherwise or not recognised, 2 bad input, 3 device, 4 database."
 
-app = console.application()
-
-
-@app.callback()
-def _commands() -> None:
-    """Say how a sensor is mounted."""
+app = console.application(named=True)
 
 
 @command(app, "check", help=HELP, epilog=EPILOG)

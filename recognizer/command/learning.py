@@ -80,12 +80,7 @@ def learning_for(
 ) -> SensorLearning:
     """Return a reader that knows what was learned of its sensor, and may go on learning.
 
-    Parameters
-    ----------
-    learn
-        File to keep it in, and to begin with if it is there.
-    state
-        File to read by alone.
+    It is kept in the file `learn`, and begun by it if it is there; `state` is one to read by alone.
 
     Raises
     ------

@@ -1,9 +1,8 @@
 """A recognition as a picture: the touch with its symbols, the window on the array, the object.
 
-Thesis figures 6.17 to 6.19. Touch: sensor frame, with the lattice that explains it best. Window:
-rows run downwards and columns to the right, as the array is printed; the array is a torus, so
-numbers start again beyond its last row or column. Object: its wireframe with the probe on it,
-object frame.
+Touch: sensor frame, with the lattice that explains it best. Window: rows run downwards and columns
+to the right, as the array is printed; beyond the last one the numbers of the torus start again.
+Object: its wireframe with the probe on it, object frame. Thesis figures 6.17 to 6.19.
 """
 
 from __future__ import annotations
@@ -65,16 +64,13 @@ class WinningLattice:
 
     def on_sensor(self, points_mm: Array) -> Array:
         """Return points (..., 2) of the lattice in the sensor frame, mm."""
-        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
-        away = points_mm - (self.x_mm, self.y_mm)
-        turned: Array = away @ np.array([[c, -s], [s, c]])
-        return turned
+        return np.asarray((points_mm - (self.x_mm, self.y_mm)) @ _turn(self.theta_rad))
 
-    def on_lattice(self, points_mm: Array) -> Array:
-        """Return points (..., 2) of the sensor in the lattice frame, mm."""
-        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
-        turned: Array = points_mm @ np.array([[c, s], [-s, c]]) + (self.x_mm, self.y_mm)
-        return turned
+    def on_array(self, points_mm: Array) -> Array:
+        """Return sensor points (n, 2) as columns and rows of the array, in cells."""
+        cells = points_mm @ _turn(self.theta_rad).T + (self.x_mm, self.y_mm)
+        cells = cells / self.encoding.style.pitch_mm
+        return np.stack([self.place.column + cells[:, 0], self.place.row + 1 - cells[:, 1]], axis=1)
 
 
 def touch_picture(
@@ -87,14 +83,8 @@ def touch_picture(
 ) -> None:
     """Draw a touch with its symbols, the window on the array, and the object with the probe on it.
 
-    Parameters
-    ----------
-    reader, signal, found
-        What was read by what, and the answer; one without an object gets the first panel.
-    path
-        PNG to write.
-    T_robot_object
-        (4, 4), mm, where it is known.
+    An answer without an object gets the first panel. `T_robot_object` (4, 4), mm, is written where
+    it is known; `path` is a PNG.
     """
     won = winning_lattice(reader, signal)
     with page(path, WIDTH, HEIGHT) as figure:
@@ -108,7 +98,7 @@ def touch_picture(
             solid.set_axis_off()
             return
         _draw_window(window, reader.sensor, won)
-        _draw_solid(solid, reader, won, found)
+        _draw_object(solid, won.encoding, reader.sensor, found)
 
 
 def winning_lattice(reader: Reader, signal: Signal) -> WinningLattice | None:
@@ -119,15 +109,10 @@ def winning_lattice(reader: Reader, signal: Signal) -> WinningLattice | None:
     encoding, place, fit = best.embossed, best.hypothesis, best.fit
     shown = labels_of(encoding, place, fit.cells)
     return WinningLattice(
-        encoding=encoding,
-        place=place,
-        x_mm=fit.x_mm,
-        y_mm=fit.y_mm,
-        theta_rad=fit.theta_rad,
-        cells=fit.cells,
+        encoding, place, fit.x_mm, fit.y_mm, fit.theta_rad, fit.cells,
         registered=np.where(shown == encoding.array.order, -1, shown),
         matched=fit.scores[np.arange(len(shown)), shown] > -CLEARLY,
-    )
+    )  # fmt: skip
 
 
 def _say_why(axes: Axes, found: Recognition) -> None:
@@ -138,13 +123,6 @@ def _say_why(axes: Axes, found: Recognition) -> None:
     if found.runner_up is not None:
         lines.append(f"also possible: {found.runner_up.object}, face {found.runner_up.face}")
     axes.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", transform=axes.transAxes)
-
-
-def _draw_solid(axes: Any, reader: Reader, won: WinningLattice, found: Recognition) -> None:
-    if found.object is not None and found.face is not None and found.T_object_probe is not None:
-        _draw_object(
-            axes, won.encoding, reader.sensor, found.object, found.face, found.T_object_probe
-        )
 
 
 def _title(found: Recognition, T_robot_object: Array | None) -> str:
@@ -175,24 +153,23 @@ def _draw_touch(axes: Axes, sensor: SensorType, signal: Signal, won: WinningLatt
     in_mm(axes, "touch and fitted symbols")
     if won is not None:
         pitch = won.encoding.style.pitch_mm
-        axes.add_collection(
-            LineCollection(_cells(won, pitch), colors="white", linewidths=0.4, alpha=0.5)
-        )
+        square = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)])
+        cells = [won.on_sensor((cell + square) * pitch) for cell in won.cells]
+        axes.add_collection(LineCollection(cells, colors="white", linewidths=0.4, alpha=0.5))
         _outlines(axes, sensor, won, won.matched, MATCH)
         _outlines(axes, sensor, won, ~won.matched, MISMATCH)
     axes.set_xlim(-half_x, half_x)
     axes.set_ylim(-half_y, half_y)
 
 
+def _turn(theta_rad: float) -> Array:
+    c, s = math.cos(theta_rad), math.sin(theta_rad)
+    return np.array([[c, -s], [s, c]])
+
+
 def _strokes_mm(alphabet: Alphabet, label: int, pitch_mm: float) -> Array:
     """Return the strokes (n, 2, 2) of a symbol about its centre, mm."""
     return np.array(alphabet.glyphs[label].strokes, np.float64) * (alphabet.reach * pitch_mm)
-
-
-def _cells(won: WinningLattice, pitch: float) -> list[Array]:
-    """Return the outlines of the cells, sensor frame."""
-    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)])
-    return [won.on_sensor((cell + corners) * pitch) for cell in won.cells]
 
 
 def _outlines(
@@ -208,18 +185,13 @@ def _outlines(
         if label >= 0:
             strokes = _strokes_mm(won.encoding.alphabet, int(label), pitch) + (cell + 0.5) * pitch
             for start, end in won.on_sensor(strokes):
-                away = np.minimum(away, _distance(points, start, end))
+                along = end - start
+                t = ((points - start) @ along / max(float(along @ along), 1e-12)).clip(0, 1)
+                offset = points - start - t[..., None] * along
+                away = np.minimum(away, np.linalg.norm(offset, axis=-1))
     edge = won.encoding.style.stroke_mm / 2
     if away.min() < edge < away.max():
-        near = np.minimum(away, 2 * edge)
-        axes.contour(x, y, near, [edge], colors=colour, linewidths=1.2)
-
-
-def _distance(points: Array, start: Array, end: Array) -> Array:
-    along = end - start
-    t = ((points - start) @ along / max(float(along @ along), 1e-12)).clip(0, 1)
-    distance: Array = np.linalg.norm(points - start - t[..., None] * along, axis=-1)
-    return distance
+        axes.contour(x, y, np.minimum(away, 2 * edge), [edge], colors=colour, linewidths=1.2)
 
 
 def _draw_window(axes: Axes, sensor: SensorType, won: WinningLattice) -> None:
@@ -248,10 +220,10 @@ def _draw_window(axes: Axes, sensor: SensorType, won: WinningLattice) -> None:
     axes.add_collection(LineCollection(lines, colors="#303030", linewidths=0.9))
     half_x, half_y = sensor.half_mm
     corners = np.array([(-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y)])
-    outline = _on_array(won, corners)
+    outline = won.on_array(corners)
     axes.add_patch(Polygon(outline, fill=False, edgecolor=MARK, linewidth=1.8))
     axes.plot(*outline[3], "o", color=MARK, markersize=5)
-    axes.plot(*_on_array(won, np.zeros((1, 2)))[0], "+", color=MARK)
+    axes.plot(*won.on_array(np.zeros((1, 2)))[0], "+", color=MARK)
     axes.set_xticks(columns[0, ::4] + 0.5, (columns[0, ::4] % array.columns).tolist())
     axes.set_yticks(rows[::4, 0] + 0.5, (rows[::4, 0] % array.rows).tolist())
     known = ((FACE, "this face"), (OBJECT, "this object"), (OTHERS, "others"))
@@ -263,29 +235,23 @@ def _draw_window(axes: Axes, sensor: SensorType, won: WinningLattice) -> None:
     axes.set_title(f"window on the array, {array.rows} x {array.columns}")
 
 
-def _on_array(won: WinningLattice, points_mm: Array) -> Array:
-    """Return sensor points (n, 2) as columns and rows of the array, in cells."""
-    cells = won.on_lattice(points_mm) / won.encoding.style.pitch_mm
-    return np.stack([won.place.column + cells[:, 0], won.place.row + 1 - cells[:, 1]], axis=1)
-
-
 def _draw_object(
     axes: Any,  # mplot3d has no types
     encoding: EmbossedArray,
     sensor: SensorType,
-    name: str,
-    face: str,
-    T_object_probe: Array,
+    found: Recognition,
 ) -> None:
     """Draw the edges, the numbers of the vertices, the face that is touched, and the probe."""
+    if found.object is None or found.T_object_probe is None:
+        return
     axes.computed_zorder = False  # what is drawn later lies above
     with read_transaction(encoding.engine) as connection:
-        held = read_object(connection, name)
+        held = read_object(connection, found.object)
     solid = held.polyhedron
     for edge in solid.edges:
         axes.plot(*solid.vertices[[edge.start, edge.end]].T, color="#404040", linewidth=0.9,
                   zorder=2)  # fmt: skip
-    touched = next((f for f in held.faces if f.name == face), None)
+    touched = next((f for f in held.faces if f.name == found.face), None)
     if touched is not None:
         loops = solid.faces[touched.face_id].loops
         corners = solid.vertices[np.concatenate([np.array(loop) for loop in loops])]
@@ -293,8 +259,8 @@ def _draw_object(
     if len(solid.vertices) <= MANY:
         for number, at in enumerate(solid.vertices.tolist()):
             axes.text(*at, str(number), fontsize=7, color="#404040", zorder=6)
-    _draw_probe(axes, sensor, T_object_probe)
-    _look(axes, solid, T_object_probe)
+    _draw_probe(axes, sensor, found.T_object_probe)
+    _look(axes, solid, found.T_object_probe)
 
 
 def _draw_probe(axes: Any, sensor: SensorType, T: Array) -> None:

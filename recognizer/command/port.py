@@ -21,16 +21,12 @@ SLICE_S = 0.1  #: how long frames are waited for before an interruption is looke
 def source_at(
     url: str, *, sensor_type: str, overlay: str, calibration: Path | None, every: bool
 ) -> TouchSource:
-    """Return what a port will give.
+    """Return the source of touches behind a port.
 
     Raises
     ------
-    PortError
-        The URL is none.
-    RecordingError
-        It is that of a recording that cannot be read.
-    CalibrationError
-        The calibration is none.
+    PortError, RecordingError, CalibrationError
+        The URL is none, or its recording or the calibration cannot be read.
     """
     address = address_of(url)
     if address.scheme == "file":
@@ -56,14 +52,12 @@ def source_at(
 def listen(
     source: TouchSource, interrupted: Event, number: int | None, calibration: Path | None
 ) -> Iterator[Iterator[Frame]]:
-    """Yield the frames of a port until it ends or an event does; lets go of it afterwards.
+    """Yield the frames of a port until it ends or `interrupted` is set; closes it afterwards.
 
     Raises
     ------
-    PortError
-        The probe is not there, or went away for good.
-    CalibrationError
-        The calibration is another sensor's.
+    PortError, CalibrationError
+        The probe is not there, or went away for good; the calibration is another sensor's.
     """
     from probe.calibration import read_calibration
     from probe.client.stream import Stream, name_of

@@ -6,10 +6,9 @@
     KEY/answer    application/json                         every answer, as --json prints it
     KEY/object    application/cdr;geometry_msgs/msg/PoseWithCovarianceStamped
 
-KEY is `touch` if left out. Images are dropped, at the publisher, for a client that is slower than
-they come: little is kept for it, so what arrives is not stale. Answers wait for their clients, in
-a thread of their own, so that the reader never does; the last ones are also kept for clients that
-come late or lose the line (zenoh's advanced subscribers fetch them).
+KEY is `touch` if left out. Images are dropped, at the publisher, for a client that is too slow for
+them. Answers wait for their clients in a thread of their own; the last ones are kept for clients
+that come late or lose the line (zenoh's advanced subscribers fetch them).
 """
 
 from __future__ import annotations
@@ -30,6 +29,7 @@ from recognizer.command.ros import object_message
 _URL = re.compile(
     r"zenoh://(?P<host>[\w.-]+|\[[0-9a-fA-F:]+\]):(?P<port>\d{1,5})(?:/(?P<key>[\w./-]+))?"
 )
+QUEUE: Final = "transport/link/tx/queue"
 KEY: Final = "touch"
 KEPT: Final = 1000  #: answers that late clients can fetch
 SEND_BUFFER: Final = 65_536  #: bytes of the socket: 60 images, a quarter of a second
@@ -41,10 +41,8 @@ class PublishSink(AnswerSink):
 
     Raises
     ------
-    EncodedObjectsError
-        No such URL, or the port is taken.
-    MissingExtraError
-        zenoh is not installed.
+    EncodedObjectsError, MissingExtraError
+        The URL is none, the port is taken, or zenoh is not installed.
     """
 
     def __init__(self, url: str) -> None:
@@ -113,13 +111,6 @@ class PublishSink(AnswerSink):
 def endpoint_of(url: str) -> tuple[str, str]:
     """Return zenoh's endpoint of a URL, and the key.
 
-    Raises
-    ------
-    EncodedObjectsError
-        The URL is none.
-
-    Examples
-    --------
     >>> endpoint_of("zenoh://127.0.0.1:7447/bench/1")
     ('tcp/127.0.0.1:7447', 'bench/1')
     """
@@ -142,11 +133,8 @@ def _config(endpoint: str) -> Any:
         ("listen/endpoints", [f"{endpoint}#so_sndbuf={SEND_BUFFER}"]),
         ("scouting/multicast/enabled", False),
         ("timestamping/enabled", True),
-        ("transport/link/tx/queue/size/data_low", 1),
-        (
-            "transport/link/tx/queue/congestion_control/block/wait_before_close",
-            int(1e6 * TIMEOUT_S),
-        ),
+        (f"{QUEUE}/size/data_low", 1),
+        (f"{QUEUE}/congestion_control/block/wait_before_close", int(1e6 * TIMEOUT_S)),
     ):
         config.insert_json5(path, json.dumps(value))
     return config

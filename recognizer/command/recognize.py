@@ -5,14 +5,13 @@ A touch is read by itself, or added to the belief of a scan.
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from encoded_objects.base.console import FAILED, INTERRUPTED, interruption
 from encoded_objects.base.errors import require
@@ -25,12 +24,13 @@ from encoded_objects.base.output import (
     warning,
     write_json,
 )
+from probe.errors import PoseError
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
 from probe.recording.read import Recording
 from recognizer.command.answers import Answer, AnswerSink
-from recognizer.command.app import RecognizeOptions
 from recognizer.command.learning import SensorLearning, learning_for
+from recognizer.command.options import RecognizeOptions
 from recognizer.command.port import listen, source_at
 from recognizer.command.scanning import (
     belief_for,
@@ -38,13 +38,16 @@ from recognizer.command.scanning import (
     pose_during,
     read_joints,
     refuse_single,
+    sensor_pose,
     touches_for,
 )
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, Recognition
-from recognizer.touch.robot import ObjectPose
 from recognizer.touch.source import TouchImage, TouchSource, source_of
+
+if TYPE_CHECKING:
+    from recognizer.touch.robot import ObjectPose
 
 TRIED = 6  #: refused touches, none answered, after which the wiring is checked
 
@@ -55,7 +58,7 @@ def recognize_touches(options: RecognizeOptions) -> int:
     Raises
     ------
     RecordingError, PortError, CalibrationError
-        What is read cannot be read.
+        The recording, port or calibration cannot be read.
     DatabaseError, LabError
         The database cannot be read, or holds no encoded object.
     """
@@ -112,11 +115,11 @@ def _print_answers(
     if scan and needed == 1:
         message("one touch is enough for these symbols; a scan helps where parts are worn or cut")
     with ExitStack() as stack:
+        bar = None
         if options.as_json or not out.isatty():  # otherwise the answers show the progress
             bar = stack.enter_context(progress_bar("reading", source.frames))
-            frames = _counted(frames, bar)
         sinks = [stack.enter_context(sink) for sink in _sinks(options, origin)]
-        frames = _shared(frames, sinks)
+        frames = _watched(frames, interrupted, sinks, bar)
         for answer in _answers(options, learning, source, frames, interrupted):
             for sink in sinks:
                 sink.answer(answer)
@@ -126,19 +129,18 @@ def _print_answers(
                 if len(refused) == TRIED and not answered:
                     _hint_wiring(learning.reader, source, refused)
             answered = bool(answer.found) + (0 if scan else answered)
-            if options.plot is not None:
-                if options.follow:
-                    _draw(learning.reader, source, answer, options.plot)
-                else:
-                    kept.append(answer)
-            if not options.as_json:
-                out.write(answer.sentence(needed) + "\n")
-                out.flush()
-            elif lines:
-                write_json(answer.printed_json(), line=True)
-                out.flush()
-            else:
+            if options.plot is not None and options.follow:
+                _draw(learning.reader, source, answer, options.plot)
+            elif options.plot is not None:
+                kept.append(answer)
+            if options.as_json and not lines:
                 values.append(answer.printed_json())
+                continue
+            if lines:
+                write_json(answer.printed_json(), line=True)
+            else:
+                out.write(answer.sentence(needed) + "\n")
+            out.flush()
     learning.end()
     if refused and not answered and len(refused) < TRIED and not interrupted.is_set():
         _hint_wiring(learning.reader, source, refused)
@@ -177,13 +179,13 @@ def _answers(
     if options.port and not options.follow and most is None and belief is None:
         most = 1
     by_touch = read_joints(options.joints_file) if options.joints_file else ()
-    touches = source.touches(_until(interrupted, frames), reader.options)
+    touches = source.touches(frames, reader.options)
     if belief is not None and options.recording is not None:
         touches = refuse_single(touches, source.place, touches_for(reader))
     warned = ""
     last: Answer | None = None  # that answers
     for count, touch in enumerate(touches, start=1):
-        if interrupted.is_set():  # what an interruption cuts short is no touch
+        if interrupted.is_set():  # a touch that is cut short is none
             return
         reader = learning.take(touch)
         if belief is None:
@@ -221,37 +223,20 @@ def _object_in_base(
     joints_deg: tuple[float, ...] | None,
     joint_error_deg: float,
 ) -> tuple[ObjectPose | None, str]:
-    """Return the object in the robot's base, and why it is not known though angles are.
-
-    Parameters
-    ----------
-    touch, found
-        What was touched; without joint angles its recorded pose counts, taken as exact.
-    joints_deg, joint_error_deg
-        (5,) joint angles, and the standard deviation of each, degrees.
-    """
-    if joints_deg is None and touch.pose is None:
-        return None, ""
-    import numpy as np
-
-    from probe.arm import Arm, SensorPose
-    from probe.errors import PoseError
-    from probe.wrist import Wrist
-    from recognizer.touch.robot import carried_pose, object_pose
-
-    if joints_deg is None:
-        assert touch.pose is not None
-        return object_pose(found, SensorPose(touch.pose, np.zeros((6, 6)))), ""
-    errors = np.full(len(joints_deg), math.radians(joint_error_deg))
+    """Return the object in the robot's base, and why it is not known though angles are."""
     try:
-        sensor = carried_pose(Arm(), Wrist(), np.radians(joints_deg), errors, touch.wrist)
+        pose = sensor_pose(touch, joints_deg, joint_error_deg)
     except PoseError as error:
         return None, str(error)
-    return object_pose(found, sensor), ""
+    if pose is None:
+        return None, ""
+    from recognizer.touch.robot import object_pose
+
+    return object_pose(found, pose), ""
 
 
 def _sinks(options: RecognizeOptions, origin: RecordingOrigin) -> Iterator[AnswerSink]:
-    """Yield the sinks that are asked for; their libraries load now."""
+    """Yield the sinks of the options; their libraries load now."""
     if options.mcap is not None:
         from recognizer.command.ros import McapSink
 
@@ -263,7 +248,7 @@ def _sinks(options: RecognizeOptions, origin: RecordingOrigin) -> Iterator[Answe
 
 
 def _rewired(flip: str, source: TouchSource, frames: Iterator[Frame]) -> Iterator[Frame]:
-    """Return frames as the sensor has them, where a person says that they arrive otherwise."""
+    """Return frames as the sensor has them, by the changes on their way."""
     if not flip:
         return frames
     from recognizer.sensor.wiring import wiring_named
@@ -281,23 +266,20 @@ def _hint_wiring(reader: Reader, source: TouchSource, refused: list[TouchImage])
         message(hint)
 
 
-def _until(interrupted: Event, frames: Iterator[Frame]) -> Iterator[Frame]:
-    for frame in frames:
-        if interrupted.is_set():
-            return
-        yield frame
-
-
-def _counted(frames: Iterator[Frame], bar: ProgressBar) -> Iterator[Frame]:
+def _watched(
+    frames: Iterator[Frame],
+    interrupted: Event,
+    sinks: Sequence[AnswerSink],
+    bar: ProgressBar | None,
+) -> Iterator[Frame]:
+    """Yield frames until an interruption; sinks and a bar get each."""
     for number, frame in enumerate(frames, start=1):
-        bar.show(number, f"{number:,} frames")
-        yield frame
-
-
-def _shared(frames: Iterator[Frame], sinks: Sequence[AnswerSink]) -> Iterator[Frame]:
-    for frame in frames:
+        if bar is not None:
+            bar.show(number, f"{number:,} frames")
         for sink in sinks:
             sink.frame(frame)
+        if interrupted.is_set():
+            return
         yield frame
 
 
@@ -305,13 +287,9 @@ def _refuse_pictures(plot: Path, *, replace: bool) -> None:
     """Refuse a picture's name that is taken, also by that of one of several touches."""
     refuse_taken(plot, ".png", replace=replace)
     require("matplotlib", extra="report", purpose="--plot")
-    there = [
-        path
-        for path in plot.parent.glob(f"{plot.stem}-*.png")
-        if path.stem.removeprefix(f"{plot.stem}-").isdecimal()
-    ]
-    if there and not replace:
-        raise file_exists_error(there[0])
+    for path in plot.parent.glob(f"{plot.stem}-*.png"):
+        if path.stem.removeprefix(f"{plot.stem}-").isdecimal() and not replace:
+            raise file_exists_error(path)
 
 
 def _draw_all(

@@ -45,10 +45,8 @@ class McapSink(AnswerSink):
 
     Raises
     ------
-    EncodedObjectsError
-        A file is there already.
-    MissingExtraError
-        The extra `robot` is not installed.
+    EncodedObjectsError, MissingExtraError
+        A file is there already, or the extra `robot` is not installed.
     """
 
     def __init__(self, out: Path, origin: RecordingOrigin, *, replace: bool) -> None:
@@ -98,14 +96,7 @@ def object_message(
 ) -> dict[str, Any] | None:
     """Return the `PoseWithCovarianceStamped` of the object; None where it is not known.
 
-    Parameters
-    ----------
-    found
-        The answer to a touch.
-    in_base
-        The object in the robot's base; None: the sensor's frame is used.
-    t_ns
-        Time of the touch.
+    It is the object in the robot's base; without that, in the sensor's frame.
     """
     placed, frame_id = in_base, BASE_FRAME
     if placed is None:

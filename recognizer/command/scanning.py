@@ -7,17 +7,18 @@ readings, else the poses of the recording, else nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from probe.arm import SensorPose
+from recognizer.command.options import five_angles
 from recognizer.errors import RecognizerError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from probe.arm import SensorPose
     from recognizer.scan.session import Scan
     from recognizer.thesis.edges import Edge
     from recognizer.thesis.scan import ThesisScan
@@ -71,24 +72,43 @@ def refuse_single(touches: Iterable[TouchImage], place: str, needed: int) -> Ite
     return chain(first, rest)
 
 
+def sensor_pose(
+    touch: TouchImage, joints_deg: Sequence[float] | None, error_deg: float
+) -> SensorPose | None:
+    """Return the pose of the sensor in the robot's base; None if nothing is known of it.
+
+    Joint angles count, with their standard deviation; else the recorded pose, taken as exact.
+
+    Raises
+    ------
+    PoseError
+        Angles or readings of the wrist that no arm can have.
+    """
+    if joints_deg is None and touch.pose is None:
+        return None
+    import numpy as np
+
+    from probe.arm import Arm, SensorPose
+    from probe.wrist import Wrist
+    from recognizer.touch.robot import carried_pose
+
+    if joints_deg is None:
+        return SensorPose(np.asarray(touch.pose), np.zeros((6, 6)))
+    errors = np.full(len(joints_deg), math.radians(error_deg))
+    return carried_pose(Arm(), Wrist(), np.radians(joints_deg), errors, touch.wrist)
+
+
 def pose_during(
     touch: TouchImage, number: int, joints_deg: Joints, error_deg: float
 ) -> SensorPose | ArrayLike | None:
-    """Return where the arm held the sensor, as far as anything tells.
-
-    Parameters
-    ----------
-    touch, number
-        The touch, and which one it is, from 1.
-    joints_deg, error_deg
-        Joint angles of every touch, none if they are not known, and their standard deviation.
+    """Return the pose of the sensor during a touch of a scan, numbered from 1.
 
     Raises
     ------
     ScanError
         Angles for fewer touches than there are.
     PoseError
-        Angles or readings of the wrist that no arm can have.
+        See `sensor_pose`.
     """
     if not joints_deg:
         return touch.pose
@@ -97,15 +117,7 @@ def pose_during(
             f"joint angles of {len(joints_deg)} touches, but there is touch {number}",
             fix="give --joints FILE with a line of five angles for each touch",
         )
-    import numpy as np
-
-    from probe.arm import Arm
-    from probe.wrist import Wrist
-    from recognizer.touch.robot import carried_pose
-
-    angles = np.radians(joints_deg[number - 1])
-    errors = np.full(len(angles), math.radians(error_deg))
-    return carried_pose(Arm(), Wrist(), angles, errors, touch.wrist)
+    return sensor_pose(touch, joints_deg[number - 1], error_deg)
 
 
 def read_joints(path: Path) -> Joints:
@@ -127,11 +139,8 @@ def read_joints(path: Path) -> Joints:
         words = line.partition("#")[0].replace(",", " ").split()
         if not words:
             continue
-        try:
-            angles = tuple(float(word) for word in words)
-        except ValueError:
-            angles = ()
-        if len(angles) != 5 or not all(abs(angle) <= 360 for angle in angles):
+        angles = five_angles(words)
+        if angles is None:
             raise ScanError(
                 f"{line.strip()!r} is not five angles in degrees",
                 fix="write a line such as 0,-30,60,0,0 for each touch",

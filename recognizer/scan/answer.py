@@ -20,18 +20,16 @@ from recognizer.touch import verdict
 from recognizer.touch.chance import expected_matches
 from recognizer.touch.evidence import null_log_likelihood, unworn_labels_at, weigh_cells
 from recognizer.touch.hypothesis import (
-    Hypothesis,
-    coincide,
+    PlaceHypothesis,
     find_hypotheses,
     find_rivals,
     log_likelihood,
-    under_centre,
 )
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at
-from recognizer.touch.recognition import TOO_FEW, Recognition, RunnerUp, refusal
-from recognizer.touch.symbols.fit import Fit, refine_lattices, score_cells
+from recognizer.touch.recognition import TOO_FEW, Recognition, refusal
+from recognizer.touch.symbols.fit import refine_lattices, score_cells
 from recognizer.touch.symbols.image import Image, bend_image
 from recognizer.touch.symbols.posterior import explained_share, refit_pose
 from recognizer.touch.verify import SHARES, bend_at
@@ -49,40 +47,17 @@ DOUBT = 2e-2
 RATIO_BY_HAND = 8.0  #: nats over symbols of no registered place, without measured steps
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ScanHypothesis:
-    """A place of accumulated evidence."""
+@dataclass(frozen=True, eq=False)
+class ScanHypothesis(PlaceHypothesis):
+    """A place of accumulated evidence, its fit with the pose of the last touch."""
 
-    embossed: EmbossedArray
     evidence: LatticeEvidence
-    hypothesis: Hypothesis
-    fit: Fit  #: of the evidence, with the pose of the last touch
-    score: float  #: log-likelihood of all touches, nats
     explained: float = math.nan  #: share of the last image's variance; NaN: not computed
     path: RegisteredPath | None = None  #: None: the motion was measured
 
-    @property
-    def index(self) -> tuple[int, int]:
-        """Row and column of the array's cell under the sensor's centre."""
-        return under_centre(self.embossed, self.fit, self.hypothesis)
-
-    @property
-    def face(self) -> tuple[str, str]:
-        """Names of object and face."""
-        held = self.embossed.face(self.hypothesis.face)
-        return held.object, held.face
-
-    def same(self, other: ScanHypothesis) -> bool:
-        """Whether two are one place."""
-        return self.embossed is other.embossed and coincide(
-            self.embossed, self.fit, self.hypothesis, other.fit, other.hypothesis
-        )
-
 
 def locate_evidence(
-    embossed: EmbossedArray,
-    found: Sequence[LatticeEvidence],
-    path: RegisteredPath | None,
+    embossed: EmbossedArray, found: Sequence[LatticeEvidence], path: RegisteredPath | None
 ) -> list[ScanHypothesis]:
     """Return the likeliest places of the evidence of one array, best evidence first."""
     places: list[ScanHypothesis] = []
@@ -100,7 +75,7 @@ def locate_evidence(
         for one in ones:
             score = log_likelihood(embossed, fit, one)
             hypothesis = replace(one, score=score)
-            places.append(ScanHypothesis(embossed, evidence, hypothesis, fit, score, path=path))
+            places.append(ScanHypothesis(embossed, hypothesis, fit, score, evidence, path=path))
     return places
 
 
@@ -110,7 +85,7 @@ def distinct_places(found: Sequence[ScanHypothesis]) -> list[ScanHypothesis]:
     It runs before the last touch is fitted to the best place, whose pose may change then.
     """
     ranked = sorted(found, key=lambda item: -item.score)
-    return [item for n, item in enumerate(ranked) if n == 0 or not ranked[0].same(item)]
+    return [item for n, item in enumerate(ranked) if n == 0 or not ranked[0].coincides(item)]
 
 
 def refine_last_pose(reader: Reader, image: Image, found: ScanHypothesis) -> ScanHypothesis:
@@ -144,10 +119,8 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
     if not found:
         return refusal(seq, TOO_FEW)
     best, path = found[0], found[0].path
-    margin, runner_up = math.inf, None
-    if len(found) > 1:
-        margin = best.score - found[1].score
-        runner_up = RunnerUp(*found[1].face, found[1].index)
+    margin = best.score - found[1].score if len(found) > 1 else math.inf
+    runner_up = found[1].runner_up if len(found) > 1 else None
     if path is not None:
         margin = min(margin, path.margin)
     by_hand = path is not None and best.evidence.agreement.touches > 1

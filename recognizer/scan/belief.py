@@ -8,7 +8,7 @@ of all touches is located in the database.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,12 +32,11 @@ from recognizer.scan.lattice import (
     same_lattice,
     seed_lattice,
 )
-from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief, relative_pose
+from recognizer.scan.mosaic.planar import FIRST_SD, PlacedTouch, planar_belief, relative_pose
 from recognizer.scan.path import follow_path, known_steps
 from recognizer.scan.views import (
     LatticeView,
     LatticeViews,
-    ScanSettings,
     TouchPoses,
     estimate_poses,
     flat_views,
@@ -49,7 +48,8 @@ from recognizer.scan.views import (
     stack_views,
 )
 from recognizer.touch.evidence import VerifiedHypothesis
-from recognizer.touch.next_touch import EarlierTouch, PlaceHypothesis, propose_next
+from recognizer.touch.hypothesis import PlaceHypothesis
+from recognizer.touch.next_touch import EarlierTouch, propose_next
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import read_touch
 from recognizer.touch.recognition import (
@@ -61,7 +61,7 @@ from recognizer.touch.recognition import (
     refusal,
 )
 from recognizer.touch.symbols.image import Image
-from recognizer.touch.verdict import least_explained
+from recognizer.touch.verdict import Face, least_explained, reject_joined
 
 Array = NDArray[np.float64]
 Views = tuple[tuple[LatticeView, ...], ...]  #: of each touch
@@ -71,7 +71,6 @@ CUT_OFF_NATS = 40.0  #: below the best lattice, from which one is dropped
 PREDICTING = 2  #: lattices whose predictions a touch is fitted to
 MOST_NOISE = 0.4  #: standard deviation of psi, beyond which a touch shows no symbols
 MOST_OUTLIERS = 3  #: touches in a row that may disagree while the answer holds
-MOST_POSITION_SD_MM = 0.6  #: of an answer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +78,6 @@ class ScanBelief:
     """The touches of one face and their answer; `extend_scan` returns the next value."""
 
     reader: Reader
-    settings: ScanSettings
     touches: tuple[PlacedTouch, ...]  #: those with contact
     touch_poses: TouchPoses | None
     views: tuple[Views, ...]  #: of each array
@@ -87,8 +85,7 @@ class ScanBelief:
     recognition: Recognition  #: with the probe's pose at the last touch
     places: tuple[ScanHypothesis, ...] = ()  #: likely places of the face, best first
     outlier_run: int = 0  #: touches in a row that disagree with the others
-    #: object and face, once confirmed by at least one consistent touch
-    confirmed_face: tuple[str | None, str | None] | None = None
+    confirmed_face: Face | None = None  #: by at least one consistent touch
     resets: int = 0  #: how often inconsistent touches began a new belief
 
     @property
@@ -97,29 +94,10 @@ class ScanBelief:
         return self.places[0] if self.places else None
 
 
-def begin_scan(reader: Reader, settings: ScanSettings | None = None) -> ScanBelief:
+def begin_scan(reader: Reader) -> ScanBelief:
     """Return a scan without touches."""
     none: tuple[tuple[()], ...] = tuple(() for _ in reader.prepared)
-    return ScanBelief(reader, settings or ScanSettings(), (), None, none, none, refusal(0, TOO_FEW))
-
-
-def read_scan(
-    reader: Reader, touches: Iterable[PlacedTouch], settings: ScanSettings | None = None
-) -> Recognition:
-    """Return object and face of a scan, and the probe's pose at its last touch.
-
-    `touches` of one face, in their order, each with a pose by the arm or a step from the touch
-    before.
-
-    Raises
-    ------
-    MosaicError
-        Another sensor's image, or a touch without a frame.
-    """
-    scan = begin_scan(reader, settings)
-    for touch in touches:
-        scan = extend_scan(scan, touch)
-    return scan.recognition
+    return ScanBelief(reader, (), None, none, none, refusal(0, TOO_FEW))
 
 
 def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
@@ -179,10 +157,10 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
 
 def _reset(scan: ScanBelief, *touches: PlacedTouch) -> ScanBelief:
     """Return a belief that rests on the last touches alone."""
-    fresh = begin_scan(scan.reader, scan.settings)
+    fresh = begin_scan(scan.reader)
     first, *rest = touches
     if first.believed is None:
-        origin = planar_belief(np.zeros(3), scan.settings.first)
+        origin = planar_belief(np.zeros(3), FIRST_SD)
         first = replace(first, stepped=None, believed=origin)
     for touch in (first, *rest):
         fresh = extend_scan(fresh, touch)
@@ -200,23 +178,18 @@ def _is_one_place(answer: Recognition, alone: Recognition, pitch_mm: float) -> b
 
 def _accept(
     scan: ScanBelief, answer: Recognition, outlier_run: int, most_outliers: int
-) -> tuple[Recognition, tuple[str | None, str | None] | None]:
-    """Return an answer or its refusal, and the confirmed face.
-
-    An inconsistent touch is answered by the others, but only while it is one of few. Two different
-    answers about one face exclude each other: both are refused. A place with a large standard
-    deviation is refused.
-    """
+) -> tuple[Recognition, Face | None]:
+    """Return an answer or its refusal, and the confirmed face."""
+    before = scan.confirmed_face
     if not answer:
-        return answer, scan.confirmed_face
+        return answer, before
     named = answer.object, answer.face
-    if scan.confirmed_face is not None and named != scan.confirmed_face:
-        return refusal(answer.seq, AMBIGUOUS, margin=answer.margin), None
-    if outlier_run > 0 and (scan.confirmed_face is None or outlier_run > most_outliers):
-        return refusal(answer.seq, NOT_ENCODED, margin=answer.margin), scan.confirmed_face
-    if answer.covariance is not None and position_sd_mm(answer.covariance) > MOST_POSITION_SD_MM:
-        return refusal(answer.seq, TOO_FEW, margin=answer.margin), scan.confirmed_face or named
-    return answer, named
+    spread = 0.0 if answer.covariance is None else position_sd_mm(answer.covariance)
+    reason = reject_joined(named, before, outlier_run, most_outliers, spread)
+    if not reason:
+        return answer, named
+    confirmed = {AMBIGUOUS: None, NOT_ENCODED: before, TOO_FEW: before or named}[reason]
+    return refusal(answer.seq, reason, margin=answer.margin), confirmed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -247,7 +220,7 @@ def _join_touch(
     """
     reader, seq = scan.reader, touches[-1].seq
     images, views, alone, rivals = _view_touch(scan, touches[-1], touch_poses, use_prediction)
-    steps = known_steps(touches, scan.settings)
+    steps = known_steps(touches)
     lattices: list[tuple[PlaneLattice, ...]] = []
     found: list[ScanHypothesis] = []
     poses_by_array: list[TouchPoses] = []
@@ -338,10 +311,7 @@ def _evidence_along(
 
 
 def _evidence_of(
-    views: LatticeViews,
-    touch_poses: TouchPoses,
-    before: Sequence[PlaneLattice],
-    pitch_mm: float,
+    views: LatticeViews, touch_poses: TouchPoses, before: Sequence[PlaneLattice], pitch_mm: float
 ) -> list[LatticeEvidence]:
     """Return the evidence of the followed lattices and of those of the last touch, best first."""
     last = len(touch_poses.poses) - 1

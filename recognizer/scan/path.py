@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from recognizer.scan.lattice import CELL_NATS, LEFT_OUT_NATS
 from recognizer.scan.mosaic.planar import (
+    BY_HAND_SD,
     PlacedTouch,
     PlanarBelief,
     compose_poses,
@@ -32,7 +33,7 @@ from recognizer.scan.mosaic.planar import (
     relative_pose,
     wrap_angle,
 )
-from recognizer.scan.views import LatticeView, ScanSettings, TouchPoses
+from recognizer.scan.views import LatticeView, TouchPoses
 from recognizer.touch.hypothesis import Hypothesis, find_hypotheses
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.symbols.fit import Fit
@@ -62,9 +63,7 @@ class RegisteredPath:
 
 
 def follow_path(
-    embossed: EmbossedArray,
-    views: Sequence[Sequence[LatticeView]],
-    steps: Sequence[PlanarBelief],
+    embossed: EmbossedArray, views: Sequence[Sequence[LatticeView]], steps: Sequence[PlanarBelief]
 ) -> RegisteredPath:
     """Return the likeliest path; without placed touches where no touch has a place.
 
@@ -99,9 +98,9 @@ def follow_path(
     return RegisteredPath(poses, placed, margin, path_ambiguity(fits, poses, steps, pitch, order))
 
 
-def known_steps(touches: Sequence[PlacedTouch], settings: ScanSettings) -> list[PlanarBelief]:
+def known_steps(touches: Sequence[PlacedTouch]) -> list[PlanarBelief]:
     """Return the step to each touch from the one before; unknown for the first one."""
-    unknown = PlanarBelief(np.zeros(3), np.diag(np.square(settings.by_hand)))
+    unknown = PlanarBelief(np.zeros(3), np.diag(np.square(BY_HAND_SD)))
     steps = [unknown]
     for before, touch in pairwise(touches):
         if touch.stepped is not None:

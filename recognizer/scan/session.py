@@ -26,20 +26,23 @@ from probe.arm import SensorPose
 from recognizer.scan.answer import ScanHypothesis
 from recognizer.scan.belief import ScanBelief, begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import (
+    ARM_SD,
+    BY_HAND_SD,
+    FIRST_SD,
     PlacedTouch,
     PlanarBelief,
     planar_belief,
     planar_covariance,
     planar_pose,
 )
-from recognizer.scan.views import ScanSettings
 from recognizer.touch.lab import Lab
 from recognizer.touch.pose import face_pose, pose_on_object
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at
-from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, Recognition, RunnerUp
+from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, Recognition
 from recognizer.touch.signal import Signal
 from recognizer.touch.source import TouchImage
+from recognizer.touch.verdict import reject_margin
 
 Array = NDArray[np.float64]
 
@@ -71,8 +74,6 @@ class Scan:
         The database, or a prepared reader of it.
     sensor
         The sensor of all touches; the usual one if not given.
-    settings
-        Uncertainty of the motion where no covariance is given.
 
     Examples
     --------
@@ -84,15 +85,8 @@ class Scan:
     (2, 'Cube', 'F1')
     """
 
-    def __init__(
-        self,
-        lab: Lab | Reader,
-        *,
-        sensor: SensorType | None = None,
-        settings: ScanSettings | None = None,
-    ) -> None:
+    def __init__(self, lab: Lab | Reader, *, sensor: SensorType | None = None) -> None:
         self._reader = lab if isinstance(lab, Reader) else Reader(lab, sensor or SensorType())
-        self._settings = settings or ScanSettings()
         self._faces = [self._new_face()]  # the last one is touched now
         self._answer = self._faces[0].belief.recognition
         self._changes = 0
@@ -112,7 +106,7 @@ class Scan:
         scores = np.array([one.score for one in found])
         shares = np.exp(scores - scores.max()) if len(found) else scores
         return tuple(
-            PlaceShare(*one.face, one.index, share)
+            PlaceShare(one.face.object, one.face.face, one.index, share)
             for one, share in zip(found, (shares / shares.sum()).tolist(), strict=True)
         )
 
@@ -162,13 +156,12 @@ class Scan:
         before = face.belief
         belief = extend_scan(before, face.places.place(signal, pose, number))
         if belief.resets > before.resets:  # the earlier touches may be of another face
-            face = _Face(replace(belief, resets=before.resets), copy(face.places))
+            face = _Face(belief, copy(face.places))
             self._faces.append(face)
         face.belief = belief = replace(belief, resets=before.resets)
         if not signal.contact:
             return belief.recognition
         face.places.keep(pose)
-        face.T_base_probe = None if pose is None else _matrix(pose)
         found = self._join()
         withdrawn = before.confirmed_face is not None and belief.confirmed_face is None
         if found or not self._answer or withdrawn:
@@ -176,7 +169,7 @@ class Scan:
         return found
 
     def _new_face(self) -> _Face:
-        return _Face(begin_scan(self._reader, self._settings), TouchPlaces(self._settings))
+        return _Face(begin_scan(self._reader), TouchPlaces())
 
     def _select_face(self, pose: SensorPose | ArrayLike | None) -> None:
         """Move the face that contains a pose to the end of the list; a new one if none does."""
@@ -198,50 +191,51 @@ class Scan:
         return join_faces(last, others)
 
 
+@dataclass(slots=True)
 class TouchPlaces:
     """Poses in any frame -> places in the plane of the first touch."""
 
-    def __init__(self, settings: ScanSettings) -> None:
-        self.settings = settings
-        self._T_first_base: Array | None = None  #: None: the first touch had no pose
-        self._before: SensorPose | ArrayLike | None = None  #: pose of the last touch
-        self._any = False  #: whether there was a touch
+    begun: bool = False  #: whether there was a touch
+    T_first_base: Array | None = None  #: None: the first touch had no pose
+    before: SensorPose | ArrayLike | None = None  #: pose of the last touch
 
     def keep(self, pose: SensorPose | ArrayLike | None) -> None:
         """Keep the pose of a touch, which later touches are placed against."""
-        if not self._any and pose is not None:
-            self._T_first_base = _inverse(_matrix(pose))
-        self._before, self._any = pose, True
+        if not self.begun and pose is not None:
+            self.T_first_base = _inverse(_matrix(pose))
+        self.before, self.begun = pose, True
 
     def holds(self, pose: SensorPose | ArrayLike) -> bool:
         """Whether a pose lies in the plane of the touches so far, or may do."""
-        if self._T_first_base is None:
+        if self.T_first_base is None:
             return True
-        T = self._T_first_base @ _matrix(pose)
+        T = self.T_first_base @ _matrix(pose)
         return float(T[2, 2]) > math.cos(FACING_RAD) and abs(float(T[2, 3])) < ABOVE_MM
 
     def place(self, signal: Signal, pose: SensorPose | ArrayLike | None, seq: int) -> PlacedTouch:
         """Return a touch with its place."""
-        if not self._any:
-            spread = self.settings.first if pose is None else self._spread(pose, _matrix(pose))
+        if not self.begun:
+            spread = FIRST_SD if pose is None else _spread(pose, _matrix(pose))
             return PlacedTouch(signal, believed=planar_belief(np.zeros(3), spread), seq=seq)
-        if pose is not None and self._T_first_base is not None:
-            return PlacedTouch(signal, believed=self._within(self._T_first_base, pose), seq=seq)
-        if pose is None or self._before is None:
-            step = planar_belief(np.zeros(3), self.settings.by_hand)
+        if pose is not None and self.T_first_base is not None:
+            return PlacedTouch(signal, believed=_pose_within(self.T_first_base, pose), seq=seq)
+        if pose is None or self.before is None:
+            step = planar_belief(np.zeros(3), BY_HAND_SD)
         else:
-            step = self._within(_inverse(_matrix(self._before)), pose)
+            step = _pose_within(_inverse(_matrix(self.before)), pose)
         return PlacedTouch(signal, stepped=step, seq=seq)
 
-    def _within(self, T_plane_base: Array, pose: SensorPose | ArrayLike) -> PlanarBelief:
-        at = planar_pose(T_plane_base @ _matrix(pose))
-        return planar_belief(at, self._spread(pose, _inverse(T_plane_base)))
 
-    def _spread(self, pose: SensorPose | ArrayLike, T_base_plane: Array) -> ArrayLike:
-        """Return covariance (3, 3) or standard deviations (3,) of a pose in a plane."""
-        if isinstance(pose, SensorPose) and pose.covariance.any():
-            return planar_covariance(pose.covariance, T_base_plane[:3, :3].T)
-        return self.settings.by_arm
+def _pose_within(T_plane_base: Array, pose: SensorPose | ArrayLike) -> PlanarBelief:
+    at = planar_pose(T_plane_base @ _matrix(pose))
+    return planar_belief(at, _spread(pose, _inverse(T_plane_base)))
+
+
+def _spread(pose: SensorPose | ArrayLike, T_base_plane: Array) -> ArrayLike:
+    """Return covariance (3, 3) or standard deviations (3,) of a pose in a plane."""
+    if isinstance(pose, SensorPose) and pose.covariance.any():
+        return planar_covariance(pose.covariance, T_base_plane[:3, :3].T)
+    return ARM_SD
 
 
 @dataclass(slots=True)
@@ -250,7 +244,6 @@ class _Face:
 
     belief: ScanBelief
     places: TouchPlaces
-    T_base_probe: Array | None = None  #: (4, 4) of its last touch; None: not known
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -259,33 +252,30 @@ class _ObjectHypothesis:
 
     object: str
     T_base_object: Array | None  #: (4, 4); None: the probe's pose is not known
-    score: float  #: nats below the likeliest place of that face, 0 or less
+    score: float = 0.0  #: nats below the likeliest place of that face, 0 or less
 
 
 def join_faces(last: _Face, others: Sequence[_Face]) -> Recognition:
     """Return the answer of the last face; where it leaves a choice, the other faces decide."""
     belief, answer = last.belief, last.belief.recognition
-    if answer or answer.reason not in _OPEN or not belief.places:
-        return answer
     by_face = [found for found in map(_hypotheses_of, others) if found]
-    if not by_face:
+    if answer or answer.reason not in _OPEN or not belief.places or not by_face:
         return answer
-    joined: list[tuple[float, ScanHypothesis]] = []
+    against = []  # nats by which each other face contradicts each place
     for place in belief.places:
-        one = _hypothesis_at(place, 0.0, last.T_base_probe)
-        joined.append((place.score - sum(_nats_against(one, each) for each in by_face), place))
-    joined.sort(key=lambda item: -item[0])
-    (score, best), rest = joined[0], joined[1:]
-    margin = math.inf if not rest else score - rest[0][0]
+        one = _hypothesis_at(place, last)
+        against.append([_nats_against(one, each) for each in by_face])
+    scores = [one.score - sum(nats) for one, nats in zip(belief.places, against, strict=True)]
+    first, *rest = sorted(range(len(scores)), key=lambda k: -scores[k])
+    best, rival = belief.places[first], belief.places[rest[0]] if rest else None
+    margin = scores[first] - scores[rest[0]] if rest else math.inf
+    contradicted = min(against[first]) >= CHANGED_NATS
     options = belief.reader.options
-    one = _hypothesis_at(best, 0.0, last.T_base_probe)
-    contradicted = all(_nats_against(one, each) >= CHANGED_NATS for each in by_face)
-    if margin < options.margin or contradicted:
+    if contradicted or reject_margin(margin, options.margin):
         return answer
-    runner_up = RunnerUp(*rest[0][1].face, rest[0][1].index) if rest else None
     found = answer_at(
         best.embossed, best.fit, best.hypothesis, options, answer.seq,
-        reason="", margin=margin, runner_up=runner_up,
+        reason="", margin=margin, runner_up=None if rival is None else rival.runner_up,
     )  # fmt: skip
     return replace(found, next=None) if found else answer
 
@@ -301,29 +291,26 @@ def _hypotheses_of(face: _Face) -> list[_ObjectHypothesis]:
     """Return the objects at the places of a face, likeliest first; empty if it is not encoded."""
     belief, answer = face.belief, face.belief.recognition
     if answer and answer.object is not None and answer.T_object_probe is not None:
-        at = _base_object(face.T_base_probe, answer.T_object_probe)
-        return [_ObjectHypothesis(answer.object, at, 0.0)]
+        return [_ObjectHypothesis(answer.object, _base_object(face, answer.T_object_probe))]
     if answer.reason not in _OPEN:
         return []
+    most = max((place.score for place in belief.places), default=0.0)
     return [
-        _hypothesis_at(place, place.score - belief.places[0].score, face.T_base_probe)
-        for place in belief.places
+        replace(_hypothesis_at(place, face), score=place.score - most) for place in belief.places
     ]
 
 
-def _hypothesis_at(
-    place: ScanHypothesis, score: float, T_base_probe: Array | None
-) -> _ObjectHypothesis:
-    face = place.embossed.face(place.hypothesis.face)
-    pose = face_pose(place.embossed, face, place.hypothesis, place.fit)
-    at = _base_object(T_base_probe, pose_on_object(face, pose))
-    return _ObjectHypothesis(face.object, at, score)
+def _hypothesis_at(place: ScanHypothesis, touched: _Face) -> _ObjectHypothesis:
+    pose = face_pose(place.embossed, place.face, place.hypothesis, place.fit)
+    at = _base_object(touched, pose_on_object(place.face, pose))
+    return _ObjectHypothesis(place.face.object, at)
 
 
-def _base_object(T_base_probe: Array | None, T_object_probe: Array) -> Array | None:
-    if T_base_probe is None:
+def _base_object(face: _Face, T_object_probe: Array) -> Array | None:
+    """Return T_base_object (4, 4) by the last touch of a face; None if its pose is not known."""
+    if face.places.before is None:
         return None
-    return np.asarray(T_base_probe @ _inverse(T_object_probe))
+    return np.asarray(_matrix(face.places.before) @ _inverse(T_object_probe))
 
 
 def _nats_against(one: _ObjectHypothesis, others: Sequence[_ObjectHypothesis]) -> float:

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.grow import add_touch
-from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
+from recognizer.scan.mosaic.mosaic import Mosaic, add_touch, no_touches
 from recognizer.scan.mosaic.planar import PlacedTouch, pose_difference
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.options import Effort
@@ -40,18 +39,6 @@ LEAST_SD_RAD = 1e-5  #: standard deviation of poses that are believed
 MOST_SD_MM = 3.0  #: standard deviation of places that are believed
 SAME_MM, SAME_RAD = 0.3, 0.03  #: within which two fits of a touch are one
 MOST_VIEWS = 6  #: fits of a touch by itself that are views
-
-
-@dataclass(frozen=True, slots=True)
-class ScanSettings:
-    """Standard deviations of x, y (mm) and the turn (rad) where no covariance is given."""
-
-    #: of the first touch against itself
-    first: tuple[float, float, float] = (0.01, 0.01, 0.001)
-    by_arm: tuple[float, float, float] = (0.4, 0.4, 0.004)  #: of a pose by the arm
-    #: of a step without any measurement. Wide: a step of 14 mm must not look less likely than one
-    #: of 2 mm, a pitch away
-    by_hand: tuple[float, float, float] = (8.0, 8.0, math.radians(2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,11 +119,7 @@ def predicted_view(image: Image, effort: Effort, near: Array) -> tuple[LatticeVi
 
 
 def flat_views(
-    image: Image,
-    bank: Bank,
-    effort: Effort,
-    near: Array,
-    alone: Sequence[Fit],
+    image: Image, bank: Bank, effort: Effort, near: Array, alone: Sequence[Fit]
 ) -> tuple[LatticeView, ...]:
     """Return the likeliest lattices of an image, and those near predicted poses.
 
@@ -158,11 +141,7 @@ def flat_views(
 
 
 def round_views(
-    image: Image,
-    bank: Bank,
-    reader: Reader,
-    embossed: EmbossedArray,
-    near: Array,
+    image: Image, bank: Bank, reader: Reader, embossed: EmbossedArray, near: Array
 ) -> tuple[LatticeView, ...]:
     """Return the likeliest lattices of an image of a round face, and those near predicted poses.
 
@@ -207,10 +186,7 @@ def is_definite(covariance: Array) -> bool:
 
 
 def _refine_near(
-    image: Image,
-    effort: Effort,
-    near: Array,
-    found: Sequence[Fit],
+    image: Image, effort: Effort, near: Array, found: Sequence[Fit]
 ) -> tuple[Fit, ...]:
     """Return the fits reached from predicted poses (k, 3) that no found fit has."""
     pitch = image.template.pitch_mm

@@ -16,7 +16,7 @@ import numpy as np
 from encoded_objects.base.files import staged_file
 from recognizer.errors import SensorStateError
 from recognizer.sensor.learn import LEAST_TOUCHES
-from recognizer.touch.sensor_state import PRIOR, SensorState
+from recognizer.touch.sensor_state import ASIDE_SD_MM, SensorState
 
 FORMAT = "tactile sensor state"
 VERSION = 1
@@ -113,7 +113,7 @@ def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -
 def state_entry(state: SensorState) -> dict[str, Any]:
     """Return a state for `--json`: tactels, spreads, and the number of touches."""
     sound = ~state.masked
-    known = sound & (state.aside_deviation_mm.max(axis=-1) < PRIOR.aside_mm / 2)
+    known = sound & (state.aside_deviation_mm.max(axis=-1) < ASIDE_SD_MM / 2)
     return {
         "sensor": state.sensor,
         "touches": state.touches,

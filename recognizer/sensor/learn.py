@@ -22,7 +22,13 @@ from probe.calibration import Calibration
 from recognizer.touch.evidence import VerifiedHypothesis
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import read_touch
-from recognizer.touch.sensor_state import PRIOR, SensorState, invert_floating, unknown_state
+from recognizer.touch.sensor_state import (
+    ASIDE_SD_MM,
+    GAIN_SD,
+    SensorState,
+    invert_floating,
+    unknown_state,
+)
 from recognizer.touch.symbols.kernels import FIRST_NOISE
 from recognizer.touch.symbols.linearize import linearize_image
 
@@ -239,4 +245,4 @@ def _unknowns(state: SensorState) -> Array:
 def _deviations(state: SensorState) -> Array:
     """Return the standard deviations of a state, at most those of an unknown sensor."""
     both = np.concatenate([state.gain_deviation[..., None], state.aside_deviation_mm], axis=-1)
-    return np.asarray(np.clip(both, 1e-6, [PRIOR.gain, *[PRIOR.aside_mm] * 2]).ravel())
+    return np.asarray(np.clip(both, 1e-6, [GAIN_SD, ASIDE_SD_MM, ASIDE_SD_MM]).ravel())

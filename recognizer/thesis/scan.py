@@ -16,10 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.arm import SensorPose
-from recognizer.scan.mosaic.grow import add_touch
-from recognizer.scan.mosaic.mosaic import no_touches
+from recognizer.scan.mosaic.mosaic import add_touch, no_touches
 from recognizer.scan.session import TouchPlaces
-from recognizer.scan.views import ScanSettings
 from recognizer.thesis.merge import WINDOW_TACTELS, Placing, merge_touches
 from recognizer.thesis.read import ClassicalReading, read_classically
 from recognizer.touch.lab import Lab
@@ -72,7 +70,7 @@ class ThesisScan:
     def __init__(self, lab: Lab, sensor: SensorType) -> None:
         self._lab, self._unread = lab, 0
         self._mosaic = no_touches(sensor)
-        self._places = TouchPlaces(ScanSettings())
+        self._places = TouchPlaces()
         self._answer = refusal(0, TOO_FEW)
 
     @property

@@ -31,11 +31,6 @@ ASIDE_SD_MM = 0.02  #: each way, of the place of symbols, beyond scale and skew
 DIFFERENCE = 1e-6  #: of scales and skew, of the differences that stand for derivatives
 
 
-def print_matrix(as_built: AsBuilt) -> Array:
-    """Return S (3, 3) of a print; z is as designed."""
-    return _print_matrix(np.array([getattr(as_built, name) for name in _PRINT]))
-
-
 def print_of(prints: Sequence[AsBuilt], part: str, printer: str) -> AsBuilt | None:
     """Return the print of a part as it was touched, else of its printer; None if neither is known.
 
@@ -62,7 +57,7 @@ def usual_print() -> AsBuilt:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FeltScale:
+class TouchScale:
     """The scale of a print by one touch, with its covariance with the pose."""
 
     excess: float  #: lattice over print, less 1
@@ -80,7 +75,7 @@ class PrintedFace:
     T_part_face: Array
 
     def pose(
-        self, T_face_probe: Array, covariance: Array, felt: FeltScale | None = None
+        self, T_face_probe: Array, covariance: Array, felt: TouchScale | None = None
     ) -> tuple[Array, Array]:
         """Return pose (4, 4) and covariance (3, 3) on the printed part, face frame of the design.
 
@@ -91,7 +86,7 @@ class PrintedFace:
         symmetric. The reader fits a turned and scaled lattice to what is turned and stretched,
         which finds the turn against Q, whatever U, and the mean of U's eigenvalues as the scale.
         """
-        print_ = np.array([getattr(self.as_built, name) for name in _PRINT])
+        print_ = scales_and_skew(self.as_built)
         spread = self.as_built.covariance[:3, :3]
         slope, alone = np.zeros(3), covariance
         if felt is not None:
@@ -100,7 +95,7 @@ class PrintedFace:
             print_, spread = self._with_scale(print_, spread, felt)
 
         def posed(print_: Array) -> Array:
-            S = _print_matrix(print_)
+            S = print_matrix(print_)
             axes, scale = _polar(S @ self.T_part_face[:3, :2])
             moved = T_face_probe
             if felt is not None:
@@ -111,11 +106,11 @@ class PrintedFace:
         by_print = _slopes(lambda one: _planar(posed(one)), print_, _planar(printed))
         along = np.eye(3)
         R = self.T_part_face[:3, :3]
-        along[:2, :2] = (R.T @ _print_matrix(print_) @ R)[:2, :2]
+        along[:2, :2] = (R.T @ print_matrix(print_) @ R)[:2, :2]
         floor = np.diag([ASIDE_SD_MM**2, ASIDE_SD_MM**2, 0.0])
         return printed, along @ alone @ along.T + by_print @ spread @ by_print.T + floor
 
-    def _with_scale(self, print_: Array, spread: Array, felt: FeltScale) -> tuple[Array, Array]:
+    def _with_scale(self, print_: Array, spread: Array, felt: TouchScale) -> tuple[Array, Array]:
         """Return scales and skew updated by the scale of a touch, and their covariance (3, 3)."""
         variance = felt.covariance[3]
         precision = 1.0 / variance - 1.0 / felt.expected**2  # by the image alone
@@ -129,7 +124,7 @@ class PrintedFace:
 
     def _excess(self, print_: Array) -> Array:
         """Return (1,) lattice over print, less 1, by a touch of the face."""
-        return np.array([1.0 / _polar(_print_matrix(print_) @ self.T_part_face[:3, :2])[1] - 1.0])
+        return np.array([1.0 / _polar(print_matrix(print_) @ self.T_part_face[:3, :2])[1] - 1.0])
 
     def _printed(self, S: Array, axes: Array, T_face_probe: Array) -> Array:
         R, ((ax, ay, az), (bx, by, bz)) = self.T_part_face[:3, :3], axes.T.tolist()
@@ -142,10 +137,13 @@ class PrintedFace:
         return found
 
 
-_PRINT = ("scale_x", "scale_y", "skew_rad")  # what of a print moves places
+def scales_and_skew(as_built: AsBuilt) -> Array:
+    """Return what of a print moves places (3,)."""
+    return np.array([as_built.scale_x, as_built.scale_y, as_built.skew_rad])
 
 
-def _print_matrix(print_: Array) -> Array:
+def print_matrix(print_: Array) -> Array:
+    """Return S (3, 3) of scales and skew (3,); z is as designed."""
     scale_x, scale_y, skew = print_.tolist()
     sin, cos = math.sin(skew), math.cos(skew)
     return np.array([[scale_x, scale_y * sin, 0.0], [0.0, scale_y * cos, 0.0], [0.0, 0.0, 1.0]])

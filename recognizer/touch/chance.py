@@ -33,7 +33,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,18 +96,34 @@ def expected_matches(
     held = labels_of(embossed, hypothesis, fit.cells)
     shown = held < embossed.array.order
     chance = chance_of_match(scores[shown, :-1], held[shown])
-    border = _border_of(fit, scores, held)
+    # the bare cells, dearest first: nats by which another place with a symbol there falls behind
+    price = np.where(shown, 0.0, scores[:, -1] - scores[:, :-1].max(axis=1))
+    dear = np.argsort(-price, kind="stable")[: int((price > 0).sum())]
+    own = scores[np.arange(len(held)), held]
+    slack = float((scores.max(axis=1) - own).sum())  # by which the hypothesis itself does
+    cells = (fit.cells - fit.cells[_anchor(fit, shown)])[dear]
     return chance * sum(
-        _count_places(one, border) if borders else len(one.keys)
-        for one in arrays
-        if (one.alphabet, one.style) == (embossed.alphabet, embossed.style)
+        count_places(one, cells, price[dear], slack)
+        if borders and len(one.keys) <= LARGE_LAB
+        else len(one.keys)
+        for one in _embossed_alike(arrays, embossed)
     )
 
 
+def _embossed_alike(
+    arrays: Iterable[EmbossedArray], embossed: EmbossedArray
+) -> list[EmbossedArray]:
+    kind = embossed.alphabet, embossed.style
+    return [one for one in arrays if (one.alphabet, one.style) == kind]
+
+
+def _anchor(fit: Fit, shown: Flags) -> int:
+    """Return the number of the cell with a symbol that is seen best."""
+    return int(np.argmax(np.where(shown, fit.seen, -1.0)))
+
+
 def expected_by_border(
-    arrays: Iterable[EmbossedArray],
-    found: VerifiedHypothesis,
-    tip_mm: float,
+    arrays: Iterable[EmbossedArray], found: VerifiedHypothesis, tip_mm: float
 ) -> float:
     """Return how many registered places a foreign face matches as well, border included.
 
@@ -116,9 +131,7 @@ def expected_by_border(
     diameter of a tactel's tip.
     """
     embossed, fit = found.embossed, found.fit
-    alike = [
-        one for one in arrays if (one.alphabet, one.style) == (embossed.alphabet, embossed.style)
-    ]
+    alike = _embossed_alike(arrays, embossed)
     if sum(len(one.keys) for one in alike) > LARGE_LAB:
         return math.inf
     scores = bounded_scores(fit)
@@ -128,8 +141,7 @@ def expected_by_border(
     sure = np.where(shown, 1.0, _pressed_share(found))
     ahead = np.where(ahead > 0, ahead * sure[:, None], ahead)
     behind = np.floor(ahead / GRAIN).astype(np.int64)
-    anchor = int(np.argmax(np.where(shown, fit.seen, -1.0)))
-    cells = fit.cells - fit.cells[anchor]
+    cells = fit.cells - fit.cells[_anchor(fit, shown)]
     places = sum(_expect_matches(one, cells, behind) for one in alike)
     return places * share_of_borders(found, tip_mm)
 
@@ -143,12 +155,12 @@ def _pressed_share(found: VerifiedHypothesis) -> Array:
     return np.asarray((on & pressed).sum(axis=1) / np.maximum(on.sum(axis=1), 1))
 
 
-def chance_of_match(scores: Array, held: Ints, grain: float = GRAIN) -> float:
+def chance_of_match(scores: Array, held: Ints) -> float:
     """Return the probability that random symbols score as well as those held (m,).
 
     `scores` (m, q) are nats, rounded by `GRAIN` towards a larger probability.
     """
-    behind = np.floor((scores[np.arange(len(held)), held][:, None] - scores) / grain)
+    behind = np.floor((scores[np.arange(len(held)), held][:, None] - scores) / GRAIN)
     return _share_within(behind.astype(np.int64), 0)
 
 
@@ -216,34 +228,9 @@ def _bears(
     return np.asarray(held_by == owners)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Border:
-    """The bare cells of a hypothesis, where other places may hold symbols."""
-
-    cells: Ints  #: (n, 2) column and upward row, from a cell that the place holds
-    price: Array  #: (n,) nats by which a symbol there falls behind, falling
-    slack: float  #: nats by which the hypothesis itself falls behind
-
-
-def _border_of(fit: Fit, scores: Array, held: Ints) -> _Border:
-    order = scores.shape[1] - 1
-    price = np.where(held == order, scores[:, -1] - scores[:, :-1].max(axis=1), 0.0)
-    dear = np.argsort(-price, kind="stable")[: int((price > 0).sum())]
-    anchor = int(np.argmax(np.where(held < order, fit.seen, -1.0)))
-    own = scores[np.arange(len(held)), held]
-    slack = float((scores.max(axis=1) - own).sum())
-    return _Border(fit.cells[dear] - fit.cells[anchor], price[dear], slack)
-
-
-def _count_places(embossed: EmbossedArray, border: _Border) -> int:
-    if len(embossed.keys) > LARGE_LAB:
-        return len(embossed.keys)
-    return count_places(embossed, border.cells, border.price, border.slack)
-
-
 def share_of_borders(found: VerifiedHypothesis, tip_mm: float) -> float:
     """Return the share of foreign borders that the image fits as well as the registered one."""
-    face = found.embossed.face(found.hypothesis.face)
+    face = found.face
     if face.round is not None or tip_mm <= 0.0:
         return 1.0
     pressed, top, bare = _free_tactels(found)

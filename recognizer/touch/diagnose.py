@@ -191,7 +191,7 @@ def _read_anywhere(touch: TouchImages) -> tuple[float, int]:
     """
     best, read = -math.inf, 0
     for one in touch.arrays:
-        for fit in one.first_fits[:1]:
+        for fit in one.fits(touch.reader.options.first)[:1]:
             order = fit.scores.shape[1] - 1
             likeliest = fit.scores.argmax(axis=1)
             shows = np.where(likeliest == order, -1, likeliest).tolist()

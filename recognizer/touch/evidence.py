@@ -10,13 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.database.registered import Bend
-from recognizer.touch.hypothesis import (
-    Hypothesis,
-    coincide,
-    labels_of,
-    neighbours,
-    under_centre,
-)
+from recognizer.touch.hypothesis import Hypothesis, PlaceHypothesis, labels_of
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.options import TIE_NATS
 from recognizer.touch.symbols.fit import Fit
@@ -32,32 +26,18 @@ IN_VIEW = 6.0  #: tactels on a cell that counts as seen
 
 
 @dataclass(frozen=True, eq=False)
-class VerifiedHypothesis:
+class VerifiedHypothesis(PlaceHypothesis):
     """A place with pose and gain fitted to the symbols that the database holds there."""
 
     image: Image  #: on a round face: under the curvature there
-    embossed: EmbossedArray
-    hypothesis: Hypothesis
-    fit: Fit
-    score: float  #: log-likelihood of the image, nats
     bend: Bend | None = None  #: of a round face, in the axes of the sensor
-
-    @property
-    def index(self) -> tuple[int, int]:
-        """Row and column of the array's cell under the sensor's centre."""
-        return under_centre(self.embossed, self.fit, self.hypothesis)
 
     def same_place(self, other: VerifiedHypothesis) -> bool:
         """Whether both are one place, up to a cell's rounding."""
         if self.embossed is not other.embossed or self.hypothesis.face != other.hypothesis.face:
             return False
-        return neighbours(self.embossed, self.index, other.index)
-
-    def coincides(self, other: VerifiedHypothesis) -> bool:
-        """Whether both are one place, and neither one a pitch off it."""
-        return self.embossed is other.embossed and coincide(
-            self.embossed, self.fit, self.hypothesis, other.fit, other.hypothesis
-        )
+        array, away = self.embossed.array, np.subtract(self.index, other.index) + 1
+        return bool((away % (array.rows, array.columns) <= 2).all())
 
     @cached_property
     def cells(self) -> CellEvidence:

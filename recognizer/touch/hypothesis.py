@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.compiled import addresses
-from recognizer.touch.lab import EmbossedArray, cell_keys
+from recognizer.touch.lab import EmbossedArray, EncodedFace, cell_keys
 from recognizer.touch.options import TIE_NATS
+from recognizer.touch.recognition import RunnerUp
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.kernels import kernels
 from recognizer.touch.symbols.linearize import LabelsAt
@@ -59,22 +60,54 @@ class Hypothesis:
     score: float  #: log-likelihood of the image, nats
 
 
+@dataclass(frozen=True, eq=False)
+class PlaceHypothesis:
+    """A registered place of a touch, or of a scan, and the fit that lies there."""
+
+    embossed: EmbossedArray
+    hypothesis: Hypothesis
+    fit: Fit
+    score: float  #: log-likelihood of all images, nats
+
+    @property
+    def face(self) -> EncodedFace:
+        """The face that holds the place."""
+        return self.embossed.face(self.hypothesis.face)
+
+    @property
+    def index(self) -> tuple[int, int]:
+        """Row and column of the array's cell under the sensor's centre."""
+        return under_centre(self.embossed, self.fit, self.hypothesis)
+
+    @property
+    def runner_up(self) -> RunnerUp:
+        """The place as the runner-up of an answer."""
+        return RunnerUp(self.face.object, self.face.face, self.index)
+
+    def coincides(self, other: PlaceHypothesis) -> bool:
+        """Whether both are one place, and neither one a pitch off it."""
+        return self.embossed is other.embossed and coincide(
+            self.embossed, self.fit, self.hypothesis, other.fit, other.hypothesis
+        )
+
+
 def find_hypotheses(
     embossed: EmbossedArray, fits: tuple[Fit, ...], kept: int = KEPT
 ) -> list[Hypothesis]:
     """Return the likeliest places over all fits, best first, at most `kept` of each fit."""
     found: list[Hypothesis] = []
     for number, fit in enumerate(fits):
-        found += _hypotheses_of(embossed, fit, number, kept)
+        scores = bounded_scores(fit)
+        places = _window_candidates(embossed, fit)
+        if places is None:
+            symbol = scores[:, :-1].max(axis=1) - scores[:, -1]  # a symbol rather than none
+            places = _anchor_candidates(embossed, fit, scores, symbol, ANCHORS)
+        found += _rank_candidates(embossed, fit, number, scores, places, kept)
     return sorted(found, key=lambda hypothesis: -hypothesis.score)
 
 
 def find_rivals(
-    embossed: EmbossedArray,
-    fit: Fit,
-    best: Hypothesis,
-    number: int,
-    kept: int = KEPT,
+    embossed: EmbossedArray, fit: Fit, best: Hypothesis, number: int, kept: int = KEPT
 ) -> list[Hypothesis]:
     """Return the likeliest other places of the whole database under a fit, best first.
 
@@ -93,22 +126,8 @@ def find_rivals(
     ]
 
 
-def _hypotheses_of(embossed: EmbossedArray, fit: Fit, number: int, kept: int) -> list[Hypothesis]:
-    scores = bounded_scores(fit)
-    found = _window_candidates(embossed, fit)
-    if found is None:
-        symbol = scores[:, :-1].max(axis=1) - scores[:, -1]  # a symbol rather than none
-        found = _anchor_candidates(embossed, fit, scores, symbol, ANCHORS)
-    return _rank_candidates(embossed, fit, number, scores, found, kept)
-
-
 def _rank_candidates(
-    embossed: EmbossedArray,
-    fit: Fit,
-    number: int,
-    scores: Array,
-    found: Places,
-    kept: int,
+    embossed: EmbossedArray, fit: Fit, number: int, scores: Array, found: Places, kept: int
 ) -> list[Hypothesis]:
     rows, columns, owners = found
     if len(rows) == 0:
@@ -165,11 +184,7 @@ def _window_candidates(embossed: EmbossedArray, fit: Fit) -> Places | None:
 
 
 def _anchor_candidates(
-    embossed: EmbossedArray,
-    fit: Fit,
-    scores: Array,
-    symbol: Array,
-    anchors: int,
+    embossed: EmbossedArray, fit: Fit, scores: Array, symbol: Array, anchors: int
 ) -> Places:
     """Return where (0, 0) can lie if one of a few cells is a registered one; none in a large lab.
 
@@ -185,10 +200,7 @@ def _anchor_candidates(
 
 
 def _origins(
-    embossed: EmbossedArray,
-    fit: Fit,
-    found: Sequence[NDArray[np.integer[Any]]],
-    numbers: list[int],
+    embossed: EmbossedArray, fit: Fit, found: Sequence[NDArray[np.integer[Any]]], numbers: list[int]
 ) -> Places:
     """Return where (0, 0) lies, each place once.
 
@@ -290,12 +302,6 @@ def under_centre(embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis) -> t
     pitch, array = embossed.style.pitch_mm, embossed.array
     i, j = math.floor(fit.x_mm / pitch), math.floor(fit.y_mm / pitch)
     return (hypothesis.row - j) % array.rows, (hypothesis.column + i) % array.columns
-
-
-def neighbours(embossed: EmbossedArray, a: tuple[int, int], b: tuple[int, int]) -> bool:
-    """Whether two cells are one, up to a cell's rounding."""
-    array = embossed.array
-    return (a[0] - b[0] + 1) % array.rows <= 2 and (a[1] - b[1] + 1) % array.columns <= 2
 
 
 def coincide(

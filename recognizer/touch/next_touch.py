@@ -18,20 +18,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType, force_share
-from recognizer.touch.hypothesis import Hypothesis
-from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.hypothesis import PlaceHypothesis
 from recognizer.touch.options import TIE_NATS
 from recognizer.touch.pose import face_pose
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NextTouch, Recognition
 from recognizer.touch.signal import Signal, combine_around, mean_of_strongest
-from recognizer.touch.symbols.fit import Fit
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -105,26 +102,6 @@ def next_limits(sensor: SensorType) -> NextLimits:
     )
 
 
-class PlaceHypothesis(Protocol):
-    """A possible place of a touch: `VerifiedHypothesis`, or one of a scan."""
-
-    @property
-    def embossed(self) -> EmbossedArray:
-        """Array and style."""
-
-    @property
-    def hypothesis(self) -> Hypothesis:
-        """The place of the fit's lattice."""
-
-    @property
-    def fit(self) -> Fit:
-        """Pose of the sensor on that lattice."""
-
-    @property
-    def score(self) -> float:
-        """Log-likelihood, nats."""
-
-
 def propose_next(
     reader: PreparedLab,
     signal: Signal,
@@ -144,8 +121,10 @@ def propose_next(
         return NextTouch(0.0, 0.0, 0.0, limits.force_n, "nothing is felt: press onto the object")
     steps = _steps(limits)
     pitch_mm = min(each.style.pitch_mm for each in reader.lab.arrays)
-    area = felt_area(reader.sensor, signal, earlier)
-    novelty = NOVELTY_INSIDE if area.share >= WHOLE_SHARE else NOVELTY
+    before = tuple((one.pose, _loaded_tactels(one.signal, limits)) for one in earlier)
+    area = LoadedArea(reader.sensor, _loaded_tactels(signal, limits), before)
+    share = float(area.loaded.mean())
+    novelty = NOVELTY_INSIDE if share >= WHOLE_SHARE else NOVELTY
     by_image, borne = _symbols_by_image(area, pitch_mm, novelty, limits)
     value = by_image
     # where nothing speaks for symbols of a registered place, hypotheses know no border either
@@ -162,7 +141,7 @@ def propose_next(
     value -= TURNING * (steps[:, 2] != 0)
     best = int(np.argmax(value)) if borne.any() else 0
     dx, dy, turn = steps[best].tolist()
-    why = _why(signal, area.share, (dx, dy, turn), answer, limits)
+    why = _why(signal, share, (dx, dy, turn), answer, limits)
     return NextTouch(round(dx, 1), round(dy, 1), round(math.degrees(turn), 1), limits.force_n, why)
 
 
@@ -192,19 +171,21 @@ def _views(sensor: SensorType, limits: NextLimits) -> tuple[PlanePoints, PlanePo
     y = steps[:, 1, None] + s * grid[:, 0] + c * grid[:, 1]
     around = limits.clear_mm * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
     views = np.stack([x, y], axis=-1), steps[:, None, :2] + around
-    return plane_points(sensor, views[0]), plane_points(sensor, views[1])
+    return _plane_points(sensor, views[0]), _plane_points(sensor, views[1])
 
 
 def _symbols_by_image(
-    area: FeltArea, pitch_mm: float, novelty: float, limits: NextLimits
+    area: LoadedArea, pitch_mm: float, novelty: float, limits: NextLimits
 ) -> tuple[Array, Flags]:
     """Return (n,) symbols worth at each step, and whether the centre stays on the loaded area."""
     points, around = _views(area.sensor, limits)
     half_x, half_y = area.sensor.half_mm
     cells = 4 * half_x * half_y / pitch_mm**2
-    expected, seen = area.look(points)
+    seen, loaded = area.look(points)
+    beyond = area.loaded[points.nearest] * np.exp(-points.away_mm / BEYOND_MM)
+    expected = np.where(seen, loaded, beyond)
     worth = cells * (expected * (1 + novelty * ~seen)).mean(axis=1)
-    return worth, np.asarray(area.felt(around).all(axis=1))
+    return worth, np.asarray(area.look(around)[1].all(axis=1))
 
 
 def _likely(hypotheses: Sequence[PlaceHypothesis]) -> list[tuple[PlaceHypothesis, float]]:
@@ -217,10 +198,10 @@ def _likely(hypotheses: Sequence[PlaceHypothesis]) -> list[tuple[PlaceHypothesis
 
 
 def _symbols_by_face(
-    area: FeltArea, one: PlaceHypothesis, steps: Array, novelty: float, limits: NextLimits
+    area: LoadedArea, one: PlaceHypothesis, steps: Array, novelty: float, limits: NextLimits
 ) -> tuple[Array, Array]:
     """Return (n,) symbols worth at each step on a face, and whether its centre lies on it."""
-    face = one.embossed.face(one.hypothesis.face)
+    face = one.face
     T = face_pose(one.embossed, face, one.hypothesis, one.fit)
     R, at = T[:2, :2], T[:2, 3]
     own = (face.centres_mm - at) @ R  # in the sensor frame of now
@@ -230,7 +211,7 @@ def _symbols_by_face(
     rim = WHOLE * one.embossed.style.pitch_mm
     half_x, half_y = area.sensor.half_mm
     seen = (np.abs(then[0]) < half_x - rim) & (np.abs(then[1]) < half_y - rim)
-    new = ~area.seen(plane_points(area.sensor, own))
+    new = ~area.look(_plane_points(area.sensor, own))[0]
     worth = (seen * (1 + novelty * new)).sum(axis=1)
     places = steps[:, :2] @ R.T + at
     region = face.region
@@ -247,7 +228,9 @@ def _why(
 ) -> str:
     """Return in words what a step promises."""
     words = []
-    if strongest_reading(signal) < (SOFT_N if signal.newtons else limits.soft_counts):
+    if mean_of_strongest(signal.forces * signal.trust) < (
+        SOFT_N if signal.newtons else limits.soft_counts
+    ):
         words.append("more force: little is felt")
     if step[0] or step[1]:
         if share < WHOLE_SHARE:
@@ -277,7 +260,7 @@ class PlanePoints:
     away_mm: Array  #: (...) from the sensor's rim
 
 
-def plane_points(sensor: SensorType, points_mm: Array) -> PlanePoints:
+def _plane_points(sensor: SensorType, points_mm: Array) -> PlanePoints:
     """Return points (..., 2) of a sensor's plane."""
     half = np.array(sensor.half_mm)
     beyond = np.maximum(np.abs(points_mm) - half, 0.0)
@@ -288,64 +271,34 @@ def plane_points(sensor: SensorType, points_mm: Array) -> PlanePoints:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FeltArea:
+class LoadedArea:
     """Where touches have loaded a face."""
 
     sensor: SensorType
     loaded: Flags  #: (rows, columns) of the last touch
     earlier: tuple[tuple[Array, Flags], ...]  #: poses (3,) and what was loaded there
 
-    @property
-    def share(self) -> float:
-        """Return how much of the sensor lies on something."""
-        return float(self.loaded.mean())
-
-    def look(self, points: PlanePoints) -> tuple[Array, Flags]:
-        """Return how much a face is expected at points (...), 0 ... 1, and which were seen."""
-        seen, felt = self._felt(points)
-        expected = self.loaded[points.nearest] * np.exp(-points.away_mm / BEYOND_MM)
-        return np.where(seen, felt, expected), seen
-
-    def felt(self, points: PlanePoints) -> Flags:
-        """Return where among points (...) the face was loaded."""
-        return self._felt(points)[1]
-
-    def seen(self, points: PlanePoints) -> Flags:
-        """Return which points (...) lay under the sensor."""
-        return self._felt(points)[0]
-
-    def _felt(self, points: PlanePoints) -> tuple[Flags, Flags]:
+    def look(self, points: PlanePoints) -> tuple[Flags, Flags]:
+        """Return which points (...) lay under the sensor, and where the face was loaded."""
         half = np.array(self.sensor.half_mm)
-        seen, felt = points.under.copy(), points.under & self.loaded[points.nearest]
-        for (x, y, turn), loaded in self.earlier:
+        seen, loaded = points.under.copy(), points.under & self.loaded[points.nearest]
+        for (x, y, turn), before in self.earlier:
             c, s = math.cos(turn), math.sin(turn)
             own = (points.mm - (x, y)) @ np.array([[c, -s], [s, c]])
             under = (np.abs(own) < half).all(axis=-1)
             seen |= under
-            felt[under] |= loaded[_tactels(self.sensor, own[under])]
-        return seen, felt
+            loaded[under] |= before[_tactels(self.sensor, own[under])]
+        return seen, loaded
 
 
-def felt_area(sensor: SensorType, signal: Signal, earlier: Sequence[EarlierTouch] = ()) -> FeltArea:
-    """Return the loaded area of the last touch and those before."""
-    limits = next_limits(sensor)
-    before = tuple((one.pose, loaded_tactels(one.signal, limits)) for one in earlier)
-    return FeltArea(sensor, loaded_tactels(signal, limits), before)
-
-
-def loaded_tactels(signal: Signal, limits: NextLimits) -> Flags:
+def _loaded_tactels(signal: Signal, limits: NextLimits) -> Flags:
     """Return (rows, columns) where the sensor lies on something, gaps between strokes closed."""
     forces = signal.forces * signal.trust
     least = LEAST_N if signal.newtons else limits.least_counts
-    pressed = forces > max(FAINT * strongest_reading(signal), least)
+    pressed = forces > max(FAINT * mean_of_strongest(forces), least)
     reach = limits.gap // 2
     near = combine_around(pressed, reach, np.logical_or)
     return combine_around(near, reach, np.logical_and)
-
-
-def strongest_reading(signal: Signal) -> float:
-    """Return the mean of the strongest readings."""
-    return mean_of_strongest(signal.forces * signal.trust)
 
 
 def _tactels(sensor: SensorType, points_mm: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.as_built import FeltScale
+from recognizer.touch.as_built import TouchScale
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import EmbossedArray, EncodedFace
 from recognizer.touch.symbols.fit import Fit
@@ -57,7 +57,7 @@ def face_covariance(face: EncodedFace, covariance: Array) -> Array:
     return np.asarray(turn @ covariance @ turn.T)
 
 
-def felt_scale(face: EncodedFace, fit: Fit, expected: float) -> FeltScale | None:
+def felt_scale(face: EncodedFace, fit: Fit, expected: float) -> TouchScale | None:
     """Return the scale of a print by a fit, in the face frame; None if it fits none.
 
     `expected` is the standard deviation within which the fit took it to be 1.
@@ -67,7 +67,7 @@ def felt_scale(face: EncodedFace, fit: Fit, expected: float) -> FeltScale | None
     x, y, turn, variance = fit.with_scale.tolist()
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
     covariance = np.array([c * x + s * y, c * y - s * x, turn, variance])
-    return FeltScale(float(fit.nuisance[3]), covariance, expected)
+    return TouchScale(float(fit.nuisance[3]), covariance, expected)
 
 
 def inside_mm(face: EncodedFace, x: float, y: float) -> float:

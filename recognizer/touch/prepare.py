@@ -100,46 +100,37 @@ def _sources() -> list[Path]:
     return [file for package in CODE for file in Path(package.__path__[0]).glob("*.py")]
 
 
+#: Arrays of a template and a bank, in the order in which they are kept.
+_KEPT = {
+    "numbers": "<f8", "counts": "<i8", "rimmed": "<f4", "taps": "<i4", "even": "<f4",
+    "odd": "<f4", "lookups": "<i4", "rotations_rad": "<f8", "shifts_mm": "<f8",
+}  # fmt: skip
+
+
 def _packed(template: ResponseTemplate, bank: Bank) -> bytes:
     """Return both as bytes: every array as its number of axes, its shape, its values."""
-    numbers = (template.pitch_mm, template.half_mm, template.ink, template.step_mm)
-    arrays = (
-        np.array(numbers, "<f8"),
-        np.array((template.order, *bank.shape, bank.reach, bank.rim), _NUMBERS),
-        template.rimmed.astype("<f4"),
-        bank.taps.astype("<i4"),
-        bank.even.astype("<f4"),
-        bank.odd.astype("<f4"),
-        bank.lookups.astype("<i4"),
-        bank.rotations_rad.astype("<f8"),
-        bank.shifts_mm.astype("<f8"),
-    )
-    return b"".join(
-        np.array((one.ndim, *one.shape), _NUMBERS).tobytes()
-        + one.tobytes()
-        + bytes(-one.nbytes % 8)
-        for one in arrays
-    )
+    given = {
+        "numbers": (template.pitch_mm, template.half_mm, template.ink, template.step_mm),
+        "counts": (template.order, *bank.shape, bank.reach, bank.rim),
+        "rimmed": template.rimmed,
+    }
+    packed = []
+    for name, kind in _KEPT.items():
+        one = np.asarray(given[name] if name in given else getattr(bank, name), kind)
+        shape = np.array((one.ndim, *one.shape), _NUMBERS)
+        packed += [shape.tobytes(), one.tobytes(), bytes(-one.nbytes % 8)]
+    return b"".join(packed)
 
 
 def _unpacked(content: bytes) -> tuple[ResponseTemplate, Bank]:
-    at = 0
-
-    def read(kind: str) -> NDArray[Any]:
-        nonlocal at
+    at, found = 0, dict[str, NDArray[Any]]()
+    for name, kind in _KEPT.items():
         axes = int(np.frombuffer(content, _NUMBERS, 1, at)[0])
         shape = np.frombuffer(content, _NUMBERS, axes, at + _NUMBERS.itemsize)
         at += (1 + axes) * _NUMBERS.itemsize
-        values = np.frombuffer(content, kind, int(shape.prod()), at).reshape(shape)
-        at += values.nbytes + -values.nbytes % 8
-        return values
-
-    numbers, counts = read("<f8").tolist(), read(_NUMBERS.str).tolist()
-    pitch_mm, half_mm, ink, step_mm = numbers
-    order, rows, columns, reach, rim = counts
-    template = ResponseTemplate(pitch_mm, order, half_mm, read("<f4"), ink, step_mm)
-    bank = Bank(
-        (rows, columns), reach, rim, read("<i4"), read("<f4"), read("<f4"), read("<i4"),
-        read("<f8"), read("<f8"),
-    )  # fmt: skip
-    return template, bank
+        found[name] = np.frombuffer(content, kind, int(shape.prod()), at).reshape(shape)
+        at += found[name].nbytes + -found[name].nbytes % 8
+    pitch_mm, half_mm, ink, step_mm = found.pop("numbers").tolist()
+    order, rows, columns, reach, rim = found.pop("counts").tolist()
+    template = ResponseTemplate(pitch_mm, order, half_mm, found.pop("rimmed"), ink, step_mm)
+    return template, Bank((rows, columns), reach, rim, **found)

@@ -24,13 +24,7 @@ from recognizer.touch.hypothesis import Hypothesis, under_centre
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.next_touch import propose_next
 from recognizer.touch.options import ReaderOptions
-from recognizer.touch.pose import (
-    face_covariance,
-    face_pose,
-    felt_scale,
-    inside_mm,
-    pose_on_object,
-)
+from recognizer.touch.pose import face_covariance, face_pose, felt_scale, inside_mm, pose_on_object
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import (
     AMBIGUOUS,
@@ -47,12 +41,7 @@ from recognizer.touch.search_gate import is_nearly_chance, may_find_more
 from recognizer.touch.signal import Signal, mean_of_strongest, swap_halves
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import STROKE_UNIT_MM
-from recognizer.touch.verdict import (
-    may_count_border,
-    reject_chance,
-    reject_few,
-    reject_reason,
-)
+from recognizer.touch.verdict import may_count_border, reject_chance, reject_few, reject_reason
 from recognizer.touch.verify import TouchImages, verify_hypotheses
 
 #: Doubt up to which a wide search confirms an answer that chance nearly allows. A wrong soft one of
@@ -156,10 +145,6 @@ def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: i
     best = found[0]
     other = next((one for one in found[1:] if not best.same_place(one)), None)
     margin = math.inf if other is None else best.score - other.score
-    runner_up = None
-    if other is not None:
-        face = other.embossed.face(other.hypothesis.face)
-        runner_up = RunnerUp(face.object, face.face, other.index)
     adjacent = next((one for one in found[1:] if not best.coincides(one)), None)
     nearest = margin
     if adjacent is not None and best.score - adjacent.score < options.margin_by_few:
@@ -169,7 +154,7 @@ def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: i
         margin = nearest
     return answer_at(
         best.embossed, best.fit if reason else best.last_fit(), best.hypothesis, options, seq,
-        reason=reason, margin=margin, runner_up=runner_up,
+        reason=reason, margin=margin, runner_up=None if other is None else other.runner_up,
     )  # fmt: skip
 
 
@@ -222,9 +207,7 @@ def _swapped_halves(touch: TouchImages, best: VerifiedHypothesis) -> Cause | Non
         return None
     for axis in (0, 1):
         swapped = replace(
-            signal,
-            forces=swap_halves(signal.forces, axis),
-            trust=swap_halves(signal.trust, axis),
+            signal, forces=swap_halves(signal.forces, axis), trust=swap_halves(signal.trust, axis)
         )
         found = verify_hypotheses(TouchImages(reader, swapped), reader.options.first)
         answer = _judge(reader, found, _best_answer(found, reader.options, 0))
@@ -246,7 +229,7 @@ def has_residual(found: VerifiedHypothesis) -> bool:
     poorly = evidence.log_likelihood_ratio < POOR_RATIO and evidence.explained < POORLY_EXPLAINED
     if poorly and strongest >= SOFT * image.noise:
         return True
-    face = found.embossed.face(found.hypothesis.face)
+    face = found.face
     if face.round is not None:
         return False
     points = points_on_face(found, face)[forces > PRESSED * strongest]

@@ -69,12 +69,12 @@ class Cause:
     evidence: Numbers  #: the numbers behind it, exact
 
     def __str__(self) -> str:
-        return _WORDS[self.code](self.evidence)
+        return _CAUSES[self.code][0](self.evidence)
 
     @property
     def way_out(self) -> str:
         """What a person does about it."""
-        return _WAYS_OUT[self.code]
+        return _CAUSES[self.code][1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,8 +146,10 @@ class Recognition:
             if self.runner_up is not None and self.reason == AMBIGUOUS:
                 others = f", {self.runner_up.object}/{self.runner_up.face} among others"
             if self.doubt is not None and self.reason == BY_CHANCE:
-                others = f", as {places_by_chance(self.doubt)} would match"
-            said = self.reason if self.cause is None else _said(self.reason, self.cause)
+                others = f", as {self.doubt:.1g} places would match"
+            said = self.reason if self.cause is None else str(self.cause)
+            if self.cause is not None and self.reason not in (NO_CONTACT, TOO_FEW, NOT_ENCODED):
+                said = f"{self.reason}: {said}"
             way_out = f"; {self.way_out}" if self.way_out else ""
             step = f"; next: {self.next}" if self.next is not None else ""
             return f"not recognised: {said}{others}{way_out}{step}"
@@ -238,19 +240,8 @@ def refusal(
     return Recognition(seq, *none, margin, runner_up, reason, doubt=doubt)
 
 
-def _said(reason: str, cause: Cause) -> str:
-    """Return reason and cause in words."""
-    told = str(cause)
-    return told if reason in (NO_CONTACT, TOO_FEW, NOT_ENCODED) else f"{reason}: {told}"
-
-
-def places_by_chance(doubt: float) -> str:
-    """Return a doubt in words, to one digit."""
-    return f"{doubt:.1g} places"
-
-
 def _as_lists(matrix: NDArray[np.float64] | None) -> list[list[float]] | None:
-    return None if matrix is None else [[float(value) for value in row] for row in matrix]
+    return None if matrix is None else matrix.tolist()
 
 
 def _percent(share: float) -> str:
@@ -261,79 +252,79 @@ def _symbols_read(count: float) -> str:
     return "1 symbol is read" if round(count) == 1 else f"{count:.0f} symbols are read"
 
 
-def _soft(n: Numbers) -> str:
-    reach = f"{n['plateau']:.2g} N" if n["newtons"] else f"{n['plateau']:.0f} counts"
-    return (
-        f"pressed too softly: readings reach {reach}, {n['signal_to_noise']:.0f} times their noise"
-    )
-
-
-def _edge(n: Numbers) -> str:
-    return (
-        f"at an edge: {_percent(n['loaded'])} of the sensor is loaded, "
-        f"{_symbols_read(n['symbols'])}"
-    )
-
-
-def _moving(n: Numbers) -> str:
-    return (
-        f"the sensor moved while it was read: along {n['direction_deg']:.0f} degrees contours "
-        f"are {_percent(n['sharpness'])} as sharp as across"
-    )
-
-
-def _dead(n: Numbers) -> str:
-    return f"dead tactels: {_percent(n['silent'])} of those that symbols should press read nothing"
-
-
-def _not_registered(n: Numbers) -> str:
-    return (
-        f"{_symbols_read(n['symbols_anywhere'])} and explain "
-        f"{_percent(n['explained_anywhere'])} of the image, but stand so nowhere in this database"
-    )
-
-
-def _other_pattern(n: Numbers) -> str:
-    return (
-        "raised, but not by symbols of this database: they explain "
-        f"{_percent(n['explained_anywhere'])} of the image"
-    )
-
-
-_WORDS: dict[str, Callable[[Numbers], str]] = {
-    NO_LOAD: lambda _: "no contact",
-    SOFT: _soft,
-    TILTED: lambda n: f"tilted: the load falls by {_percent(n['slope'])} across the sensor",
-    MOVING: _moving,
-    EDGE: _edge,
-    ONE_ROW: lambda n: f"one row of symbols: what is loaded is {n['width_mm']:.0f} mm wide",
-    DEAD_TACTELS: _dead,
-    EXCHANGED: lambda n: (
-        "all of the touch lies on one face if the halves of the sensor's "
-        f"{'columns' if n['columns'] else 'rows'} are exchanged"
+#: Of each code: what is said of the numbers behind it, and what a person does about it.
+_CAUSES: dict[str, tuple[Callable[[Numbers], str], str]] = {
+    NO_LOAD: (lambda _: "no contact", "press the probe onto the object"),
+    SOFT: (
+        lambda n: (
+            "pressed too softly: readings reach "
+            + (f"{n['plateau']:.2g} N" if n["newtons"] else f"{n['plateau']:.0f} counts")
+            + f", {n['signal_to_noise']:.0f} times their noise"
+        ),
+        "press harder",
     ),
-    NOT_REGISTERED: _not_registered,
-    OTHER_PATTERN: _other_pattern,
-    PLAIN: lambda n: (
-        f"not an encoded surface: no strokes are felt, readings vary by {_percent(n['variation'])}"
+    TILTED: (
+        lambda n: f"tilted: the load falls by {_percent(n['slope'])} across the sensor",
+        "hold the probe flat on the face",
     ),
-    UNCLEAR: lambda n: (
-        f"symbols are read poorly: {n['symbols']:.0f} of them, which explain "
-        f"{_percent(n['explained'])} of the image"
+    MOVING: (
+        lambda n: (
+            f"the sensor moved while it was read: along {n['direction_deg']:.0f} degrees contours "
+            f"are {_percent(n['sharpness'])} as sharp as across"
+        ),
+        "hold the probe still",
     ),
-}
-
-_WAYS_OUT = {
-    NO_LOAD: "press the probe onto the object",
-    SOFT: "press harder",
-    TILTED: "hold the probe flat on the face",
-    MOVING: "hold the probe still",
-    EDGE: "move towards the loaded part",
-    ONE_ROW: "one row tells no place: touch another face, or several places as one (--scan)",
-    DEAD_TACTELS: "learn the sensor: recognize-object --learn FILE, from 25 touches or more",
-    EXCHANGED: "is the sensor wired as drawn? recognize-object check tells",
-    NOT_REGISTERED: "is the object in this database, or of another lab?",
-    OTHER_PATTERN: "another profile, another overlay (--overlay), or an object of no lab?",
-    PLAIN: "is the object in this database?",
-    UNCLEAR: "touch again more evenly, a few mm beside",
+    EDGE: (
+        lambda n: (
+            f"at an edge: {_percent(n['loaded'])} of the sensor is loaded, "
+            f"{_symbols_read(n['symbols'])}"
+        ),
+        "move towards the loaded part",
+    ),
+    ONE_ROW: (
+        lambda n: f"one row of symbols: what is loaded is {n['width_mm']:.0f} mm wide",
+        "one row tells no place: touch another face, or several places as one (--scan)",
+    ),
+    DEAD_TACTELS: (
+        lambda n: (
+            f"dead tactels: {_percent(n['silent'])} of those that symbols should press read nothing"
+        ),
+        "learn the sensor: recognize-object --learn FILE, from 25 touches or more",
+    ),
+    EXCHANGED: (
+        lambda n: (
+            "all of the touch lies on one face if the halves of the sensor's "
+            f"{'columns' if n['columns'] else 'rows'} are exchanged"
+        ),
+        "is the sensor wired as drawn? recognize-object check tells",
+    ),
+    NOT_REGISTERED: (
+        lambda n: (
+            f"{_symbols_read(n['symbols_anywhere'])} and explain "
+            f"{_percent(n['explained_anywhere'])} of the image, but stand so nowhere in this "
+            "database"
+        ),
+        "is the object in this database, or of another lab?",
+    ),
+    OTHER_PATTERN: (
+        lambda n: (
+            "raised, but not by symbols of this database: they explain "
+            f"{_percent(n['explained_anywhere'])} of the image"
+        ),
+        "another profile, another overlay (--overlay), or an object of no lab?",
+    ),
+    PLAIN: (
+        lambda n: (
+            "not an encoded surface: no strokes are felt, readings vary by "
+            f"{_percent(n['variation'])}"
+        ),
+        "is the object in this database?",
+    ),
+    UNCLEAR: (
+        lambda n: (
+            f"symbols are read poorly: {n['symbols']:.0f} of them, which explain "
+            f"{_percent(n['explained'])} of the image"
+        ),
+        "touch again more evenly, a few mm beside",
+    ),
 }

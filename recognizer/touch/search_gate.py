@@ -18,18 +18,13 @@ no such answer is, and makes 42 touches right of the 50 that it can.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from recognizer.touch.evidence import VerifiedHypothesis, symbols_to_name
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.options import TIE_NATS
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, TOO_FEW, Recognition
-from recognizer.touch.signal import Signal, mean_of_strongest, quantile
+from recognizer.touch.signal import Signal, mean_of_strongest, quantile, sorted_around
 from recognizer.touch.verdict import MANY_INLIERS, RATIO, Evidence
-
-Array = NDArray[np.float64]
 
 PRESSED = 0.15  #: share of the strongest readings from which a tactel is pressed
 AROUND = 5  #: tactels, side of a square in which strokes and gaps lie
@@ -100,12 +95,7 @@ def shows_strokes(reader: PreparedLab, signal: Signal) -> bool:
 def gap_share(signal: Signal) -> float:
     """Return the share of the tactels next to strong ones that read little."""
     forces = signal.forces * signal.trust
-    reach = AROUND // 2
-    rows, columns = (np.arange(-reach, n + reach).clip(0, n - 1) for n in forces.shape)
-    windows = np.lib.stride_tricks.sliding_window_view(
-        forces[rows[:, None], columns], (AROUND, AROUND)
-    )
-    near = quantile(np.sort(windows.reshape(*forces.shape, -1), axis=-1), HIGH)
+    near = quantile(sorted_around(forces, AROUND, mode="edge"), HIGH)
     adjacent = (near > _pressed_from(signal)) & (signal.trust > 0)
     weak = adjacent & (forces < WEAK * near)
     return float(weak.sum()) / max(int(adjacent.sum()), 1)

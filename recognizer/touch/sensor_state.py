@@ -21,26 +21,13 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
-class TactelPrior:
-    """What is taken for known of a tactel before any touch: standard deviations."""
+# Known of a tactel before any touch: standard deviations.
+GAIN_SD = 0.2  #: of the logarithm of a tactel's gain
+ASIDE_SD_MM = 0.15  #: of a tip's place, each way
 
-    gain: float = 0.2  #: of the logarithm of a tactel's gain
-    aside_mm: float = 0.15  #: of a tip's place, each way
-
-
-PRIOR = TactelPrior()
-
-
-@dataclass(frozen=True, slots=True)
-class InversionSettings:
-    """Of floating rows."""
-
-    least: float = 1e-4  #: of the largest reading; one below it is taken for it
-    tolerance: float = 1e-4  #: of the conductances
-
-
-FLOATING = InversionSettings()
+# Of floating rows.
+LEAST_READING = 1e-4  #: of the largest; one below it is taken for it
+TOLERANCE = 1e-4  #: of the conductances
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,8 +98,8 @@ def unknown_state(sensor: SensorType, *, newtons: bool = False, name: str = "") 
     aside = np.zeros((*shape, 2))
     return SensorState(
         sensor=name or sensor.name, touches=0, newtons=newtons, dead=none > 0, hot=none > 0,
-        offset=none, gain=one, gain_deviation=PRIOR.gain * one,
-        aside_mm=aside, aside_deviation_mm=PRIOR.aside_mm + aside,
+        offset=none, gain=one, gain_deviation=GAIN_SD * one,
+        aside_mm=aside, aside_deviation_mm=ASIDE_SD_MM + aside,
     )  # fmt: skip
 
 
@@ -126,8 +113,8 @@ def invert_floating(readings: Array) -> Array:
     """
     from probe.circuit.network import solve_floating
 
-    over = np.maximum(readings, FLOATING.least * float(np.max(readings, initial=1e-12)))
+    over = np.maximum(readings, LEAST_READING * float(np.max(readings, initial=1e-12)))
     try:
-        return np.asarray(solve_floating(1.0 / over, FLOATING.tolerance).conductance_s)
+        return np.asarray(solve_floating(1.0 / over, TOLERANCE).conductance_s)
     except CircuitError:
         return np.asarray(np.maximum(readings, 0.0))

@@ -150,11 +150,7 @@ def _live_mask(forces: Array, known: Array) -> Array:
         if not dead.any():
             continue
         neighbours = np.minimum(np.roll(total, 1), np.roll(total, -1)) > LIVE_NEIGHBOURS * middle
-        where = np.flatnonzero(dead & neighbours)
-        if axis == 0:
-            alive[where] = 0
-        else:
-            alive[:, where] = 0
+        alive.swapaxes(0, axis)[dead & neighbours] = 0
     return alive
 
 
@@ -176,6 +172,17 @@ def combine_around(image: NDArray[Kind], reach: int, combine: np.ufunc) -> NDArr
     return np.asarray(found)
 
 
+def sorted_around(image: Array, around: int, **pad: Any) -> Array:
+    """Return the sorted values (rows, columns, around^2) of the square about each tactel.
+
+    Beyond the rim they are those of `numpy.pad`.
+    """
+    before = around // 2
+    wide = np.pad(image, (before, around - 1 - before), **pad)
+    each = np.lib.stride_tricks.sliding_window_view(wide, (around, around))
+    return np.sort(each.reshape(*image.shape, around**2), axis=-1)
+
+
 def quantile(ordered: NDArray[np.float64], share: float) -> NDArray[np.float64]:
     """Return the quantile of values that rise along the last axis, as `numpy.quantile` does."""
     at = (ordered.shape[-1] - 1) * share
@@ -186,9 +193,9 @@ def quantile(ordered: NDArray[np.float64], share: float) -> NDArray[np.float64]:
     return np.asarray(one + between * part if part < 0.5 else other - between * (1 - part))
 
 
-def mean_of_strongest(forces: NDArray[np.float64], count: int = STRONGEST) -> float:
+def mean_of_strongest(forces: NDArray[np.float64]) -> float:
     """Return the mean of the `STRONGEST` highest readings."""
-    return float(np.sort(forces, axis=None)[-count:].mean())
+    return float(np.sort(forces, axis=None)[-STRONGEST:].mean())
 
 
 def swap_halves(image: NDArray[Scalar], axis: int) -> NDArray[Scalar]:

@@ -230,16 +230,16 @@ class _Contact:
     group: list[_ContactFrame] = field(default_factory=list)  # frames that rest at one force
     best: list[_ContactFrame] = field(default_factory=list)  # longest group of what is alike
 
-    def take(self, felt: _ContactFrame) -> Iterator[TouchImage]:
+    def take(self, now: _ContactFrame) -> Iterator[TouchImage]:
         """Add a frame; yield the touches that it completes."""
-        if self.last is None or _correlation(self.last, felt.image) < ALIKE:
+        if self.last is None or _correlation(self.last, now.image) < ALIKE:
             yield from self._closed()
-            self.first = felt.frame.seq
-        self.last = felt.image
-        if not self._rests(felt):
-            self._keep_best()
+            self.first = now.frame.seq
+        self.last = now.image
+        if not self._rests(now):
+            self.best = max(self.best, self.group, key=_rank)
             self.group = []
-        self.group.append(felt)
+        self.group.append(now)
         if len(self.group) == ENOUGH:
             yield from self._steady(self.group)
             self.group = []
@@ -253,11 +253,11 @@ class _Contact:
 
     def _closed(self) -> Iterator[TouchImage]:
         """End a run of alike images; where it was not read, read the longest rest in it."""
-        self._keep_best()
+        self.best = max(self.best, self.group, key=_rank)
         if self.read is None and len(self.best) >= FEW:
             yield from self._steady(self.best)
         elif self.read is None and self.best and not self.steady:
-            self.fragments.append(_average(_frames(self.best), self.first))
+            self.fragments.append(_average([one.frame for one in self.best], self.first))
             if len(self.fragments) >= FRAGMENTS:
                 yield from self.fragments
                 self.fragments = []
@@ -265,33 +265,25 @@ class _Contact:
 
     def _steady(self, group: list[_ContactFrame]) -> Iterator[TouchImage]:
         """Read frames that rest, unless they show what was read before."""
-        image = np.mean([felt.image for felt in group], axis=0)
+        image = np.mean([now.image for now in group], axis=0)
         if self.read is None or _correlation(self.read, image) < ALIKE:
             seq = self.first if self.read is None else group[0].frame.seq
-            yield _average(_frames(group), seq)
+            yield _average([one.frame for one in group], seq)
             self.read, self.steady, self.fragments = image, True, []
 
-    def _rests(self, felt: _ContactFrame) -> bool:
+    def _rests(self, now: _ContactFrame) -> bool:
         """Return whether a frame has force and image of the group."""
         if not self.group:
             return True
         first = self.group[0]
         return (
-            abs(felt.total - first.total) <= STEADY * first.total
-            and _correlation(first.image, felt.image) >= STILL
+            abs(now.total - first.total) <= STEADY * first.total
+            and _correlation(first.image, now.image) >= STILL
         )
-
-    def _keep_best(self) -> None:
-        if _rank(self.group) > _rank(self.best):
-            self.best = self.group
 
 
 def _rank(group: list[_ContactFrame]) -> tuple[int, float]:
-    return len(group), sum(felt.total for felt in group)
-
-
-def _frames(group: list[_ContactFrame]) -> list[Frame]:
-    return [felt.frame for felt in group]
+    return len(group), sum(now.total for now in group)
 
 
 def _average(frames: list[Frame], seq: int) -> TouchImage:

@@ -38,7 +38,11 @@ STRONG_CONTRADICTION = 16.0
 #: registered places, whatever their borders, that random symbols match as well: with more of them
 #: the symbols of a touch, partly seen ones counted by what they show, name no place
 NAMED = 1.0
+MOST_POSITION_SD_MM = 0.6  #: standard deviation of the place of several touches
 WORN_WITH_BORDER = 1  #: symbols in view and not felt, with more of which borders do not count
+
+
+Face = tuple[str | None, str | None]  #: names of an object and a face
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +82,7 @@ def reject_reason(
         return TOO_FEW  # few of many touches agree on some place by chance
     if evidence.log_likelihood_ratio < least_ratio or evidence.inliers < options.least_inliers:
         return TOO_FEW
-    return AMBIGUOUS if margin < options.margin else ""
+    return reject_margin(margin, options.margin)
 
 
 def is_encoded(evidence: Evidence, contradictions: float = CONTRADICTIONS) -> bool:
@@ -107,7 +111,28 @@ def reject_few(evidence: Evidence, margin: float, matches: float, options: Reade
         return ""
     if matches > NAMED:
         return TOO_FEW
-    return AMBIGUOUS if margin < options.margin_by_few else ""
+    return reject_margin(margin, options.margin_by_few)
+
+
+def reject_margin(margin: float, least: float) -> str:
+    """Return `AMBIGUOUS` where another place comes nearer than so many nats."""
+    return AMBIGUOUS if margin < least else ""
+
+
+def reject_joined(
+    named: Face, confirmed: Face | None, outliers: int, most_outliers: int, position_sd_mm: float
+) -> str:
+    """Return why the answer of several touches of one face is no answer; "" where it is.
+
+    Two different answers about one face exclude each other: a `named` face that is not the
+    `confirmed` one is ambiguous. A touch that disagrees with the others is answered by them, but
+    only as one of few: `outliers` are such touches in a row. A vague place is refused.
+    """
+    if confirmed is not None and named != confirmed:
+        return AMBIGUOUS
+    if outliers > 0 and (confirmed is None or outliers > most_outliers):
+        return NOT_ENCODED
+    return TOO_FEW if position_sd_mm > MOST_POSITION_SD_MM else ""
 
 
 def reject_chance(doubt: float, most: float) -> str:

@@ -71,6 +71,7 @@ class ArrayImage:
     reader: PreparedLab
     prepared: Prepared
     signal: Signal
+    _fits: dict[Effort, tuple[Fit, ...]] = field(default_factory=dict)
     _curved: list[tuple[Image, CoarseSearch]] = field(default_factory=list)
 
     @cached_property
@@ -83,19 +84,13 @@ class ArrayImage:
         """Its coarse searches."""
         return search_image(self.image, self.prepared.bank)
 
-    @cached_property
-    def first_fits(self) -> tuple[Fit, ...]:
-        """Lattices of the first search, best first; without covariances."""
-        return self._fits(self.reader.options.first)
-
     def fits(self, effort: Effort) -> tuple[Fit, ...]:
         """Return the lattices in the image, best first; without covariances."""
-        return self.first_fits if effort is self.reader.options.first else self._fits(effort)
-
-    def _fits(self, effort: Effort) -> tuple[Fit, ...]:
-        return fit_lattices(
-            self.image, self.prepared.bank, effort, self.searches, with_covariance=False
-        )
+        if effort not in self._fits:
+            self._fits[effort] = fit_lattices(
+                self.image, self.prepared.bank, effort, self.searches, with_covariance=False
+            )
+        return self._fits[effort]
 
     @cached_property
     def curvatures(self) -> list[BendGuess]:
@@ -142,12 +137,9 @@ def _verify_on_flat_faces(
     image: Image, embossed: EmbossedArray, fits: tuple[Fit, ...]
 ) -> list[VerifiedHypothesis]:
     """Return the likeliest places, best first, fitted to the registered symbols."""
-    candidates = _on_flat_faces(embossed, find_hypotheses(embossed, fits))
-    candidates = candidates[:KEPT]
+    candidates = _near_best(_on_flat_faces(embossed, find_hypotheses(embossed, fits)))
     if not candidates:
         return []
-    near = [place.score > candidates[0].score - NEAR for place in candidates]
-    candidates = candidates[: max(2, sum(near))]
     verified = _fit_hypotheses(image, embossed, candidates, fits)
     best = verified[0]
     rivals = find_rivals(embossed, best.fit, best.hypothesis, len(fits))
@@ -160,6 +152,12 @@ def _verify_on_flat_faces(
     return sorted(verified, key=lambda one: -one.score)
 
 
+def _near_best(candidates: list[Hypothesis]) -> list[Hypothesis]:
+    """Return the candidates, best first, that are verified: two at least."""
+    kept = candidates[:KEPT]
+    return kept[: max(2, sum(place.score > kept[0].score - NEAR for place in kept))]
+
+
 def _on_flat_faces(embossed: EmbossedArray, found: list[Hypothesis]) -> list[Hypothesis]:
     """Return the places on flat faces; those on round ones are read with their curvature."""
     if not embossed.radii_mm:
@@ -168,10 +166,7 @@ def _on_flat_faces(embossed: EmbossedArray, found: list[Hypothesis]) -> list[Hyp
 
 
 def _fit_hypotheses(
-    image: Image,
-    embossed: EmbossedArray,
-    candidates: list[Hypothesis],
-    fits: tuple[Fit, ...],
+    image: Image, embossed: EmbossedArray, candidates: list[Hypothesis], fits: tuple[Fit, ...]
 ) -> list[VerifiedHypothesis]:
     """Return places with pose and gain fitted to their symbols, best first."""
     starts = [fits[place.fit] for place in candidates]
@@ -194,7 +189,7 @@ def _fit_hypotheses(
         scores[n, alike] = log_likelihoods_at(embossed, fit, places)
     for n, (place, best) in enumerate(zip(candidates, scores.argmax(axis=0), strict=True)):
         score = float(scores[best, n])
-        verified.append(VerifiedHypothesis(image, embossed, place, again[best], score))
+        verified.append(VerifiedHypothesis(embossed, place, again[best], score, image))
     return sorted(verified, key=lambda one: -one.score)
 
 
@@ -215,15 +210,14 @@ def verify_on_round_faces(touch: ArrayImage, effort: Effort) -> list[VerifiedHyp
         place
         for place in find_hypotheses(embossed, tuple(fits))
         if _is_compatible(embossed, place, fits[place.fit], under[place.fit])
-    ][:KEPT]
-    near = [place.score > candidates[0].score - NEAR for place in candidates]
+    ]
 
     def verified(place: Hypothesis, fit: Fit) -> list[VerifiedHypothesis]:
         one = _verify_under_curvature(image, sensor, embossed, place, fit)
         return [] if one is None else [one]
 
     found: list[VerifiedHypothesis] = []
-    for place in candidates[: max(2, sum(near))]:
+    for place in _near_best(candidates):
         found += verified(place, fits[place.fit])
     found = [_under_best_fit(one, found) for one in found]
     if found:
@@ -250,14 +244,10 @@ def bend_at(embossed: EmbossedArray, hypothesis: Hypothesis, fit: Fit) -> Bend |
 
 
 def _is_compatible(
-    embossed: EmbossedArray,
-    hypothesis: Hypothesis,
-    fit: Fit,
-    under: Bend | None,
+    embossed: EmbossedArray, hypothesis: Hypothesis, fit: Fit, under: Bend | None
 ) -> bool:
     """Whether a place has about the curvature under which its symbols were read."""
-    bend = bend_at(embossed, hypothesis, fit)
-    return _same_bend(bend, under, TURNED_RAD, RADIUS_FACTOR)
+    return _same_bend(bend_at(embossed, hypothesis, fit), under, TURNED_RAD, RADIUS_FACTOR)
 
 
 def _same_bend(a: Bend | None, b: Bend | None, turn_rad: float, factor: float) -> bool:
@@ -268,11 +258,7 @@ def _same_bend(a: Bend | None, b: Bend | None, turn_rad: float, factor: float) -
 
 
 def _verify_under_curvature(
-    image: Image,
-    sensor: SensorType,
-    embossed: EmbossedArray,
-    hypothesis: Hypothesis,
-    fit: Fit,
+    image: Image, sensor: SensorType, embossed: EmbossedArray, hypothesis: Hypothesis, fit: Fit
 ) -> VerifiedHypothesis | None:
     """Return a place with pose and gain fitted to its symbols under its curvature; None if flat.
 
@@ -296,7 +282,7 @@ def _verify_under_curvature(
         best = int(np.argmax(scores))
         fit = each[best]
         seen = bend_image(image, sensor, bend, shares[best : best + 1])
-        found = VerifiedHypothesis(seen, embossed, hypothesis, fit, scores[best], bend)
+        found = VerifiedHypothesis(embossed, hypothesis, fit, scores[best], seen, bend)
     return found
 
 

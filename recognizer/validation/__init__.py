@@ -5,10 +5,10 @@
     campaign     how many touches, of which kinds and levels
     encoded_set  the objects that are touched, and what some kinds need besides
     touch_plan   the plan of a touch and the scenes of faces;  draw  number -> touch and counts
-    trial        touch -> answer -> verdict -> row
+    trial        touch -> answer -> verdict, a row
     run          which touches are left;  workers  who does them;  files  where they go
     results      rows -> shares and errors (statistics);  studies, extremes  add theirs
-    report       results -> page (pictures, flat_faces);  result  what `validate` returns
+    report       results -> page (pictures, flat_faces);  provenance  where they come from
     compare      two runs, or the worlds of several;  repeat  one touch again
     dataset      touches with their truth, for training;  printing  printed surfaces
     pipeline     all of it in order: `validate`;  command  validate-set
@@ -19,19 +19,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from recognizer.validation.pipeline import validate
-    from recognizer.validation.result import ValidationResult
+    from recognizer.validation.pipeline import ValidationResult, validate
 
 __all__ = ["ValidationResult", "validate"]
 
 
 def __getattr__(name: str) -> Any:
-    if name == "validate":  # numpy and the simulation load when they are used
-        from recognizer.validation.pipeline import validate
+    if name in __all__:  # numpy and the simulation load when they are used
+        from recognizer.validation import pipeline
 
-        return validate
-    if name == "ValidationResult":
-        from recognizer.validation.result import ValidationResult
-
-        return ValidationResult
+        return getattr(pipeline, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -11,11 +11,18 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import accumulate
+from typing import Any
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import (
+    USUAL_SENSOR,
+    SensorType,
+    choose_sensor_type,
+    sensor_type_text,
+)
 from probe.contact.engines import ENGINES, engine_named
 from probe.simulate.world.levels import LEVELS
 from recognizer.touch.options import DEFAULTS
@@ -23,7 +30,7 @@ from recognizer.touch.reader import Reader
 from recognizer.validation.draw import FOREIGN
 from recognizer.validation.encoded_set import COPY, NEAR, SAME_PROFILE, SIDE, SMALL
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.touch_plan import TouchPlan, sensor_of
+from recognizer.validation.touch_plan import TouchPlan
 from recognizer.validation.trial import ONE, POLICY_NAMES
 
 SHARD = 1000  #: touches in a file, lost at most with a run
@@ -40,7 +47,7 @@ FILES, PRINTED, REGISTERED = SURFACES = ("files", "printed", "database")
 
 Shares = tuple[tuple[str, float], ...]
 
-#: Kinds of touches and their shares. `foreign` is any of `surfaces.FOREIGN` but the blank one.
+#: Kinds of touches and their shares. `foreign` is any of `draw.FOREIGN` but the blank one.
 KINDS: Shares = (
     ("face", 0.55),
     ("edge", 0.10),
@@ -60,6 +67,7 @@ READERS: dict[str, tuple[int, int, int, int]] = {
     "more candidates": (12, 4, 4, 6),
     "most": (24, 6, 8, 10),
 }
+EFFORT = ("candidates", "steps", "finalists", "final_steps")  #: options of a reader
 AS_IS = "as it is"  #: the reader with the settings that it has
 
 
@@ -71,9 +79,9 @@ class Campaign:
     seed: int = 1
     kinds: Shares = KINDS
     levels: Shares = LEVEL_SHARES
-    sensor_type: str = ""  #: as YAML, `sensor_type_text`; empty: `fsr-16`
+    sensor_type: SensorType = USUAL_SENSOR
     overlay: str = "tab"
-    surfaces: str = "files"  #: what is touched: `SURFACES`
+    surfaces: str = FILES  #: what is touched: `SURFACES`
     print_profile: str = ""  #: of printed surfaces: machine, nozzle, layers
     faults: str = ""  #: of printed surfaces: what the machine does wrong
     engine: str = "own"  #: of contact
@@ -82,21 +90,88 @@ class Campaign:
     study: int = 0  #: touches of every reader of `READERS`; 0: no study
     shard: int = SHARD  #: touches in a file: at most so many are lost with a run
 
+    @property
+    def sensor(self) -> SensorType:
+        """The sensor type under the overlay of the campaign."""
+        return self.sensor_type.with_overlay(self.overlay)
 
-def touchable(campaign: Campaign, named: bool) -> Campaign:
-    """Return a campaign without the kinds that it cannot touch: prints are of parts of the set.
+    @property
+    def kind_names(self) -> list[str]:
+        """Kinds that are touched."""
+        return [kind for kind, _ in self.kinds]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the fields; the sensor type as YAML, empty for `fsr-16`."""
+        usual = self.sensor_type == USUAL_SENSOR
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return values | {"sensor_type": "" if usual else sensor_type_text(self.sensor_type)}
+
+
+def campaign_from(values: Mapping[str, Any]) -> Campaign:
+    """Return a campaign from the values of `as_json`, read from a file."""
+    shares = {
+        name: tuple((key, float(share)) for key, share in values[name])
+        for name in ("kinds", "levels")
+    }
+    kind = choose_sensor_type(None, values["sensor_type"], None, "--sensor-type")
+    return Campaign(**{**values, **shares, "sensor_type": kind})
+
+
+def campaign_of(options: Mapping[str, Any], known: Campaign | None) -> Campaign:
+    """Return the campaign of options, over that of the run that is resumed, over defaults.
 
     Parameters
     ----------
-    campaign
-        As it was given.
-    named
-        Whether a person named the kinds; otherwise those that cannot be are left out.
+    options
+        Fields of the campaign as they were given, `kinds` and `levels` as text; None or empty: not
+        given.
+    known
+        Of the run that is resumed.
 
     Raises
     ------
     ValidationError
-        It asks for what cannot be touched so, or for an overlay that its engine does not know.
+        An option is unknown, or does not suit another one.
+    """
+    given = {name: value for name, value in options.items() if value is not None and value != ""}
+    for name, allowed in {
+        "overlay": ("tab", "pad"),
+        "surfaces": SURFACES,
+        "engine": tuple(ENGINES),
+        "sensor_per": ("touch", "run"),
+        "policy": POLICY_NAMES,
+    }.items():
+        if name in given and given[name] not in allowed:
+            raise ValidationError(
+                f"'{given[name]}' is not known",
+                fix=f"give {' or '.join(allowed)}",
+                place=f"--{name.replace('_', '-')}",
+            )
+    named = "kinds" in given
+    for name, names in (("kinds", KIND_NAMES), ("levels", tuple(LEVELS))):
+        if name in given:
+            given[name] = shares_of(given[name], names, f"--{name}")
+    if "sensor_type" in given:
+        given.setdefault("overlay", given["sensor_type"].overlay.kind)
+    if known is None:
+        touches = given.get("touches", Campaign().touches)
+        given.setdefault("study", STUDY if touches >= STUDY else 0)
+    campaign = replace(known or Campaign(), **given)
+    for name in ("print_profile", "faults"):
+        if getattr(campaign, name) and campaign.surfaces != PRINTED:
+            raise ValidationError(
+                f"{campaign.surfaces} are touched, nothing is printed",
+                fix="add --surfaces printed",
+                place=f"--{name.replace('_', '-')}",
+            )
+    return _touchable(campaign, named)
+
+
+def _touchable(campaign: Campaign, named: bool) -> Campaign:
+    """Return a campaign without the kinds that it cannot touch: prints are of parts of the set.
+
+    Refuses them if a person named the kinds (`named`), and an overlay that the engine does not
+    know.
     """
     overlays = engine_named(campaign.engine).overlays
     if campaign.overlay not in overlays:
@@ -107,7 +182,7 @@ def touchable(campaign: Campaign, named: bool) -> Campaign:
         )
     if campaign.surfaces != PRINTED:
         return campaign
-    other = [kind for kind, _ in campaign.kinds if kind not in ON_FACES]
+    other = [kind for kind in campaign.kind_names if kind not in ON_FACES]
     if named and other:
         raise ValidationError(
             f"prints are parts of the set, not {', '.join(other)}",
@@ -119,104 +194,7 @@ def touchable(campaign: Campaign, named: bool) -> Campaign:
     return replace(campaign, kinds=tuple((kind, share / total) for kind, share in kept))
 
 
-@dataclass(frozen=True, slots=True)
-class Series:
-    """Numbers 0 ... touches - 1, drawn from shares and read by one reader."""
-
-    name: str
-    touches: int
-    kinds: Shares
-    levels: Shares
-    shard: int
-    reader: str = AS_IS
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class Batch:
-    """Touches first ... last - 1 of a series."""
-
-    series: str
-    first: int
-    last: int
-
-
-def series_of(campaign: Campaign) -> tuple[Series, ...]:
-    """Return the touches, and the series of the study if there is one."""
-    found = [Series(TOUCHES, campaign.touches, campaign.kinds, campaign.levels, campaign.shard)]
-    if campaign.study:
-        for name in (AS_IS, *READERS):
-            label = f"reader-{name.replace(' ', '-')}"
-            kinds: Shares = (("face", 1.0),)
-            found.append(
-                Series(label, campaign.study, kinds, campaign.levels, campaign.shard, name)
-            )
-    return tuple(found)
-
-
-def shards_of(series: Series) -> int:
-    """Return into how many files a series goes."""
-    return math.ceil(series.touches / series.shard)
-
-
-def batches_of(series: Series, shard: int) -> Iterator[Batch]:
-    """Yield the batches of a shard."""
-    end = min((shard + 1) * series.shard, series.touches)
-    for first in range(shard * series.shard, end, BATCH):
-        yield Batch(series.name, first, min(first + BATCH, end))
-
-
-def plan_of(
-    campaign: Campaign,
-    series: Series,
-    database: str,
-    number: int,
-    labs: tuple[str, ...] = (),
-    prints: str = "",
-) -> tuple[str, TouchPlan]:
-    """Return the kind of a touch as `kinds` names it, and the plan that draws it.
-
-    `prints` is the listing of the printed surfaces, where these are touched.
-    """
-    rng = np.random.default_rng([campaign.seed, number, 1])
-    kind, level = _draw(series.kinds, rng), _draw(series.levels, rng)
-    surface = kind
-    if kind == STRANGE:
-        strange = [name for name in FOREIGN if name != BLANK]
-        surface = strange[int(rng.integers(len(strange)))]
-    plan = TouchPlan(database, campaign.seed, level, surface, files=campaign.surfaces == FILES,
-                     prints=prints, engine=campaign.engine, sensor_per=campaign.sensor_per,
-                     labs=labs,
-                     policy=campaign.policy if series.name == TOUCHES else ONE)  # fmt: skip
-    return kind, plan
-
-
-def reader_with(reader: Reader, name: str) -> Reader:
-    """Return a reader that spends as `READERS` says, and no second try beyond it."""
-    if name == AS_IS:
-        return reader
-    candidates, steps, finalists, final_steps = READERS[name]
-    effort: dict[str, int] = {
-        "candidates": candidates,
-        "steps": steps,
-        "finalists": finalists,
-        "final_steps": final_steps,
-    }
-    spent = replace(reader.options.first, **effort)
-    return replace(reader, options=replace(reader.options, first=spent, thorough=spent))
-
-
-def settings_of(name: str) -> dict[str, int]:
-    """Return what a reader of the study spends, as the report names it."""
-    given = DEFAULTS.first
-    if name == AS_IS:
-        values = (given.candidates, given.steps, given.finalists, given.final_steps)
-    else:
-        values = READERS[name]
-    named = dict(zip(("candidates", "steps", "finalists", "final steps"), values, strict=True))
-    return named | ({"second try": DEFAULTS.thorough.candidates} if name == AS_IS else {})
-
-
-def shares_of(text: str, allowed: Mapping[str, object] | tuple[str, ...], option: str) -> Shares:
+def shares_of(text: str, allowed: tuple[str, ...], option: str) -> Shares:
     """Read `face=2,edge` from an option: names with their weights, 1 where none is given.
 
     Raises
@@ -246,14 +224,82 @@ def shares_of(text: str, allowed: Mapping[str, object] | tuple[str, ...], option
     return tuple((name, value / total) for name, value in found.items() if value > 0)
 
 
-def kinds_of(text: str) -> Shares:
-    """Read the shares of `--kinds`."""
-    return shares_of(text, KIND_NAMES, "--kinds")
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Numbers 0 ... touches - 1, drawn from shares and read by one reader."""
+
+    name: str
+    touches: int
+    kinds: Shares
+    levels: Shares
+    shard: int
+    reader: str = AS_IS
+
+    @property
+    def shards(self) -> int:
+        """Into how many files it goes."""
+        return math.ceil(self.touches / self.shard)
+
+    def batches(self, shard: int) -> Iterator[Batch]:
+        """Yield the batches of a shard."""
+        end = min((shard + 1) * self.shard, self.touches)
+        for first in range(shard * self.shard, end, BATCH):
+            yield Batch(self.name, first, min(first + BATCH, end))
 
 
-def levels_of(text: str) -> Shares:
-    """Read the shares of `--levels`."""
-    return shares_of(text, LEVELS, "--levels")
+@dataclass(frozen=True, slots=True, order=True)
+class Batch:
+    """Touches first ... last - 1 of a series."""
+
+    series: str
+    first: int
+    last: int
+
+
+def series_of(campaign: Campaign) -> tuple[Series, ...]:
+    """Return the touches, and the series of the study if there is one."""
+    levels, shard = campaign.levels, campaign.shard
+    found = [Series(TOUCHES, campaign.touches, campaign.kinds, levels, shard)]
+    for name in (AS_IS, *READERS) if campaign.study else ():
+        label = f"reader-{name.replace(' ', '-')}"
+        found.append(Series(label, campaign.study, (("face", 1.0),), levels, shard, name))
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """A campaign on a set: what all batches of a run share."""
+
+    campaign: Campaign
+    database: str  #: as the workers find it, as all paths
+    set_digest: str = ""
+    code_digest: str = ""
+    labs: tuple[str, ...] = ()  #: databases of other labs
+    prints: str = ""  #: listing of the printed surfaces; empty: none
+    specs: tuple[str, ...] = ()  #: as they were named
+
+    def plan(self, series: Series, number: int) -> TouchPlan:
+        """Return the plan that draws a touch."""
+        campaign = self.campaign
+        rng = np.random.default_rng([campaign.seed, number, 1])
+        kind, level = _draw(series.kinds, rng), _draw(series.levels, rng)
+        surface = kind
+        if kind == STRANGE:
+            strange = [name for name in FOREIGN if name != BLANK]
+            surface = strange[int(rng.integers(len(strange)))]
+        return TouchPlan(
+            self.database,
+            campaign.seed,
+            level,
+            surface,
+            kind,
+            files=campaign.surfaces == FILES,
+            prints=self.prints,
+            engine=campaign.engine,
+            sensor_per=campaign.sensor_per,
+            labs=self.labs,
+            policy=campaign.policy if series.name == TOUCHES else ONE,
+        )
 
 
 def _draw(shares: Shares, rng: np.random.Generator) -> str:
@@ -262,68 +308,17 @@ def _draw(shares: Shares, rng: np.random.Generator) -> str:
     return shares[min(place, len(shares) - 1)][0]
 
 
-@dataclass(frozen=True, slots=True)
-class CampaignOptions:
-    """Options as they were given; None or empty: as in the run that is resumed, or the default."""
-
-    touches: int | None = None
-    seed: int | None = None
-    kinds: str = ""
-    levels: str = ""
-    sensor_type: str = ""
-    overlay: str = ""
-    surfaces: str = ""
-    print_profile: str = ""
-    faults: str = ""
-    engine: str = ""
-    sensor_per: str = ""
-    policy: str = ""
-    study: int | None = None
-    shard: int | None = None
+def reader_with(reader: Reader, name: str) -> Reader:
+    """Return a reader that spends as `READERS` says, and no second try beyond it."""
+    if name == AS_IS:
+        return reader
+    spent = replace(reader.options.first, **dict(zip(EFFORT, READERS[name], strict=True)))
+    return replace(reader, options=replace(reader.options, first=spent, thorough=spent))
 
 
-def campaign_of(options: CampaignOptions, known: Campaign | None) -> Campaign:
-    """Return what is record for, options over what was record before over defaults."""
-    for given, allowed, option in (
-        (options.overlay, ("tab", "pad"), "--overlay"),
-        (options.surfaces, SURFACES, "--surfaces"),
-        (options.engine, tuple(ENGINES), "--engine"),
-        (options.sensor_per, ("touch", "run"), "--sensor-per"),
-        (options.policy, POLICY_NAMES, "--policy"),
-    ):
-        if given and given not in allowed:
-            raise ValidationError(
-                f"'{given}' is not known", fix=f"give {' or '.join(allowed)}", place=option
-            )
-    base = known or Campaign()
-    own = sensor_of(options.sensor_type, "").overlay.kind if options.sensor_type else ""
-    touches = base.touches if options.touches is None else options.touches
-    study = base.study if known else (STUDY if touches >= STUDY else 0)
-    campaign = replace(
-        base,
-        touches=touches,
-        seed=base.seed if options.seed is None else options.seed,
-        kinds=kinds_of(options.kinds) if options.kinds else base.kinds,
-        levels=levels_of(options.levels) if options.levels else base.levels,
-        sensor_type=options.sensor_type or base.sensor_type,
-        overlay=options.overlay or own or base.overlay,
-        surfaces=options.surfaces or base.surfaces,
-        print_profile=options.print_profile or base.print_profile,
-        faults=options.faults or base.faults,
-        engine=options.engine or base.engine,
-        sensor_per=options.sensor_per or base.sensor_per,
-        policy=options.policy or base.policy,
-        study=study if options.study is None else options.study,
-        shard=base.shard if options.shard is None else options.shard,
-    )
-    for given, option in (
-        (campaign.print_profile, "--print-profile"),
-        (campaign.faults, "--faults"),
-    ):
-        if given and campaign.surfaces != PRINTED:
-            raise ValidationError(
-                f"{campaign.surfaces} are touched, nothing is printed",
-                fix="add --surfaces printed",
-                place=option,
-            )
-    return touchable(campaign, bool(options.kinds))
+def settings_of(name: str) -> dict[str, int]:
+    """Return what a reader of the study spends, as the report names it."""
+    first = DEFAULTS.first
+    values = READERS.get(name) or tuple(getattr(first, option) for option in EFFORT)
+    named = {option.replace("_", " "): n for option, n in zip(EFFORT, values, strict=True)}
+    return named | ({"second try": DEFAULTS.thorough.candidates} if name == AS_IS else {})

@@ -15,7 +15,7 @@ heavy is imported before it is needed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -27,9 +27,8 @@ from probe.contact.engines import ENGINES
 from probe.simulate.world.levels import LEVELS
 
 if TYPE_CHECKING:
-    from typer import Typer
-
-    from recognizer.validation.result import ValidationResult
+    from encoded_objects.base.options import Application
+    from recognizer.validation.pipeline import ValidationResult
 
 NAME = "validate-set"
 TOOLS = ("compare", "worlds", "repeat", "report")
@@ -68,7 +67,7 @@ def run(arguments: list[str]) -> int:
     return console.run(NAME, _application, arguments)
 
 
-def _application(arguments: list[str]) -> Typer:
+def _application(arguments: list[str]) -> Application:
     return tools if arguments[:1] and arguments[0] in TOOLS else app
 
 
@@ -201,11 +200,7 @@ def touch_set(
     from recognizer.validation.pipeline import validate
     from recognizer.validation.run import TouchProgress
 
-    given = vars(options) | {
-        "specs": options.specs or (),
-        "sensor_type": options.sensor_type or None,
-        "prints": options.prints or "",
-    }
+    given = vars(options) | {"specs": options.specs or (), "prints": options.prints or ""}
     with progress_bar("making the set") as bar:
         result = validate(**given, progress=TouchProgress(bar))
     _report(result, as_json=as_json)
@@ -225,8 +220,8 @@ def compare(
     """Show two runs side by side: what became better, worse, or is the same within chance."""
     from recognizer.validation.compare import compare_runs
 
-    _print_comparison(compare_runs(first, second, output), output, as_json=as_json)
-    return console.DONE
+    found = compare_runs(first, second, output)
+    return _show(found, _print_comparison, output, as_json=as_json)
 
 
 @command(tools)
@@ -242,8 +237,7 @@ def worlds(
     """Show runs of different worlds on one page: engines, surfaces, sensors."""
     from recognizer.validation.compare import join_runs
 
-    _print_worlds(join_runs(folders, output), output, as_json=as_json)
-    return console.DONE
+    return _show(join_runs(folders, output), _print_worlds, output, as_json=as_json)
 
 
 @command(tools)
@@ -258,8 +252,7 @@ def repeat(
     """Do one touch again: surface, counts, fitted symbols, answer and truth."""
     from recognizer.validation.repeat import repeat_touch
 
-    _print_row(repeat_touch(folder, number, plot), plot, as_json=as_json)
-    return console.DONE
+    return _show(repeat_touch(folder, number, plot), _print_row, plot, as_json=as_json)
 
 
 @command(tools)
@@ -282,52 +275,46 @@ def _report(result: ValidationResult, *, as_json: bool) -> None:
         output.write(f"{result}\nnext: open {result.folder / 'report.html'}")
 
 
-def _print_comparison(found: dict[str, Any], page: Path | None, *, as_json: bool) -> None:
-    """Print a comparison."""
+def _show(
+    found: dict[str, Any],
+    show: Callable[[dict[str, Any]], None],
+    page: Path | None,
+    *,
+    as_json: bool,
+) -> int:
+    """Print what was found, as JSON or as people read it, and the page to look at now."""
     if as_json:
         output.write_json(found)
-        return
+    else:
+        show(found)
+        if page:
+            output.write(f"next: open {page}")
+    return console.DONE
+
+
+def _print_comparison(found: dict[str, Any]) -> None:
     wide = max(len(line["name"]) for line in found["lines"])
     output.write(f"{'':{wide}}  {'A':>12}  {'B':>12}")
     for line in found["lines"]:
         a, b = (("-" if v is None else f"{v:.6g}") for v in (line["a"], line["b"]))
         output.write(f"{line['name']:{wide}}  {a:>12}  {b:>12}  {line['word']}")
-    _print_next(page)
 
 
-def _print_worlds(found: dict[str, Any], page: Path | None, *, as_json: bool) -> None:
-    """Print the outcome of every world."""
-    if as_json:
-        output.write_json(found)
-        return
+def _print_worlds(found: dict[str, Any]) -> None:
     names = [f"{w['run']}: {w['engine']}, {w['surface']}, {w['sensor']}" for w in found["worlds"]]
     wide = max(map(len, names), default=0)
     heads = ("touches", "right", "wrong", "refused", "mm rms", "deg rms", "inside")
     output.write(f"{'':{wide}}" + "".join(f"{head:>9}" for head in heads))
     for name, line in zip(names, found["worlds"], strict=True):
-        counts = (line["touches"], line["right"], line["wrong"], line["rejected"])
-        sizes = (
-            ("-" if line[key] is None else f"{line[key]:.3f}") for key in ("rms_mm", "rms_deg")
-        )
-        inside = line["inside_95"]["share"]
-        cells = [f"{n:,}" for n in counts] + [*sizes, "-" if inside is None else f"{inside:.1%}"]
+        cells = [f"{line[key]:,}" for key in ("touches", "right", "wrong", "rejected")]
+        values = ((line["rms_mm"], ".3f"), (line["rms_deg"], ".3f"),
+                  (line["inside_95"]["share"], ".1%"))  # fmt: skip
+        cells += ["-" if value is None else f"{value:{digits}}" for value, digits in values]
         output.write(f"{name:{wide}}" + "".join(f"{cell:>9}" for cell in cells))
-    _print_next(page)
 
 
-def _print_row(row: dict[str, Any], plot: Path | None, *, as_json: bool) -> None:
-    """Print the row of one touch."""
-    if as_json:
-        output.write_json(row)
-        return
+def _print_row(row: dict[str, Any]) -> None:
     output.pairs({name: "-" if value is None else str(value) for name, value in row.items()})
-    _print_next(plot)
-
-
-def _print_next(page: Path | None) -> None:
-    """Say what to look at now, if there is anything."""
-    if page:
-        output.write(f"next: open {page}")
 
 
 if __name__ == "__main__":

@@ -2,8 +2,8 @@
 
 Folders -> lines, and a page. Shares differ if the difference exceeds what two samples of one
 share show in 95 % of all cases (Newcombe's interval, from the exact ones of both); root mean
-squares, if it exceeds twice its standard error, 1/sqrt(4 n) of each. Of worlds nothing is counted
-together: they differ, and so do the numbers of their touches.
+squares, if it exceeds twice its standard error, 1/sqrt(4 n) of each. Worlds are not counted
+together: they differ, and their numbers of touches do.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,17 +23,11 @@ from recognizer.validation.results import FORMAT
 PAIR, WORLDS = "compare.html.j2", "worlds.html.j2"  #: templates
 SAME, BETTER, WORSE = "same within chance", "better", "worse"
 
-
-@dataclass(frozen=True, slots=True)
-class FinishedRun:
-    """Results of a run that is done, as its folder has them."""
-
-    results: dict[str, Any]
-    times: dict[str, Any]
+FinishedRun = tuple[dict[str, Any], dict[str, Any]]  #: results and times of a run that is done
 
 
 def read_finished(folder: Path) -> FinishedRun:
-    """Return the results of a folder's run.
+    """Return results and times of a folder's run.
 
     Raises
     ------
@@ -48,7 +41,7 @@ def read_finished(folder: Path) -> FinishedRun:
             fix=f"make them anew: validate-set report {folder}",
             place=str(folder),
         )
-    return FinishedRun(results, times)
+    return results, times
 
 
 def _read_json(folder: Path, name: str) -> dict[str, Any]:
@@ -75,12 +68,11 @@ def compare_runs(first: Path, second: Path, output: Path | None) -> dict[str, An
     ValidationError
         As `read_finished`.
     """
-    one, other = read_finished(first), read_finished(second)
-    a, b, times = one.results, other.results, (one.times, other.times)
-    found = {
-        "lines": _lines(a, b, times),
-        "differ": _differing_settings(a["provenance"], b["provenance"]),
-    }
+    (a, a_times), (b, b_times) = read_finished(first), read_finished(second)
+    lines = _lines(a, b)
+    one, two = (times["reading"]["median"] for times in (a_times, b_times))
+    lines.append({"name": "CPU to read a touch, ms, median", "a": one, "b": two, "word": ""})
+    found = {"lines": lines, "differ": _differing_settings(a["provenance"], b["provenance"])}
     if output is not None:
         page = environment().get_template(PAIR)
         text = page.render(a=a, b=b, found=found, pictures=(accuracy(a), accuracy(b)))
@@ -88,37 +80,33 @@ def compare_runs(first: Path, second: Path, output: Path | None) -> dict[str, An
     return found
 
 
-def _lines(
-    a: dict[str, Any], b: dict[str, Any], times: tuple[dict[str, Any], dict[str, Any]]
-) -> list[dict[str, Any]]:
+def _lines(a: dict[str, Any], b: dict[str, Any]) -> list[dict[str, Any]]:
     lines = [
-        _share("wrong, all touches", a["totals"]["wrongly"], b["totals"]["wrongly"], least=True),
-        _share("answered, enough symbols", a["enough"]["answered"], b["enough"]["answered"]),
-    ]
+        compare_shares("wrong, all touches", a["totals"]["wrongly"], b["totals"]["wrongly"],
+                       least=True),
+        compare_shares("answered, enough symbols", a["enough"]["answered"],
+                       b["enough"]["answered"]),
+    ]  # fmt: skip
     levels = {line["level"]: line for line in b["levels"]}
-    for line in a["levels"]:
-        other = levels.get(line["level"])
-        if other is None:
-            continue
-        name = line["level"]
-        lines.append(_share(f"answered, {name}", line["answered"], other["answered"]))
-        for size, unit in (("rms_mm", "mm"), ("rms_deg", "degrees")):
-            of = line["right"], other["right"]
-            lines.append(_size(f"rms {unit}, {name}", line[size], other[size], of))
+    for one in a["levels"]:
+        name, two = one["level"], levels.get(one["level"])
+        if two is not None:
+            lines.append(compare_shares(f"answered, {name}", one["answered"], two["answered"]))
+            of = one["right"], two["right"]
+            for size, unit in (("rms_mm", "mm"), ("rms_deg", "degrees")):
+                lines.append(compare_sizes(f"rms {unit}, {name}", one[size], two[size], of))
     kinds = {line["kind"]: line for line in b["kinds"] if not line["surface"]}
-    for line in a["kinds"]:
-        other = kinds.get(line["kind"])
-        if not line["surface"] and other is not None and line["kind"] not in ("blank", "foreign"):
-            lines.append(_share(f"answered, {line['kind']}", line["answered"], other["answered"]))
-    one, two = (each["reading"]["median"] for each in times)
-    lines.append({"name": "CPU to read a touch, ms, median", "a": one, "b": two, "word": ""})
+    for one in a["kinds"]:
+        name, two = one["kind"], kinds.get(one["kind"])
+        if not one["surface"] and two is not None and name not in ("blank", "foreign"):
+            lines.append(compare_shares(f"answered, {name}", one["answered"], two["answered"]))
     return lines
 
 
-def _share(
+def compare_shares(
     name: str, a: dict[str, Any], b: dict[str, Any], *, least: bool = False
 ) -> dict[str, Any]:
-    """Return a line of two shares."""
+    """Return a line of two shares; `least`: less of it is better."""
     word = SAME
     if a["share"] is not None and b["share"] is not None:
         gap = b["share"] - a["share"]
@@ -129,7 +117,9 @@ def _share(
     return {"name": name, "a": a["share"], "b": b["share"], "word": word}
 
 
-def _size(name: str, a: float | None, b: float | None, of: tuple[int, int]) -> dict[str, Any]:
+def compare_sizes(
+    name: str, a: float | None, b: float | None, of: tuple[int, int]
+) -> dict[str, Any]:
     """Return a line of two root mean squares over so many answers each."""
     word = SAME
     if a is not None and b is not None:
@@ -140,16 +130,16 @@ def _size(name: str, a: float | None, b: float | None, of: tuple[int, int]) -> d
 
 
 def _differing_settings(a: dict[str, Any], b: dict[str, Any]) -> list[dict[str, str]]:
-    """Return the settings in which two runs differ."""
-    found = []
-    for part in ("campaign", "versions"):
-        for name in a[part] | b[part]:
-            one, two = a[part].get(name), b[part].get(name)
-            if one != two:
-                found.append({"name": name, "a": _text(one), "b": _text(two)})
-    if a["set"] != b["set"]:
-        found.append({"name": "set", "a": a["set"], "b": b["set"]})
-    return found
+    """Return the settings in which two runs differ, by their provenance."""
+    both = [
+        (name, a[part].get(name), b[part].get(name))
+        for part in ("campaign", "versions")
+        for name in a[part] | b[part]
+    ]
+    both.append(("set", a["set"], b["set"]))
+    return [
+        {"name": name, "a": _text(one), "b": _text(two)} for name, one, two in both if one != two
+    ]
 
 
 def _text(value: Any) -> str:
@@ -158,11 +148,6 @@ def _text(value: Any) -> str:
 
 def join_runs(folders: Sequence[Path], page: Path | None) -> dict[str, Any]:
     """Return the worlds of several runs; `page` (HTML) and its JSON are written if it is given.
-
-    Returns
-    -------
-    `runs`: name (a letter), command, versions; `worlds`: a line of `results.worlds_of` each, with
-    the run's name and the CPU times of a touch (`drawing_ms`, `reading_ms`).
 
     Raises
     ------
@@ -186,15 +171,20 @@ def join_runs(folders: Sequence[Path], page: Path | None) -> dict[str, Any]:
 
 
 def join_finished(runs: Sequence[FinishedRun]) -> dict[str, Any]:
-    """Return the worlds of runs, in their order."""
+    """Return the worlds of runs, in their order.
+
+    Returns
+    -------
+    `runs`: name (a letter), command, versions; `worlds`: a line of `results.worlds_of` each, with
+    the run's name and the CPU times of a touch (`drawing_ms`, `reading_ms`).
+    """
     listed, worlds = [], []
-    for number, run in enumerate(runs):
-        name = run_name(number)
-        provenance = run.results["provenance"]
-        touches = run.results["totals"]["touches"]
-        listed.append({"run": name, "command": provenance["command"], "touches": touches,
-                     "versions": provenance["versions"], "set": provenance["set"]})  # fmt: skip
-        for line, spent in zip(run.results["worlds"], run.times["worlds"], strict=True):
+    for number, (results, times) in enumerate(runs):
+        name, provenance = run_name(number), results["provenance"]
+        listed.append({"run": name, "command": provenance["command"],
+                       "touches": results["totals"]["touches"],
+                       "versions": provenance["versions"], "set": provenance["set"]})  # fmt: skip
+        for line, spent in zip(results["worlds"], times["worlds"], strict=True):
             ms = {f"{part}_ms": value for part, value in spent.items()}
             worlds.append({"run": name, **line, **ms})
     return {"runs": listed, "worlds": worlds}

@@ -27,15 +27,14 @@ from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from encoded_objects.base.files import whole_file
 from recognizer.touch.recognise import recognise
-from recognizer.validation.campaign import plan_of, series_of
+from recognizer.validation.campaign import Work, series_of
 from recognizer.validation.draw import draw_touch
-from recognizer.validation.files import write_json
-from recognizer.validation.run import RunRecord, TouchProgress
+from recognizer.validation.files import write_json, write_table
+from recognizer.validation.run import TouchProgress
 from recognizer.validation.trial import NEAR_DEG, NEAR_MM, judge
 from recognizer.validation.workers import prepare_reader
 
@@ -54,33 +53,29 @@ class TouchDataset:
     pitch_mm: float  #: of the sensor's tactels
     description: dict[str, Any]  #: of the world, and what our reader reaches in it
 
-    def __len__(self) -> int:
-        return len(self.arrays["number"])
 
-
-def touch_dataset(record: RunRecord, folder: Path, progress: TouchProgress) -> TouchDataset:
+def touch_dataset(work: Work, progress: TouchProgress) -> TouchDataset:
     """Return the touches of a run, drawn and read again by their numbers."""
-    work = record.work_now(folder)
-    reader = prepare_reader(work)
-    series = series_of(record.campaign)[0]
+    reader, campaign = prepare_reader(work), work.campaign
+    series = series_of(campaign)[0]
     faces = [one.face(number) for one in reader.lab.arrays for number in range(len(one.faces))]
     names = sorted(f"{face.object}/{face.face}" for face in faces)
     label_of = {name: label for label, name in enumerate(names)}
     rows: list[dict[str, Any]] = []
     progress.begin("data set", series.touches, 0)
     for number in range(series.touches):
-        kind, plan = plan_of(record.campaign, series, work.database, number, work.labs, work.prints)
+        plan = work.plan(series, number)
         found = draw_touch(plan, number, reader)
         answer = recognise(reader, reader.signal(found.counts), number)
-        trial = judge(plan, number, found, answer, 0.0)
+        trial = judge(plan, number, found, answer, reader)
         T = np.full((4, 4), math.nan) if answer.T_face_probe is None else answer.T_face_probe
         touched = trial.object != ""
         rows.append(
             {
                 "counts": found.counts,
                 "number": number,
-                "kind": kind,
-                "level": plan.level,
+                "kind": trial.kind,
+                "level": trial.level,
                 "test": number % TEST_EVERY == TEST_EVERY - 1,
                 "label": label_of.get(f"{trial.object}/{trial.face}", -1),
                 "x_mm": trial.x_mm if touched else math.nan,
@@ -97,8 +92,18 @@ def touch_dataset(record: RunRecord, folder: Path, progress: TouchProgress) -> T
         )
         progress.step("touches")
     arrays = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    description = {
+        "seed": campaign.seed,
+        "kinds": dict(campaign.kinds),
+        "levels": dict(campaign.levels),
+        "surfaces": campaign.surfaces,
+        "engine": campaign.engine,
+        "set": work.set_digest,
+        "specs": [Path(spec).name for spec in work.specs],
+        "baseline": baseline(arrays, arrays["test"]),
+    }
     arrays["names"] = np.array(names)
-    return TouchDataset(arrays, reader.sensor.pitch_mm, _described(record, arrays))
+    return TouchDataset(arrays, reader.sensor.pitch_mm, description)
 
 
 def baseline(arrays: dict[str, Array], chosen: Array) -> dict[str, Any]:
@@ -123,66 +128,63 @@ def baseline(arrays: dict[str, Array], chosen: Array) -> dict[str, Any]:
     }
 
 
-def write_npz(data: TouchDataset, folder: Path) -> Path:
-    """Write the data set as one file of arrays; returns its name."""
-    path = folder / "dataset.npz"
-    arrays: dict[str, Any] = data.arrays | {"description": np.array(json.dumps(data.description))}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as file:
-        np.savez_compressed(file, **arrays)
-    return path
-
-
-def _described(record: RunRecord, arrays: dict[str, Array]) -> dict[str, Any]:
-    campaign = record.campaign
-    return {
-        "seed": campaign.seed,
-        "kinds": dict(campaign.kinds),
-        "levels": dict(campaign.levels),
-        "surfaces": campaign.surfaces,
-        "engine": campaign.engine,
-        "set": record.set_digest,
-        "specs": [Path(spec).name for spec in record.specs],
-        "baseline": baseline(arrays, arrays["test"]),
-    }
-
-
 def _rms(values: Array) -> float | None:
     return round(float(np.sqrt(np.mean(values**2))), 4) if len(values) else None
 
 
-VERSION: Final = "v3.0"
-FPS: Final = 1  #: frames of an episode a second: there is one
+def write_npz(data: TouchDataset, folder: Path) -> None:
+    """Write the data set as one file of arrays."""
+    arrays: dict[str, Any] = data.arrays | {"description": np.array(json.dumps(data.description))}
+    folder.mkdir(parents=True, exist_ok=True)
+    with whole_file(folder / "dataset.npz") as file:
+        np.savez_compressed(file, **arrays)
+
+
+VERSION: Final = "v3.0"  #: of LeRobot's format
 TASK: Final = "say which face is touched, and where"
 ROWS: Final = 50_000  #: touches in a file; LeRobot wants less than 100 MB
 CHUNK_FILES: Final = 1000
 DATA: Final = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
-EPISODES: Final = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+INDEX: Final = "__index_level_0__"  #: what pandas calls an index without a name
+PANDAS: Final[dict[str, Any]] = {
+    "index_columns": [INDEX],
+    "column_indexes": [],
+    "columns": [
+        {"name": name, "field_name": field, "pandas_type": kind, "numpy_type": stored,
+         "metadata": None}
+        for name, field, kind, stored in (
+            ("task_index", "task_index", "int64", "int64"),
+            (None, INDEX, "unicode", "object"),
+        )
+    ],
+    "pandas_version": "2.2.0",
+}  # fmt: skip
 
 
-def write_lerobot(data: TouchDataset, folder: Path) -> Path:
-    """Write the data set; returns its folder, whole or not there."""
+def write_lerobot(data: TouchDataset, folder: Path) -> None:
+    """Write the data set in the folder `lerobot`, whole or not there."""
     target, draft = folder / "lerobot", folder / ".lerobot.writing"
     shutil.rmtree(draft, ignore_errors=True)
-    order = np.argsort(data.arrays["test"], kind="stable")
-    columns = _columns(data, order)
-    total, train = len(order), int((~data.arrays["test"]).sum())
+    columns = _columns(data)
+    total = len(columns["index"])
     for file, start in enumerate(range(0, total, ROWS)):
-        rows = {name: values[start : start + ROWS] for name, values in columns.items()}
-        _write(draft / DATA.format(**_place(file)), {n: _arrow(v) for n, v in rows.items()})
-    _write(draft / EPISODES.format(chunk_index=0, file_index=0), _episodes(total))
-    _write(draft / "meta/tasks.parquet", {"task_index": pa.array([0]), _INDEX: pa.array([TASK])},
-           {"pandas": json.dumps(_PANDAS)})  # fmt: skip
-    write_json(
-        draft / "meta/stats.json", {name: _stats(values) for name, values in columns.items()}
-    )
-    write_json(draft / "meta/info.json", _info(data, columns, total, train))
+        rows = {name: _arrow(values[start : start + ROWS]) for name, values in columns.items()}
+        name = DATA.format(chunk_index=file // CHUNK_FILES, file_index=file % CHUNK_FILES)
+        write_table(pa.table(rows), draft / name, "snappy")
+    episodes = draft / "meta/episodes/chunk-000/file-000.parquet"
+    write_table(_episodes(total), episodes, "snappy")
+    tasks = pa.table({"task_index": pa.array([0]), INDEX: pa.array([TASK])})
+    tasks = tasks.replace_schema_metadata({"pandas": json.dumps(PANDAS)})
+    write_table(tasks, draft / "meta/tasks.parquet", "snappy")
+    write_json(draft / "meta/stats.json", {name: _stats(v) for name, v in columns.items()})
+    write_json(draft / "meta/info.json", _info(data, columns))
     shutil.rmtree(target, ignore_errors=True)
     draft.rename(target)
-    return target
 
 
-def _columns(data: TouchDataset, order: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
+def _columns(data: TouchDataset) -> dict[str, Array]:
+    """Return a column for each feature; the touches kept for testing come last."""
+    order = np.argsort(data.arrays["test"], kind="stable")
     arrays = {name: values[order] for name, values in data.arrays.items() if name != "names"}
     total = len(order)
     pose = np.stack([arrays["x_mm"], arrays["y_mm"], arrays["theta_rad"]], axis=1)
@@ -200,10 +202,9 @@ def _columns(data: TouchDataset, order: NDArray[np.intp]) -> dict[str, NDArray[A
     }
 
 
-def _info(
-    data: TouchDataset, columns: dict[str, NDArray[Any]], total: int, train: int
-) -> dict[str, Any]:
+def _info(data: TouchDataset, columns: dict[str, Array]) -> dict[str, Any]:
     rows, across = data.arrays["counts"].shape[1:]
+    total, train = len(columns["index"]), int((~data.arrays["test"]).sum())
     named = {
         "observation.tactile": [f"r{r}c{c}" for r in range(rows) for c in range(across)],
         "action": ["x_mm", "y_mm", "theta_rad"],
@@ -226,7 +227,7 @@ def _info(
         "chunks_size": CHUNK_FILES,
         "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 200,
-        "fps": FPS,
+        "fps": 1,  # an episode has one frame
         "splits": splits,
         "data_path": DATA,
         "video_path": None,
@@ -237,24 +238,26 @@ def _info(
     }
 
 
-def _episodes(total: int) -> dict[str, pa.Array]:
+def _episodes(total: int) -> pa.Table:
     each = np.arange(total)
     files = each // ROWS
     none = np.zeros(total, np.int64)
-    return {
-        "episode_index": pa.array(each),
-        "tasks": pa.array([[TASK]] * total),
-        "length": pa.array(none + 1),
-        "data/chunk_index": pa.array(files // CHUNK_FILES),
-        "data/file_index": pa.array(files % CHUNK_FILES),
-        "dataset_from_index": pa.array(each),
-        "dataset_to_index": pa.array(each + 1),
-        "meta/episodes/chunk_index": pa.array(none),
-        "meta/episodes/file_index": pa.array(none),
-    }
+    return pa.table(
+        {
+            "episode_index": each,
+            "tasks": pa.array([[TASK]] * total),
+            "length": none + 1,
+            "data/chunk_index": files // CHUNK_FILES,
+            "data/file_index": files % CHUNK_FILES,
+            "dataset_from_index": each,
+            "dataset_to_index": each + 1,
+            "meta/episodes/chunk_index": none,
+            "meta/episodes/file_index": none,
+        }
+    )
 
 
-def _stats(values: NDArray[Any]) -> dict[str, list[Any]]:
+def _stats(values: Array) -> dict[str, list[Any]]:
     """Return what LeRobot normalises by, over all touches."""
     flat = values.reshape(len(values), -1).astype(np.float64)
     found = {"min": flat.min(axis=0), "max": flat.max(axis=0), "mean": flat.mean(axis=0),
@@ -262,38 +265,7 @@ def _stats(values: NDArray[Any]) -> dict[str, list[Any]]:
     return {name: each.tolist() for name, each in found.items()} | {"count": [len(values)]}
 
 
-def _arrow(values: NDArray[Any]) -> pa.Array:
+def _arrow(values: Array) -> pa.Array:
     if values.ndim == 1:
         return pa.array(values)
     return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
-
-
-def _place(file: int) -> dict[str, int]:
-    return {"chunk_index": file // CHUNK_FILES, "file_index": file % CHUNK_FILES}
-
-
-def _write(
-    path: Path, columns: dict[str, pa.Array], metadata: dict[str, str] | None = None
-) -> None:
-    table = pa.table(columns)
-    if metadata:
-        table = table.replace_schema_metadata(metadata)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as file:
-        pq.write_table(table, file)
-
-
-_INDEX = "__index_level_0__"  #: what pandas calls an index without a name
-_PANDAS: dict[str, Any] = {
-    "index_columns": [_INDEX],
-    "column_indexes": [],
-    "columns": [
-        {"name": name, "field_name": field, "pandas_type": kind, "numpy_type": stored,
-         "metadata": None}
-        for name, field, kind, stored in (
-            ("task_index", "task_index", "int64", "int64"),
-            (None, _INDEX, "unicode", "object"),
-        )
-    ],
-    "pandas_version": "2.2.0",
-}  # fmt: skip

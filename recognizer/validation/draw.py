@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import alphabet_named
-from generator.array import FoldedArray, ProductArray, profile
+from generator.array import profile
 from probe.contact.contract import Touch
 from probe.errors import ContactError
-from probe.simulate.scene import Scene, bare_scene
-from probe.simulate.touch import TouchRanges, random_touches
+from probe.simulate.scene import Scene, TouchRanges, bare_scene, random_touches
 from probe.simulate.world.sensor import LevelSensor, SensorInstance, sample_sensor
 from probe.simulate.world.surfaces import (
     AdjacentParts,
@@ -40,14 +39,7 @@ from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
 from recognizer.validation.encoded_set import SAME_PROFILE, SIDE
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.touch_plan import (
-    TouchPlan,
-    faces_of_kind,
-    faces_of_lab,
-    level_of,
-    ranges_of,
-    scene_of,
-)
+from recognizer.validation.touch_plan import TouchPlan, faces_of_kind, faces_of_lab
 
 #: A touch inside a face keeps this far from its edges: a sensor of 25 mm then shows most of its
 #: window; nearer ones are of the kind `edge`, or `corner` about a corner.
@@ -60,26 +52,28 @@ UNREST = (
     ("finds no rest", "no rest in the engine"),
     ("does not settle", "no rest in the engine"),
 )
+FOREIGN_SYMBOLS = 64  #: rows and columns of foreign symbols, repeated without end
 
 
 def _random_symbols(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return symbols of the lab's alphabet and pitch, drawn at random."""
-    return _embossed_surface(encoding, rng.integers(encoding.array.order, size=(64, 64)))
+    shape = (FOREIGN_SYMBOLS, FOREIGN_SYMBOLS)
+    return _embossed_surface(encoding, rng.integers(encoding.array.order, size=shape))
 
 
 def _other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return another array in the lab's alphabet and pitch."""
-    sizes = (encoding.array.rows, encoding.array.columns)
-    names = ("one-touch", "large") if encoding.array.order == 4 else ("thesis",)
-    others = [_array_of(name) for name in names]
-    array = next((a for a in others if (a.rows, a.columns) != sizes), others[0])
-    if (array.rows, array.columns) == sizes or array.order != encoding.array.order:
+    own = encoding.array
+    names = ("one-touch", "large") if own.order == 4 else ("thesis",)
+    others = [profile(name).array() for name in names]
+    others = [a for a in others if (a.rows, a.columns) != (own.rows, own.columns)]
+    if not others or others[0].order != own.order:
         return _random_symbols(encoding, rng)
+    array = others[0]
     row, column = (int(rng.integers(size)) for size in (array.rows, array.columns))
-    rows, columns = np.indices((64, 64))
-    return _embossed_surface(
-        encoding, array.symbols((rows + row) % array.rows, (columns + column) % array.columns)
-    )
+    rows, columns = np.indices((FOREIGN_SYMBOLS, FOREIGN_SYMBOLS))
+    labels = array.symbols((rows + row) % array.rows, (columns + column) % array.columns)
+    return _embossed_surface(encoding, labels)
 
 
 def _letters(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
@@ -101,11 +95,6 @@ FOREIGN: dict[str, Callable[[EmbossedArray, np.random.Generator], HeightMap]] = 
 }
 
 
-@lru_cache(maxsize=4)
-def _array_of(name: str) -> FoldedArray | ProductArray:
-    return profile(name).array()
-
-
 def _embossed_surface(encoding: EmbossedArray, labels: NDArray[np.int64]) -> HeightMap:
     style, alphabet = encoding.style, encoding.alphabet
     return endless_face(
@@ -120,50 +109,6 @@ def _embossed_surface(encoding: EmbossedArray, labels: NDArray[np.int64]) -> Hei
 def _relief(encoding: EmbossedArray) -> Relief:
     style = encoding.style
     return Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
-
-
-def draw_on_face(
-    scene: Scene, kind: str, most: float, rng: np.random.Generator, ranges: TouchRanges
-) -> Touch:
-    """Draw a touch of a face; where a face is too small for its kind, anywhere on it."""
-    if kind == "corner":
-        touch = next(random_touches(scene.region, rng, ranges))
-        corner = scene.region.starts[int(rng.integers(len(scene.region.starts)))]
-        towards = np.array([touch.x_mm, touch.y_mm]) - corner
-        by = INSIDE_MM * rng.random() / max(float(np.hypot(*towards)), INSIDE_MM)
-        at = corner + towards * by
-        return replace(touch, x_mm=float(at[0]), y_mm=float(at[1]))
-    if kind == "edge":
-        for touch in random_touches(scene.region, rng, ranges):
-            if scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0] < INSIDE_MM:
-                return touch
-    margin = 0.0 if kind == "anywhere" else min(INSIDE_MM, 0.8 * most)
-    return next(random_touches(scene.region, rng, replace(ranges, margin_mm=margin)))
-
-
-@lru_cache(maxsize=512)
-def inradius_mm(database: str, object_name: str, face: str, files: bool, prints: str = "") -> float:
-    """Return how far the inmost point of a face lies from its edges, mm, nearly."""
-    return scene_of(database, object_name, face, files, prints).inradius_mm()
-
-
-def draw_anywhere(rng: np.random.Generator, ranges: TouchRanges) -> Touch:
-    """Draw a touch of a surface that has no edges near, within 100 mm of its origin."""
-    low, high = ranges.force_n
-    theta, towards = rng.uniform(-math.pi, math.pi, 2)
-    tilt = ranges.tilt_rad * math.sqrt(rng.random())
-    x, y = rng.uniform(0, 100, 2)
-    return Touch(
-        x_mm=float(x),
-        y_mm=float(y),
-        theta_rad=float(theta),
-        force_n=float(rng.uniform(low, high)),
-        tilt_x_rad=tilt * math.cos(towards),
-        tilt_y_rad=tilt * math.sin(towards),
-    )
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,9 +143,15 @@ class DrawnTouch:
 
 
 def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
-    """Return what is touched in a trial, and the reading."""
+    """Return what is touched in a trial, and the reading.
+
+    Raises
+    ------
+    ValidationError
+        The set has no face of the plan's kind.
+    """
     rng = np.random.default_rng([plan.seed, number])
-    ranges = ranges_of(plan, level_of(plan), reader.sensor)
+    ranges = plan.ranges(reader.sensor)
     of_run = _sensor_of_run(plan.seed, reader.sensor) if plan.sensor_per == "run" else None
     resampled: list[str] = []
     arrays = [
@@ -216,19 +167,15 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
         )
     encoding = arrays[int(rng.integers(len(arrays)))]
     while True:
-        contact, touch = sample_scene(plan, encoding, ranges, rng)
+        contact, touch = _sample_scene(plan, encoding, ranges, rng)
         sensor = of_run or sample_sensor(reader.sensor, rng)
         try:
             counts = _read(plan, contact.scene, touch, sensor, reader, rng)
         except ContactError as error:
-            resampled.append(_reason_of(error.cause))
+            reasons = (reason for words, reason in UNREST if words in error.cause)
+            resampled.append(next(reasons, "other"))
         else:
             return DrawnTouch(contact, touch, counts, sensor, tuple(resampled))
-
-
-def _reason_of(cause: str) -> str:
-    """Return the reason that is counted for a cause of the contact."""
-    return next((reason for words, reason in UNREST if words in cause), "other")
 
 
 def draw_again(
@@ -247,7 +194,7 @@ def draw_again(
 
 def draw_tilt(plan: TouchPlan, touch: Touch, rng: np.random.Generator) -> Touch:
     """Return a touch with another tilt of the wrist, as the plan draws it."""
-    tilt = ranges_of(plan, level_of(plan), SensorType()).tilt_rad * math.sqrt(rng.random())
+    tilt = plan.ranges(SensorType()).tilt_rad * math.sqrt(rng.random())
     towards = float(rng.uniform(-math.pi, math.pi))
     return replace(touch, tilt_x_rad=tilt * math.cos(towards), tilt_y_rad=tilt * math.sin(towards))
 
@@ -256,37 +203,66 @@ def _read(
     plan: TouchPlan, scene: Scene, touch: Touch, sensor: SensorInstance, reader: Reader,
     rng: np.random.Generator,
 ) -> NDArray[np.uint16]:  # fmt: skip
-    """Return what a sensor reads of a touch."""
-    worse = LevelSensor(reader.sensor, level_of(plan), plan.engine, sensor)
+    worse = LevelSensor(reader.sensor, plan.noise, plan.engine, sensor)
     return worse.read(scene, touch, rng).counts
 
 
-def sample_scene(
+def _sample_scene(
     plan: TouchPlan, encoding: EmbossedArray, ranges: TouchRanges, rng: np.random.Generator
 ) -> tuple[ContactScene, Touch]:
     """Draw what is touched and where."""
     if plan.kind in FOREIGN:
         foreign = bare_scene(FOREIGN[plan.kind](encoding, rng), plan.kind)
-        return ContactScene(foreign, registered=False), draw_anywhere(rng, ranges)
+        return ContactScene(foreign, registered=False), _draw_anywhere(rng, ranges)
     if plan.kind == SAME_PROFILE:
         lab = plan.labs[int(rng.integers(len(plan.labs)))]
         faces = faces_of_lab(lab)
-        name, shown = faces[int(rng.integers(len(faces)))]
-        scene = scene_of(lab, name, shown, plan.files)
-        most = inradius_mm(lab, name, shown, plan.files)
-        touch = draw_on_face(scene, plan.kind, most, rng, ranges)
-        return ContactScene(scene, registered=False), touch
+        scene, most = plan.face(*faces[int(rng.integers(len(faces)))], lab=lab)
+        return ContactScene(scene, registered=False), _draw_on_face(plan, scene, most, rng, ranges)
     known = faces_of_kind(encoding, plan.kind, plan.prints, plan.only)
     face = encoding.face(known[int(rng.integers(len(known)))])
-    scene = scene_of(plan.database, face.object, face.face, plan.files, plan.prints)
+    scene, most = plan.face(face.object, face.face)
     if plan.kind == SIDE:
         return _adjacent(plan, encoding, scene, ranges, rng)
-    most = inradius_mm(plan.database, face.object, face.face, plan.files, plan.prints)
-    touch = draw_on_face(scene, plan.kind, most, rng, ranges)
+    touch = _draw_on_face(plan, scene, most, rng, ranges)
     if plan.kind == "worn":
         pitch_mm = encoding.style.pitch_mm
         scene = worn_scene(scene, face.centres_mm, face.rotation_rad, pitch_mm, plan.worn, rng)
     return ContactScene(scene), touch
+
+
+def _draw_on_face(
+    plan: TouchPlan, scene: Scene, most: float, rng: np.random.Generator, ranges: TouchRanges
+) -> Touch:
+    """Draw a touch of a face; where the face is too small for its kind, anywhere on it."""
+    if plan.kind == "corner":
+        touch = next(random_touches(scene.region, rng, ranges))
+        corner = scene.region.starts[int(rng.integers(len(scene.region.starts)))]
+        towards = np.array([touch.x_mm, touch.y_mm]) - corner
+        by = INSIDE_MM * rng.random() / max(float(np.hypot(*towards)), INSIDE_MM)
+        at = corner + towards * by
+        return replace(touch, x_mm=float(at[0]), y_mm=float(at[1]))
+    if plan.kind == "edge":
+        for touch in random_touches(scene.region, rng, ranges):
+            if scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0] < INSIDE_MM:
+                return touch
+    margin = 0.0 if plan.kind == "anywhere" else min(INSIDE_MM, 0.8 * most)
+    return next(random_touches(scene.region, rng, replace(ranges, margin_mm=margin)))
+
+
+def _draw_anywhere(rng: np.random.Generator, ranges: TouchRanges) -> Touch:
+    """Draw a touch of a surface that has no edges near, within 100 mm of its origin."""
+    theta, towards = rng.uniform(-math.pi, math.pi, 2)
+    tilt = ranges.tilt_rad * math.sqrt(rng.random())
+    x, y = rng.uniform(0, 100, 2)
+    return Touch(
+        x_mm=float(x),
+        y_mm=float(y),
+        theta_rad=float(theta),
+        force_n=float(rng.uniform(*ranges.force_n)),
+        tilt_x_rad=tilt * math.cos(towards),
+        tilt_y_rad=tilt * math.sin(towards),
+    )
 
 
 def _adjacent(
@@ -297,9 +273,9 @@ def _adjacent(
     faces = [encoding.face(n) for n in faces_of_kind(encoding, SIDE, plan.prints)]
     others = [face for face in faces if face.object != scene.object_name]
     other = others[int(rng.integers(len(others)))]
-    second = scene_of(plan.database, other.object, other.face, plan.files, plan.prints)
+    second, _ = plan.face(other.object, other.face)
     place, at = place_adjacent(scene.region, second.region, rng)
-    touch = replace(draw_anywhere(rng, ranges), x_mm=float(at[0]), y_mm=float(at[1]))
+    touch = replace(_draw_anywhere(rng, ranges), x_mm=float(at[0]), y_mm=float(at[1]))
     both = replace(scene, surface=AdjacentParts(scene.surface, second.surface, place))
     return ContactScene(both, adjacent=(second, place)), touch
 

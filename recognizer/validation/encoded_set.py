@@ -13,14 +13,11 @@ import json
 import subprocess
 import sys
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
-from sqlalchemy import Connection
 
 from generator.array.lab_key import lab_key_of
 from generator.database import DatabaseError
@@ -29,6 +26,10 @@ from generator.database.read import list_objects, read_parts
 from generator.database.transaction import read_transaction
 from recognizer.validation.errors import SetError, ValidationError
 
+COPY, NEAR, SMALL, SIDE = "copy", "near", "small", "side"
+SAME_PROFILE = "same_profile"
+#: Kinds that are touches of members of their own, and how the names of these begin.
+EXTRA = {COPY: "Extra copy", NEAR: "Extra near", SMALL: "Extra small"}
 BLOCK_MM = (45.0, 35.0, 28.0)  #: of copies and near ones
 COPIES = 12  #: of one block; as many near ones
 NEAR_MM = 0.5  #: from one near block to the next
@@ -38,20 +39,8 @@ SMALL_PITCHES = (3.15, 3.3, 3.45, 3.6)
 OTHER_LABS, LAB_OBJECTS = 2, 8  #: that made parts with the same profile; objects of each
 LAB_MM = (35.0, 75.0)  #: their sizes
 
-PARTS, LAB = "parts", "lab.db"
+PARTS, LAB, LABS = "parts", "lab.db", "labs"
 LAB_KEY = "VA11-DATE-0000-0002"  #: of the sets that are made here and say none
-
-
-@dataclass(frozen=True, slots=True)
-class Member:
-    """An object of the set, as provenance names it."""
-
-    name: str
-    spec_sha256: str
-    faces: int
-    symbols: int
-    array: str  #: profile and size
-    pitch_mm: float
 
 
 def make_parts(specs: list[Path], folder: Path, database: str, sensor_type: str = "") -> None:
@@ -73,9 +62,19 @@ def make_parts(specs: list[Path], folder: Path, database: str, sensor_type: str 
     if not (any(map(_says_lab_key, specs)) or database_exists(database)):
         command += ["--lab-key", LAB_KEY]
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
-    if done.returncode:
-        cause, fix, place = _first_problem(done.stdout, done.stderr)
-        raise SetError(f"encode-object: {cause}", fix=fix, place=place, exit_code=done.returncode)
+    if done.returncode == 0:
+        return
+    try:
+        first = json.loads(done.stdout)["error"]
+    except (ValueError, KeyError, IndexError):
+        lines = (done.stderr or done.stdout).strip().splitlines() or ["it failed"]
+        first = {"cause": lines[-1]}
+    raise SetError(
+        f"encode-object: {first.get('cause', 'it failed')}",
+        fix=str(first.get("fix") or ""),
+        place=str(first.get("place") or ""),
+        exit_code=done.returncode,
+    )
 
 
 def _says_lab_key(spec: Path) -> bool:
@@ -89,79 +88,52 @@ def _says_lab_key(spec: Path) -> bool:
     return any(isinstance(output, dict) and "lab_key" in output for output in outputs)
 
 
-@contextmanager
-def _connect(database: str) -> Iterator[Connection]:
-    """Yield a connection that only reads; raises `SetError` if the database cannot be read."""
-    try:
-        with read_transaction(open_database(database, writable=False)) as connection:
-            yield connection
-    except DatabaseError as error:
-        raise SetError(error.cause, fix=error.fix, place=error.place or database) from error
+def members_of(database: str) -> list[dict[str, Any]]:
+    """Return the objects of a database as provenance names them: `array` is profile and size.
 
-
-def members_of(database: str) -> tuple[Member, ...]:
-    """Return the objects of a database; raises `SetError` if it cannot be read."""
-    with _connect(database) as connection:
-        entries = list_objects(connection)
-    return tuple(
-        Member(
-            name=entry.name,
-            spec_sha256=entry.spec_hash,
-            faces=entry.faces,
-            symbols=entry.symbols,
-            array=f"{entry.profile} {entry.rows}x{entry.columns}",
-            pitch_mm=entry.pitch_mm,
-        )
-        for entry in entries
-    )
+    Raises
+    ------
+    SetError
+        The database cannot be read.
+    """
+    return [
+        {
+            "name": entry.name,
+            "spec_sha256": entry.spec_hash,
+            "faces": entry.faces,
+            "symbols": entry.symbols,
+            "array": f"{entry.profile} {entry.rows}x{entry.columns}",
+            "pitch_mm": entry.pitch_mm,
+        }
+        for entry, _ in _entries(database)
+    ]
 
 
 def set_digest(database: str) -> str:
     """Return a sha256 of specs, arrays, styles and files; raises `SetError` if it cannot."""
-    with _connect(database) as connection:
-        held: list[Any] = [
-            [
-                entry.name,
-                entry.spec_hash,
-                entry.symbols,
-                [[part.name, part.sha256] for part in read_parts(connection, entry.object_id)],
-            ]
-            for entry in list_objects(connection)
-        ]
+    held = [
+        [entry.name, entry.spec_hash, entry.symbols, [[part.name, part.sha256] for part in parts]]
+        for entry, parts in _entries(database)
+    ]
     return hashlib.sha256(json.dumps(held).encode()).hexdigest()
 
 
-def _first_problem(stdout: str, stderr: str) -> tuple[str, str, str]:
-    """Return cause, fix and place of the first problem that `encode-object` reports."""
+def _entries(database: str) -> list[tuple[Any, Any]]:
+    """Return the objects of a database with their parts; raises `SetError` if it cannot."""
     try:
-        first = json.loads(stdout)["error"]
-    except (ValueError, KeyError, IndexError):
-        lines = (stderr or stdout).strip().splitlines()
-        return (lines[-1] if lines else "it failed"), "", ""
-    where = str(first.get("place") or "")
-    return str(first.get("cause", "it failed")), str(first.get("fix") or ""), where
-
-
-COPY, NEAR, SMALL, SIDE = "copy", "near", "small", "side"
-SAME_PROFILE = "same_profile"
-EXTRA = {COPY: "Extra copy", NEAR: "Extra near", SMALL: "Extra small"}
-"""Kinds that are touches of members of their own, and how the names of these begin."""
-LABS = "labs"
+        with read_transaction(open_database(database, writable=False)) as connection:
+            return [
+                (entry, read_parts(connection, entry.object_id))
+                for entry in list_objects(connection)
+            ]
+    except DatabaseError as error:
+        raise SetError(error.cause, fix=error.fix, place=error.place or database) from error
 
 
 def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: int) -> None:
-    """Make what kinds need besides the set.
+    """Make what kinds need besides the set, which is made, in the folder of the run.
 
-    Parameters
-    ----------
-    folder
-        Of the run.
-    database
-        Of the set, which is made.
-    kinds
-        Of the campaign.
-    seed
-        Of the campaign; draws the objects of other labs.
+    `seed` draws the objects of other labs.
 
     Raises
     ------
@@ -180,7 +152,7 @@ def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: in
     first = members[0]
     for kind in EXTRA:  # one after the other: they may be on different arrays
         if kind in kinds:
-            specs = list(_extra_specs(kind, first.pitch_mm))
+            specs = list(_extra_specs(kind, first["pitch_mm"]))
             _make(specs, first, folder / f"extra-{kind}.yaml", folder / PARTS, database)
     if SAME_PROFILE in kinds:
         for number in range(OTHER_LABS):
@@ -189,25 +161,17 @@ def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: in
             rng = np.random.default_rng([seed, number, 5])
             specs = list(_random_specs(number, rng))
             key = lab_key_of(np.random.default_rng([seed, number, 6]).bytes(16))
-            _make(specs, first, lab / "set.yaml", lab / PARTS, str(lab / LAB), lab_key=key)
+            _make(specs, first, lab / "set.yaml", lab / PARTS, str(lab / LAB), {"lab_key": key})
 
 
 def labs_of(folder: Path, kinds: Collection[str]) -> tuple[str, ...]:
     """Return the databases of the other labs that a run touches."""
-    if SAME_PROFILE not in kinds:
-        return ()
-    found = range(1, OTHER_LABS + 1)
+    found = range(1, OTHER_LABS + 1) if SAME_PROFILE in kinds else ()
     return tuple(str((folder / LABS / f"lab-{number}" / LAB).absolute()) for number in found)
 
 
 def refuse_without_specs(kinds: Collection[str]) -> None:
-    """See to it that no object is registered in a database that is only to be read.
-
-    Raises
-    ------
-    ValidationError
-        A kind needs members of its own.
-    """
+    """Refuse kinds that need members of their own: a database that is named is only read."""
     made = [kind for kind in EXTRA if kind in kinds]
     if made:
         raise ValidationError(
@@ -244,30 +208,29 @@ def _random_specs(lab: int, rng: np.random.Generator) -> Iterator[dict[str, Any]
     """Yield the objects of another lab, of any size."""
     for k in range(LAB_OBJECTS):
         x, y, z = (float(round(size, 1)) for size in rng.uniform(*LAB_MM, 3))
-        shape: dict[str, Any] = {"box": _lengths(x, y, z)}
-        if k % 3 == 1:
-            shape = {"triangular_prism": {"side": f"{x:g} mm", "height": f"{y:g} mm"}}
-        if k % 3 == 2:
-            shape = {"cube": f"{x:g} mm"}
-        yield {"name": f"Other {lab + 1}-{k + 1}", "shape": shape}
+        shapes: tuple[dict[str, Any], ...] = (
+            {"box": _lengths(x, y, z)},
+            {"triangular_prism": {"side": f"{x:g} mm", "height": f"{y:g} mm"}},
+            {"cube": f"{x:g} mm"},
+        )
+        yield {"name": f"Other {lab + 1}-{k + 1}", "shape": shapes[k % 3]}
 
 
 def _make(
     specs: list[dict[str, Any]],
-    like: Member,
+    like: dict[str, Any],
     file: Path,
     folder: Path,
     database: str,
-    lab_key: str = "",
+    output: dict[str, str] | None = None,
 ) -> None:
+    """Make objects in the profile and at the pitch of a member of the set."""
     style = {
-        "profile": like.array.rpartition(" ")[0],
-        "symbols": {"pitch": f"{like.pitch_mm:g} mm"},
+        "profile": like["array"].rpartition(" ")[0],
+        "symbols": {"pitch": f"{like['pitch_mm']:g} mm"},
     }
     whole: dict[str, Any] = {"version": 1, "objects": [style | spec for spec in specs]}
-    if lab_key:
-        whole["output"] = {"lab_key": lab_key}
-    text = json.dumps(whole, indent=1)
+    text = json.dumps(whole | ({"output": output} if output else {}), indent=1)
     file.write_text(text + "\n", "utf-8")
     make_parts([file], folder, database)
 

@@ -1,4 +1,4 @@
-"""Errors of `validate-set`: options and folders, workers, the set.
+"""Errors of `validate-set`.
 
 ::
 

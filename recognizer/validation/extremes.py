@@ -7,7 +7,7 @@ load to within `BALANCE`; an image passes if the reader answers nothing, and rai
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -34,27 +34,13 @@ _FREE = WristStiffness(0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class ExtremeScene:
-    """What is pressed, and what must come of it."""
+    """A scene that is pressed, and the outcomes that pass."""
 
     name: str
     surface: HeightMap
     touch: Touch = _HERE
     expected: str = FINITE
-    overlay: Mapping[str, Any] = field(default_factory=dict)  #: what of it is changed
-
-
-@dataclass(frozen=True, slots=True)
-class SceneOutcome:
-    """What came of a scene."""
-
-    outcome: str  #: finite, refused, or that it is no finite answer
-    detail: str  #: the level that answered, or why it was refused
-    balance: float | None  #: of the load, by which the forces miss it
-
-    @property
-    def balanced(self) -> bool:
-        """Whether the forces sum to the load, if there are any."""
-        return self.balance is None or self.balance <= BALANCE
+    overlay: dict[str, Any] = field(default_factory=dict)  #: what of it is changed
 
 
 class _NoNumber:
@@ -96,35 +82,34 @@ SCENES: tuple[ExtremeScene, ...] = (
 )  # fmt: skip
 
 
-def press_scene(scene: ExtremeScene, kind: str) -> SceneOutcome:
-    """Press a scene with an overlay, `tab` or `pad`, changed as the scene says."""
-    overlay = Overlay(kind="pad" if kind == "pad" else "tab")
-    sensor = SensorType(overlay=replace(overlay, **dict(scene.overlay)))
-    try:
-        contact = press(scene.surface, sensor, scene.touch)
-    except ProbeError as error:
-        return SceneOutcome(REFUSED, error.cause, None)
-    forces, load = contact.forces_n, scene.touch.force_n
-    if not np.isfinite(forces).all() or forces.min() < -BALANCE * load:
-        return SceneOutcome("no finite answer", "", None)
-    off = abs(float(forces.sum()) - load) / max(load, 1e-30)
-    return SceneOutcome(FINITE, contact.level, off)
-
-
 def press_scenes() -> Iterator[dict[str, Any]]:
     """Press every scene with both overlays; yield its outcome, and whether it passes."""
     for kind in ("tab", "pad"):
         for scene in SCENES:
-            found = press_scene(scene, kind)
+            overlay = replace(Overlay(kind=kind), **scene.overlay)
+            outcome, detail, off = _press(scene, SensorType(overlay=overlay))
+            balanced = off <= BALANCE
             yield {
                 "part": f"contact, {kind}",
                 "case": scene.name,
                 "expected": scene.expected,
-                "outcome": found.outcome,
-                "told": found.detail,
-                "out_of_balance": None if found.balanced else round_digits(found.balance or 0.0, 2),
-                "passes": found.outcome in scene.expected and found.balanced,
+                "outcome": outcome,
+                "told": detail,
+                "out_of_balance": None if balanced else round_digits(off, 2),
+                "passes": outcome in scene.expected and balanced,
             }
+
+
+def _press(scene: ExtremeScene, sensor: SensorType) -> tuple[str, str, float]:
+    """Return the outcome, the contact level or the cause of a refusal, and the imbalance."""
+    try:
+        contact = press(scene.surface, sensor, scene.touch)
+    except ProbeError as error:
+        return REFUSED, error.cause, 0.0
+    forces, load = contact.forces_n, scene.touch.force_n
+    if not np.isfinite(forces).all() or forces.min() < -BALANCE * load:
+        return "no finite answer", "", 0.0
+    return FINITE, contact.level, abs(float(forces.sum()) - load) / max(load, 1e-30)
 
 
 def _images(shape: tuple[int, int]) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -146,15 +131,13 @@ def _images(shape: tuple[int, int]) -> Iterator[tuple[str, NDArray[np.float64]]]
 
 def read_images(reader: Reader) -> Iterator[dict[str, Any]]:
     """Show the reader strange images; yield the outcome of each, and whether it passes."""
-    shape = (reader.sensor.rows, reader.sensor.columns)
-    for name, image in _images(shape):
+    for name, image in _images((reader.sensor.rows, reader.sensor.columns)):
         answer = recognise(reader, reader.signal(image))
-        outcome = FINITE if answer else NO_ANSWER
         yield {
             "part": "reader",
             "case": name,
             "expected": NO_ANSWER,
-            "outcome": outcome,
+            "outcome": FINITE if answer else NO_ANSWER,
             "told": f"{answer.object}/{answer.face}" if answer else answer.reason,
             "out_of_balance": None,
             "passes": not answer,

@@ -9,17 +9,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from encoded_objects.base.files import whole_file
-from recognizer.validation.campaign import Series, shards_of
+from recognizer.validation.campaign import Series
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.trial import COLUMNS, CpuTime, Row
+from recognizer.validation.trial import COLUMNS, Row
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+SHARDS, TIMES = "shards", "times"
+TIME_COLUMNS = {"number": "int", "drawing": "float", "reading": "float"}  #: CPU of a touch, s
+ADDED = ("drawn_anew", "touches")  #: columns that runs of before may lack
+GROUP = 100_000  #: rows that a file holds together
 
 
 def write_text(path: Path, text: str) -> None:
@@ -34,9 +38,13 @@ def write_json(path: Path, values: Any) -> None:
     write_text(path, json.dumps(values, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-SHARDS, TIMES = "shards", "times"
-ADDED = ("drawn_anew", "touches")  #: columns that runs of before may lack
-GROUP = 100_000  #: rows that a file holds together
+def write_table(table: pa.Table, path: Path, compression: str = "zstd") -> None:
+    """Write a table."""
+    import pyarrow.parquet as pq
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as file:
+        pq.write_table(table, file, compression=compression, row_group_size=GROUP)
 
 
 def shard_file(folder: Path, series: str, shard: int, what: str = SHARDS) -> Path:
@@ -44,46 +52,31 @@ def shard_file(folder: Path, series: str, shard: int, what: str = SHARDS) -> Pat
     return folder / what / series / f"{shard:05d}.parquet"
 
 
-def row_schema() -> pa.Schema:
-    """Return the types of `rows.COLUMNS` in a file."""
+def _schema(what: str) -> pa.Schema:
+    """Return the types of the columns of rows, or of times, in a file."""
     import pyarrow as pa
 
-    types = {"text": pa.string(), "whole": pa.int64(), "truth": pa.bool_()}
-    return pa.schema([(name, types.get(str(what), pa.float64())) for name, what in COLUMNS.items()])
+    types = {"str": pa.string(), "int": pa.int64(), "bool": pa.bool_(), "float": pa.float64()}
+    columns = COLUMNS if what == SHARDS else TIME_COLUMNS
+    return pa.schema([(name, types[kind]) for name, kind in columns.items()])
 
 
 def write_shard(
-    folder: Path, series: str, shard: int, rows: Iterable[Row], times: Iterable[CpuTime]
+    folder: Path, series: str, shard: int, rows: Iterable[Row], times: Iterable[Row]
 ) -> None:
     """Write a shard and its times, in the order of the touches' numbers."""
     import pyarrow as pa
 
-    ordered = sorted(rows, key=lambda row: row["number"])
-    spent = sorted(times, key=lambda time: time.number)
-    schema = pa.schema([(f.name, pa.int64() if f.name == "number" else pa.float64())
-                        for f in fields(CpuTime)])  # fmt: skip
-    columns = {name: [getattr(time, name) for time in spent] for name in schema.names}
-    write_table(pa.table(columns, schema=schema), shard_file(folder, series, shard, TIMES))
-    table = pa.Table.from_pylist(ordered, schema=row_schema())
-    write_table(table, shard_file(folder, series, shard))
-
-
-def write_table(table: pa.Table, path: Path) -> None:
-    """Write a table under a name that it gets when all of it is on the disk."""
-    import pyarrow.parquet as pq
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as file:
-        pq.write_table(table, file, compression="zstd", row_group_size=GROUP)
+    for what, found in ((TIMES, times), (SHARDS, rows)):
+        ordered = sorted(found, key=lambda row: row["number"])
+        table = pa.Table.from_pylist(ordered, schema=_schema(what))
+        write_table(table, shard_file(folder, series, shard, what))
 
 
 def done_shards(folder: Path, series: Series) -> set[int]:
     """Return which shards of a series are there."""
-    return {
-        shard
-        for shard in range(shards_of(series))
-        if shard_file(folder, series.name, shard).exists()
-    }
+    shards = range(series.shards)
+    return {shard for shard in shards if shard_file(folder, series.name, shard).exists()}
 
 
 def read_series(folder: Path, series: Series, what: str = SHARDS) -> pa.Table:
@@ -99,11 +92,11 @@ def read_series(folder: Path, series: Series, what: str = SHARDS) -> pa.Table:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    files = [shard_file(folder, series.name, shard, what) for shard in range(shards_of(series))]
+    files = [shard_file(folder, series.name, shard, what) for shard in range(series.shards)]
     table = pa.concat_tables([pq.read_table(file) for file in files]).combine_chunks()
     if what == TIMES:
         return table
-    schema = row_schema()
+    schema = _schema(what)
     missing = [name for name in schema.names if name not in table.column_names]
     if set(missing).difference(ADDED):
         raise ValidationError(
@@ -112,8 +105,7 @@ def read_series(folder: Path, series: Series, what: str = SHARDS) -> pa.Table:
             place=str(folder),
         )
     for name in missing:
-        kind = schema.field(name).type
-        table = table.append_column(name, pa.nulls(len(table), kind))
+        table = table.append_column(name, pa.nulls(len(table), schema.field(name).type))
     return table.select(schema.names)
 
 

@@ -7,7 +7,7 @@ thousand of them stay a small file.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.lab import EncodedFace, Lab
+from recognizer.touch.lab import Lab
 from recognizer.validation.pictures import COLOURS, DOTS, WORDS
 from recognizer.validation.trial import REJECTED, RIGHT, WRONG
 
@@ -49,14 +49,17 @@ class FlatFace:
         return corners.min(axis=0), corners.max(axis=0)
 
 
-def flat_objects(lab: Lab, rows: Mapping[str, Any], faces: Sequence[Mapping[str, Any]]) -> Any:
+def flat_objects(
+    lab: Lab, rows: Mapping[str, Any], faces: Sequence[Mapping[str, Any]]
+) -> list[dict[str, Any]]:
     """Return, for each object that was touched, its name, whether a face is bad, and its picture.
 
     `rows` are columns of `trial.COLUMNS`; `faces` the lines `objects.faces` of `results.json`.
     """
-    held: dict[str, list[FlatFace]] = {}
-    shapes = {(face.object, face.face): face for face in _faces_of(lab)}
+    every = (one.face(number) for one in lab.arrays for number in range(len(one.faces)))
+    shapes = {(face.object, face.face): face for face in every}
     touched = {name: rows["object"] == name for name in {line["object"] for line in faces}}
+    held: dict[str, list[FlatFace]] = {}
     for line in faces:
         shape = shapes[line["object"], line["face"]]
         here = np.flatnonzero(touched[line["object"]])
@@ -65,7 +68,8 @@ def flat_objects(lab: Lab, rows: Mapping[str, Any], faces: Sequence[Mapping[str,
         by = {v: at[rows["verdict"][here] == v] for v in (RIGHT, REJECTED, WRONG)}
         flat = FlatFace(line["face"], shape.polygon_mm, shape.centres_mm, by, line["bad"])
         held.setdefault(line["object"], []).append(flat)
-    scale = _scale([flat for each in held.values() for flat in each])
+    boxes = (flat.box_mm for each in held.values() for flat in each)
+    scale = MOST / max((float((far - low).max()) for low, far in boxes), default=1.0)
     return [
         {"object": name, "bad": any(flat.bad for flat in each), "svg": draw_flat(each, scale)}
         for name, each in held.items()
@@ -100,16 +104,17 @@ def _panel(face: FlatFace, left: float, top: float, scale: float) -> str:
         at: Array = (points - (low[0], far[1])) * (scale, -scale) + (left, top)
         return at
 
-    outline = "".join(f"M{_path(on_page(loop))}Z" for loop in face.loops_mm)
+    outline = "".join(
+        f"M{'L'.join(f'{x:.1f} {y:.1f}' for x, y in on_page(loop))}Z" for loop in face.loops_mm
+    )
     count = {verdict: len(at) for verdict, at in face.touches_mm.items()}
     words = ", ".join(f"{n} {WORDS[v]}" for v, n in count.items() if n) or "not touched"
-    colour = COLOURS[WRONG] if face.bad else INK
+    ink, fill, edge = (COLOURS[WRONG], BAD, COLOURS[WRONG]) if face.bad else (INK, FACE, "#9aa1ab")
     svg = (
-        f'<text x="{left:.0f}" y="{top - 18:.0f}" fill="{colour}" font-weight="bold">'
+        f'<text x="{left:.0f}" y="{top - 18:.0f}" fill="{ink}" font-weight="bold">'
         f"{escape(face.name)}</text>"
-        f'<text x="{left:.0f}" y="{top - 5:.0f}" fill="{colour}" font-size="9">{words}</text>'
-        f'<path d="{outline}" fill="{BAD if face.bad else FACE}" fill-rule="evenodd" '
-        f'stroke="{colour if face.bad else "#9aa1ab"}"/>'
+        f'<text x="{left:.0f}" y="{top - 5:.0f}" fill="{ink}" font-size="9">{words}</text>'
+        f'<path d="{outline}" fill="{fill}" fill-rule="evenodd" stroke="{edge}"/>'
     )
     svg += _dots(on_page(face.symbols_mm), SYMBOL, max(1.0, DOT * 0.6))
     for verdict in (RIGHT, REJECTED, WRONG):
@@ -129,19 +134,3 @@ def _dots(at: Array, colour: str, size: float) -> str:
         f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{size:.1f}" '
         f'style="stroke-linecap:round"/>'
     )
-
-
-def _path(points: Array) -> str:
-    return "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
-
-
-def _scale(faces: Sequence[FlatFace]) -> float:
-    """Return px a mm, so that the largest face is as large as it may be."""
-    sides = [float((far - low).max()) for low, far in (face.box_mm for face in faces)]
-    return MOST / max(sides, default=1.0)
-
-
-def _faces_of(lab: Lab) -> Iterable[EncodedFace]:
-    for encoding in lab.arrays:
-        for number in range(len(encoding.faces)):
-            yield encoding.face(number)

@@ -24,9 +24,12 @@ from recognizer.validation.trial import REJECTED, RIGHT, WRONG
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.backend_bases import FigureCanvasBase
+    from matplotlib.figure import Figure
     from matplotlib.text import Annotation
 
-COLOURS = {RIGHT: "#2a7f62", WRONG: "#c0392b", REJECTED: "#8a8f98"}
+GREEN, RED, GREY = "#2a7f62", "#c0392b", "#8a8f98"
+COLOURS = {RIGHT: GREEN, WRONG: RED, REJECTED: GREY}
 DOTS = COLOURS | {REJECTED: "#d98c00"}  #: grey would be taken for a symbol
 WORDS = {RIGHT: "right", WRONG: "wrong", REJECTED: "refused"}  #: as pages say them
 LEVEL_COLOURS = {"low": "#4c9f70", "typical": "#2f6db3", "hard": "#b8860b", "mismatch": "#b0413e"}
@@ -63,14 +66,11 @@ def svg_figure(rows: int, columns: int, size: tuple[float, float]) -> Iterator[S
     """Yield a figure of some inches; its SVG is there at the end."""
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure
 
     with matplotlib.rc_context(_SETTINGS):
-        figure = Figure(figsize=size, layout="constrained")
-        FigureCanvasSVG(figure)
-        drawn = SvgFigure(list(figure.subplots(rows, columns, squeeze=False).flat))
+        figure, axes = _figure(FigureCanvasSVG, rows, columns, size)
+        drawn, text = SvgFigure(axes), io.StringIO()
         yield drawn
-        text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
     drawn.svg = svg[svg.index("<svg") :]
@@ -83,15 +83,23 @@ def figure_on(
     """Yield axes, without a grid, of a picture that is written at the end: .png, .svg, .pdf."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
     with matplotlib.rc_context(_SETTINGS | {"axes.grid": False}):
-        figure = Figure(figsize=size, layout="constrained")
-        FigureCanvasAgg(figure)
-        yield list(figure.subplots(rows, columns, squeeze=False).flat)
+        figure, axes = _figure(FigureCanvasAgg, rows, columns, size)
+        yield axes
         undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
         metadata: dict[str, None] = undated.get(path.suffix.lower(), {})
         figure.savefig(path, dpi=110, metadata=metadata)
+
+
+def _figure(
+    canvas: type[FigureCanvasBase], rows: int, columns: int, size: tuple[float, float]
+) -> tuple[Figure, list[Axes]]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    canvas(figure)
+    return figure, list(figure.subplots(rows, columns, squeeze=False).flat)
 
 
 def confusion(objects: dict[str, Any]) -> str:
@@ -124,18 +132,20 @@ def pose(rows: dict[str, Any]) -> str:
     if not right.any():
         return ""
     colours = level_colours(rows["level"])
+    of_level = {level: right & (rows["level"] == level) for level in colours}
+    of_level = {level: where for level, where in of_level.items() if where.any()}
     with svg_figure(1, 3, (11.5, 3.2)) as picture:
         axes = picture.axes
         for axis, name, label in (
             (axes[0], "error_mm", "error of the place, mm"),
             (axes[1], "error_deg", "error of the turn, degrees"),
         ):
-            for level, colour in colours.items():
-                errors = np.sort(np.abs(rows[name][right & (rows["level"] == level)]))
-                if len(errors):
-                    shares = np.linspace(0, 100, len(errors) + 1)[1:]
-                    keep = np.unique(np.linspace(0, len(errors) - 1, 200).astype(int))
-                    axis.step(errors[keep], shares[keep], where="post", color=colour, label=level)
+            for level, where in of_level.items():
+                errors = np.sort(np.abs(rows[name][where]))
+                shares = np.linspace(0, 100, len(errors) + 1)[1:]
+                keep = np.unique(np.linspace(0, len(errors) - 1, 200).astype(int))
+                axis.step(errors[keep], shares[keep], where="post", color=colours[level],
+                          label=level)  # fmt: skip
             axis.set_xlabel(label)
             axis.set_ylabel("right answers with no more, %")
             axis.set_ylim(0, 101)
@@ -144,11 +154,9 @@ def pose(rows: dict[str, Any]) -> str:
         expected = np.linspace(0.01, 0.99, 99)
         limits = np.array([chi2_quantile(p) for p in expected])
         axes[2].plot([0, 100], [0, 100], color="black", lw=0.8, ls="--")
-        for level, colour in colours.items():
-            chi2 = rows["chi2"][right & (rows["level"] == level)]
-            if len(chi2):
-                found = (chi2[None] < limits[:, None]).mean(axis=1)
-                axes[2].plot(100 * expected, 100 * found, color=colour, label=level)
+        for level, where in of_level.items():
+            found = (rows["chi2"][where][None] < limits[:, None]).mean(axis=1)
+            axes[2].plot(100 * expected, 100 * found, color=colours[level], label=level)
         axes[2].set_xlabel("ellipsoid of the covariance that should hold, %")
         axes[2].set_ylabel("and holds, % of the right answers")
     return picture.svg
@@ -162,10 +170,8 @@ def accuracy(results: dict[str, Any]) -> str:
         above, below = axes[: len(names) + 1], axes[len(names) + 1 :]
         levels = results["levels"]
         places = np.arange(len(levels))
-        _share(above[0], places, [line["answered"] for line in levels], marker="o")
-        below[0].plot(
-            places, [number_or_nan(line["rms_mm"]) for line in levels], "o", color="black"
-        )
+        _shares(above[0], places, levels, marker="o")
+        below[0].plot(places, _rms_mm(levels), "o", color="black")
         for axis in (above[0], below[0]):
             axis.set_xticks(places, [line["level"] for line in levels], rotation=30, ha="right")
             axis.set_xlim(-0.5, max(len(levels), 1) - 0.5)
@@ -173,11 +179,10 @@ def accuracy(results: dict[str, Any]) -> str:
         for name, top, bottom in zip(names, above[1:], below[1:], strict=True):
             bins = results["against"][name]["bins"]
             middle = np.array([(line["low"] + line["high"]) / 2 for line in bins])
-            _share(top, middle, [line["answered"] for line in bins])
+            _shares(top, middle, bins)
             wrong = [100 * line["wrongly"]["share"] for line in bins]
             top.plot(middle, wrong, "x", color=COLOURS[WRONG])
-            rms = [number_or_nan(line["rms_mm"]) for line in bins]
-            bottom.plot(middle, rms, "o-", color="black", ms=3)
+            bottom.plot(middle, _rms_mm(bins), "o-", color="black", ms=3)
             bottom.set_xlabel(_NAMES[name])
         above[0].set_ylabel("answered, %; wrong (x), %")
         below[0].set_ylabel("place, rms, mm")
@@ -186,6 +191,21 @@ def accuracy(results: dict[str, Any]) -> str:
         for axis in below:
             axis.set_ylim(bottom=0)
     return picture.svg
+
+
+def _shares(axis: Axes, at: Any, lines: list[dict[str, Any]], marker: str = ".") -> None:
+    """Draw the shares that are answered, with their intervals, in percent."""
+    value, low, high = (
+        np.array([100 * line["answered"][end] for line in lines])
+        for end in ("share", "low", "high")
+    )
+    ends = value - low, high - value
+    axis.errorbar(at, value, ends, fmt=marker, color=COLOURS[RIGHT], capsize=2)
+
+
+def _rms_mm(lines: list[dict[str, Any]]) -> list[float]:
+    """Return the errors of the place, NaN for None."""
+    return [np.nan if line["rms_mm"] is None else line["rms_mm"] for line in lines]
 
 
 def level_colours(levels: Any) -> dict[str, str]:
@@ -215,26 +235,8 @@ def margins(rows: dict[str, Any]) -> str:
     return picture.svg
 
 
-def _share(axis: Axes, at: Any, shares: list[dict[str, Any]], marker: str = ".") -> None:
-    """Draw shares with their intervals, in percent."""
-    value = np.array([100 * share["share"] for share in shares])
-    low = value - np.array([100 * share["low"] for share in shares])
-    high = np.array([100 * share["high"] for share in shares]) - value
-    axis.errorbar(at, value, (low, high), fmt=marker, color=COLOURS[RIGHT], capsize=2)
-
-
-def number_or_nan(value: float | None) -> float:
-    """Return a number, for what is None as well."""
-    return np.nan if value is None else value
-
-
-TINTS = {HOLDS: "#2a7f62", FAILS: "#c0392b"}  #: of a state; others are grey
-GREY, REFUSED_STRANGER = "#8a8f98", "#7fae9d"
-
-
-def world_name(line: dict[str, Any]) -> str:
-    """Return a world in a line."""
-    return f"{line['run']}: {line['engine']}, {line['surface']}, {line['sensor']}"
+TINTS = {HOLDS: GREEN, FAILS: RED}  #: of a state; others are grey
+REFUSED_STRANGER = "#7fae9d"
 
 
 def draw_answers(worlds: Sequence[dict[str, Any]]) -> str:
@@ -272,26 +274,25 @@ def draw_errors(worlds: Sequence[dict[str, Any]]) -> str:
         return ""
     with svg_figure(1, 3, (11.5, 1.0 + 0.27 * len(shown))) as picture:
         axes = picture.axes
-        for axis, name, label in (
-            (axes[0], "mm", "place, rms, mm"),
-            (axes[1], "deg", "turn, rms, degrees"),
+        for axis, name, bound, label in (
+            (axes[0], "rms_mm", RMS_MM, "place, rms, mm"),
+            (axes[1], "rms_deg", RMS_DEG, "turn, rms, degrees"),
         ):
             places = _rows_of(axis, shown)
-            top = 1.3 * max(line[f"rms_{name}"] for line in shown)
+            top = 1.3 * max(line[name] for line in shown)
             for y, line in zip(places, shown, strict=True):
-                low, high = line[f"rms_{name}_95"]
-                ends = low, min(top, np.inf if high is None else high)
-                _interval(axis, y, line[f"rms_{name}"], ends, line["states"][f"rms_{name}"])
-            axis.axvline(RMS_MM if name == "mm" else RMS_DEG, color="black", lw=0.8,
-                         ls="--")  # fmt: skip
-            axis.set_xlim(0, max(top, 1.1 * (RMS_MM if name == "mm" else RMS_DEG)))
+                low, high = line[f"{name}_95"]
+                ends = low, top if high is None else min(top, high)
+                _interval(axis, y, line[name], ends, line["states"][name])
+            axis.axvline(bound, color="black", lw=0.8, ls="--")
+            axis.set_xlim(0, max(top, 1.1 * bound))
             axis.set_xlabel(label)
         places = _rows_of(axes[2], shown)
         for y, line in zip(places, shown, strict=True):
             share = line["inside_95"]
             ends = 100 * share["low"], 100 * share["high"]
             _interval(axes[2], y, 100 * share["share"], ends, line["states"]["inside_95"])
-        axes[2].axvspan(*(100 * end for end in INSIDE), color="#2a7f62", alpha=0.12, lw=0)
+        axes[2].axvspan(*(100 * end for end in INSIDE), color=GREEN, alpha=0.12, lw=0)
         axes[2].set_xlim(0, 101)
         axes[2].set_xlabel("inside the 95 % ellipsoid, %")
         for axis in axes[1:]:
@@ -302,7 +303,8 @@ def draw_errors(worlds: Sequence[dict[str, Any]]) -> str:
 def _rows_of(axis: Axes, worlds: Sequence[dict[str, Any]]) -> np.ndarray:
     """Give every world a row, the first on top; return their places."""
     places = np.arange(len(worlds))
-    axis.set_yticks(places, [world_name(line) for line in worlds])
+    names = (f"{w['run']}: {w['engine']}, {w['surface']}, {w['sensor']}" for w in worlds)
+    axis.set_yticks(places, list(names))
     axis.set_ylim(len(worlds) - 0.4, -0.6)
     axis.grid(visible=False, axis="y")
     return places
@@ -358,7 +360,7 @@ def label_points(axes: Axes, points: Sequence[Point]) -> list[Annotation]:
         text.set_position(offset)
         if math.hypot(*offset) - size[0] / 2 >= LINE_FROM:
             axes.annotate("", (x, y), offset, textcoords="offset points", annotation_clip=False,
-                          arrowprops={"arrowstyle": "-", "lw": 0.5, "color": "#8a8f98",
+                          arrowprops={"arrowstyle": "-", "lw": 0.5, "color": GREY,
                                       "shrinkA": 4, "shrinkB": 3}).set_in_layout(False)  # fmt: skip
         taken.append(box)
         found.append(text)
@@ -385,7 +387,7 @@ def _free_place(
 
 
 def boxes_overlap(one: Box, other: Box) -> bool:
-    """Return whether two boxes share an area."""
+    """Whether two boxes share an area."""
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
@@ -396,8 +398,7 @@ def work_precision(study: dict[str, Any], times: dict[str, Any], used: str = "")
     contact model of this run, which is ringed.
     """
     with svg_figure(2, 2, (11.5, 8.0)) as picture:
-        axes = picture.axes
-        draw_work_precision(axes, study, times, used)
+        draw_work_precision(picture.axes, study, times, used)
     return picture.svg
 
 
@@ -405,26 +406,25 @@ def draw_work_precision(
     axes: list[Axes], study: Mapping[str, Any], times: Mapping[str, Any], used: str
 ) -> list[Annotation]:
     """Draw four pictures; return the names of their points."""
-    panels = [_contact_points(axes[0], study, times, used)]
-    decoders = zip(study["decoders"], times["decoders"], strict=True)
-    panels.append(
-        [
-            (1e3 * ms, 100 * (1 - line["right"] / line["windows"]), line["decoder"])
-            for line, ms in decoders
-        ]
+    contact, decoders, readers = (
+        list(zip(times[name], study[name], strict=True))
+        for name in ("contact", "decoders", "readers")
     )
-    readers = list(zip(study["readers"], times["readers"], strict=True))
-    panels.append(
-        [(ms, 100 * (1 - line["right"] / line["touches"]), line["reader"]) for line, ms in readers]
-    )
-    panels.append([(ms, number_or_nan(line["rms_mm"]), line["reader"]) for line, ms in readers])
-    titles = (
-        ("contact models and engines", "largest error of an image, %", "ms"),
-        ("decoders, 5 % wrong symbols", "windows not answered right, %", "µs"),
-        ("readers", "touches not answered right, %", "ms"),
-        ("readers", "place, rms, mm", "ms"),
-    )
-    for axis, points, (title, label, unit) in zip(axes, panels, titles, strict=True):
+    places = _rms_mm(study["readers"])
+    panels: list[tuple[str, str, str, list[Point]]] = [
+        ("contact models and engines", "largest error of an image, %", "ms",
+         [(ms, 100 * line["error"], line["level"]) for ms, line in contact]),
+        ("decoders, 5 % wrong symbols", "windows not answered right, %", "µs",
+         [(1e3 * ms, 100 * (1 - line["right"] / line["windows"]), line["decoder"])
+          for ms, line in decoders]),
+        ("readers", "touches not answered right, %", "ms",
+         [(ms, 100 * (1 - line["right"] / line["touches"]), line["reader"])
+          for ms, line in readers]),
+        ("readers", "place, rms, mm", "ms",
+         [(ms, mm, line["reader"]) for (ms, line), mm in zip(readers, places, strict=True)]),
+    ]  # fmt: skip
+    _draw_contact(axes[0], [line["series"] for _, line in contact], panels[0][3], used)
+    for axis, (title, label, unit, points) in zip(axes, panels, strict=True):
         if axis is not axes[0]:
             _scatter(axis, points)
         axis.set_title(title)
@@ -434,31 +434,20 @@ def draw_work_precision(
     for axis in axes[1:]:
         top = max(axis.get_ylim()[1], 1e-3)
         axis.set_ylim(-0.12 * top, 1.15 * top)
-    names = []
-    for axis, points in zip(axes, panels, strict=True):
-        names += label_points(axis, points)
-    return names
+    named = (label_points(axis, panel[3]) for axis, panel in zip(axes, panels, strict=True))
+    return [text for texts in named for text in texts]
 
 
-def _contact_points(
-    axis: Axes, study: Mapping[str, Any], times: Mapping[str, Any], used: str
-) -> list[Point]:
-    """Draw a line for each overlay and each engine; return their points."""
-    lines = list(zip(study["contact"], times["contact"], strict=True))
-    found: list[Point] = []
-    for number, name in enumerate(dict.fromkeys(line["series"] for line, _ in lines)):
-        points = [(ms, 100 * line["error"], line["level"])
-                  for line, ms in lines if line["series"] == name]  # fmt: skip
-        x, y, _levels = zip(*points, strict=True)
+def _draw_contact(axis: Axes, series: list[str], points: list[Point], used: str) -> None:
+    """Draw a line for each overlay and each engine, and a ring about the level in use."""
+    for number, name in enumerate(dict.fromkeys(series)):
+        own = [point for point, of in zip(points, series, strict=True) if of == name]
+        x, y, _levels = zip(*own, strict=True)
         axis.loglog(x, y, "os^vD"[number % 5] + "-", lw=1, label=name, mfc="none")
-        for ms, error, level in points:
+        for ms, error, level in own:
             if level == used:
-                axis.plot(
-                    [ms], [error], "o", ms=10, mfc="none", mec="black", ls="", label="this run"
-                )
-        found += points
+                axis.plot(ms, error, "o", ms=10, mfc="none", mec="black", label="this run")
     axis.legend(frameon=False, loc="lower left")
-    return found
 
 
 def _scatter(axis: Axes, points: list[Point]) -> None:

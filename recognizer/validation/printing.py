@@ -1,6 +1,6 @@
 """The parts of a set, printed in simulation before they are touched. Resumable.
 
-RunRecord + folder -> `printed.json`: which surface is which face. The surfaces lie in
+Work + folder -> `printed.json`: which surface is which face. The surfaces lie in
 `printed/` of the run, or in a folder that runs share; what is there is not printed again.
 """
 
@@ -22,10 +22,10 @@ from probe.simulate.printed import (
     read_listing,
 )
 from probe.simulate.registered import registered_object, registered_objects
-from recognizer.validation.campaign import Campaign
+from recognizer.validation.campaign import Campaign, Work
 from recognizer.validation.errors import ValidationError, WorkersError
 from recognizer.validation.files import write_text
-from recognizer.validation.run import PRINTS, RunRecord, TouchProgress, absolute_database
+from recognizer.validation.run import PRINTS, TouchProgress
 from recognizer.validation.touch_plan import check_file, stl_part
 from recognizer.validation.workers import run_pool
 
@@ -38,20 +38,11 @@ def print_options(campaign: Campaign) -> PrintOptions:
 
 
 def print_set(
-    record: RunRecord, folder: Path, shared: Path | None, processes: int, progress: TouchProgress
+    work: Work, folder: Path, shared: Path | None, processes: int, progress: TouchProgress
 ) -> None:
     """Print what is not printed yet, and write the listing when all of it is there.
 
-    Parameters
-    ----------
-    record, folder
-        The run.
-    shared
-        Folder of prints that runs share; the run's own if None.
-    processes
-        How many parts are printed at a time.
-    progress
-        Hears how far it is.
+    `shared` is a folder of prints that runs share; the run's own if None.
 
     Raises
     ------
@@ -65,8 +56,8 @@ def print_set(
     listing = folder / PRINTS
     if listing.exists() and read_listing(str(listing)).complete():
         return
-    options, prints = print_options(record.campaign), shared or folder / FOLDER
-    parts = find_parts(absolute_database(record.database, folder))
+    options, prints = print_options(work.campaign), shared or folder / FOLDER
+    parts = find_parts(work.database)
     left = [part for part in parts if part.left(options, prints)]
     progress.begin("printing", len(parts), len(parts) - len(left))
     if processes == 1:
@@ -88,13 +79,7 @@ def print_set(
 
 
 def find_parts(database: str) -> list[PartToPrint]:
-    """Return the parts of a set that bear symbols, their files checked.
-
-    Raises
-    ------
-    SetError, ValidationError
-        See `print_set`.
-    """
+    """Return the parts of a set that bear symbols, their files checked; errors as `print_set`."""
     url = normal_url(database)
     parts: list[PartToPrint] = []
     for name in registered_objects(database):

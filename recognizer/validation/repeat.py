@@ -13,18 +13,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.alphabet import Alphabet
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
-from recognizer.touch.symbols.fit import Fit, fit_lattices
-from recognizer.validation.campaign import plan_of, series_of
+from recognizer.touch.symbols.fit import fit_lattices
+from recognizer.validation.campaign import series_of
 from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.pictures import figure_on
 from recognizer.validation.run import read_record
-from recognizer.validation.trial import find_face, judge, row_of, symbols_in_view
-from recognizer.validation.workers import prepare_reader
+from recognizer.validation.trial import find_face, judge
+from recognizer.validation.workers import reader_now
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,23 +32,13 @@ Array = NDArray[np.float64]
 
 GRID = 240  #: points of the picture of a surface, each way
 FORMATS = (".png", ".svg", ".pdf")
+TRUTH, ANSWER = "#b0413e", "#2f6db3"
 
 
 def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]:
-    """Do a touch again.
+    """Do a touch of a run again, and write a picture of it if `plot` is given.
 
-    Parameters
-    ----------
-    folder
-        Of a run, done or not.
-    number
-        Of the touch.
-    plot
-        Picture to write; None: none.
-
-    Returns
-    -------
-    The touch as a row of `trials.parquet` holds it.
+    Returns the touch as a row of `trials.parquet` holds it; None for what is no number.
 
     Raises
     ------
@@ -62,22 +51,22 @@ def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]
             fix=f"give {', '.join(FORMATS)}",
             place=str(plot),
         )
-    record = read_record(folder)
-    series = series_of(record.campaign)[0]
+    work = read_record(folder)
+    series = series_of(work.campaign)[0]
     if number >= series.touches:
         raise ValidationError(
             f"touch {number} of {series.touches}",
             fix=f"give 0 ... {series.touches - 1}",
             place=str(folder),
         )
-    work = record.work_now(folder)
-    reader = prepare_reader(work)
-    kind, plan = plan_of(record.campaign, series, work.database, number, work.labs, work.prints)
+    reader, plan = reader_now(work), work.plan(series, number)
     found = draw_touch(plan, number, reader)
     answer = recognise(reader, reader.signal(found.counts), number)
-    trial = judge(plan, number, found, answer, 0.0)
-    row = row_of(trial, kind, symbols_in_view(reader.lab, reader.sensor, trial))
-    row = {name: _or_none(value) for name, value in row.items()}
+    row = judge(plan, number, found, answer, reader).row()
+    row = {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in row.items()
+    }
     if plot is not None:
         with figure_on(plot, 2, 2, (10.5, 10.0)) as axes:
             _draw_surface(axes[0], found, reader)
@@ -85,11 +74,6 @@ def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]
             _draw_fit(axes[2], found, reader)
             _draw_answer(axes[3], found, reader, answer, row)
     return row
-
-
-def _or_none(value: Any) -> Any:
-    """Return a value, None for what is no number or has no bound."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _draw_surface(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
@@ -105,44 +89,42 @@ def _draw_surface(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
         shown, origin="lower", extent=(x[0], x[-1], y[0], y[-1]), cmap="Greys_r", aspect="equal"
     )
     axis.figure.colorbar(image, ax=axis, shrink=0.8, label="height over the face, mm")
-    axis.plot(*_outline(reader, touch.x_mm, touch.y_mm, touch.theta_rad), color="#b0413e")
+    axis.plot(*_outline(reader, touch.x_mm, touch.y_mm, touch.theta_rad), color=TRUTH)
     axis.set_title("1  what is touched, and where the sensor stands")
-    axis.set_xlabel("x of the surface, mm")
-    axis.set_ylabel("y of the surface, mm")
+    _label(axis, "surface")
 
 
 def _draw_counts(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
     image = axis.imshow(found.counts, extent=_extent(reader), cmap="viridis")
     axis.figure.colorbar(image, ax=axis, shrink=0.8, label="counts")
     axis.set_title("2  what the sensor reads")
-    _sensor_labels(axis)
+    _label(axis, "sensor")
 
 
 def _draw_fit(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
     """Draw the likeliest lattice and its symbols over the counts."""
     axis.imshow(found.counts, extent=_extent(reader), cmap="Greys")
     signal = reader.signal(found.counts)
-    best: tuple[float, Fit, Alphabet, float] | None = None
-    for prepared in reader.prepared if signal.contact else ():
-        encoding, image = prepared.embossed, reader.image(signal, prepared)
-        for fit in fit_lattices(image, prepared.bank, reader.options.first):
-            if best is None or fit.value > best[0]:
-                best = (fit.value, fit, encoding.alphabet, encoding.style.pitch_mm)
-    if best is not None:
-        _, fit, alphabet, pitch = best
+    fits = [
+        (fit, prepared.embossed)
+        for prepared in (reader.prepared if signal.contact else ())
+        for fit in fit_lattices(reader.image(signal, prepared), prepared.bank, reader.options.first)
+    ]
+    if fits:
+        fit, embossed = max(fits, key=lambda one: one[0].value)
+        glyphs, pitch = embossed.alphabet.glyphs, embossed.style.pitch_mm
+        c, s = math.cos(fit.theta_rad), math.sin(fit.theta_rad)
         for cell, scores in zip(fit.cells, fit.scores, strict=True):
             label = int(np.argmax(scores))
-            if label == len(alphabet.glyphs):
-                continue  # no symbol
-            for stroke in alphabet.glyphs[label].strokes:
-                line = (cell + 0.5) * pitch + np.array(stroke) * alphabet.reach * pitch
-                at = _to_sensor_frame(line, fit.x_mm, fit.y_mm, fit.theta_rad)
-                axis.plot(*at.T, color="#2f6db3", lw=2.5, alpha=0.8)
+            for stroke in glyphs[label].strokes if label < len(glyphs) else ():
+                line = (cell + 0.5) * pitch + np.array(stroke) * embossed.alphabet.reach * pitch
+                at = (line - (fit.x_mm, fit.y_mm)) @ np.array([[c, -s], [s, c]])  # sensor frame
+                axis.plot(*at.T, color=ANSWER, lw=2.5, alpha=0.8)
     axis.set_title("3  the symbols that the likeliest lattice shows")
-    half = reader.sensor.half_mm
-    axis.set_xlim(-half[0], half[0])
-    axis.set_ylim(-half[1], half[1])
-    _sensor_labels(axis)
+    left, right, bottom, top = _extent(reader)
+    axis.set_xlim(left, right)
+    axis.set_ylim(bottom, top)
+    _label(axis, "sensor")
 
 
 def _draw_answer(
@@ -156,24 +138,19 @@ def _draw_answer(
         held = find_face(reader.lab, scene.object_name, scene.face)
         if held is not None:
             axis.plot(*held[0].centres_mm.T, ".", color="#aab0b8", ms=3)
-        axis.plot(
-            *_outline(reader, touch.x_mm, touch.y_mm, touch.theta_rad),
-            color="#b0413e",
-            label="truth",
-        )
+        outline = _outline(reader, touch.x_mm, touch.y_mm, touch.theta_rad)
+        axis.plot(*outline, color=TRUTH, label="truth")
     T = answer.T_face_probe
     if answer and T is not None:
-        turn = math.atan2(T[1, 0], T[0, 0])
         own = scene is not None and (answer.object, answer.face) == (scene.object_name, scene.face)
         label = "answer" if own else f"answer, on {answer.object}/{answer.face}"
-        outline = _outline(reader, float(T[0, 3]), float(T[1, 3]), turn)
-        axis.plot(*outline, "--", color="#2f6db3", label=label)
+        outline = _outline(reader, T[0, 3], T[1, 3], math.atan2(T[1, 0], T[0, 0]))
+        axis.plot(*outline, "--", color=ANSWER, label=label)
     outcome = row["verdict"] + (f": {row['reason']}" if row["reason"] else "")
     if row["error_mm"] is not None:
         outcome += f", off by {row['error_mm']:.3f} mm, {row['error_deg']:.2f} degrees"
     axis.set_title(f"4  {outcome}")
-    axis.set_xlabel("x of the face, mm")
-    axis.set_ylabel("y of the face, mm")
+    _label(axis, "face")
     axis.set_aspect("equal")
     if axis.get_legend_handles_labels()[0]:
         axis.legend(frameon=False)
@@ -188,18 +165,11 @@ def _outline(reader: Reader, x: float, y: float, theta: float) -> Array:
     return outline
 
 
-def _to_sensor_frame(points: Array, x: float, y: float, theta: float) -> Array:
-    """Take points of the lattice to the sensor frame."""
-    c, s = math.cos(theta), math.sin(theta)
-    moved: Array = (points - (x, y)) @ np.array([[c, -s], [s, c]])
-    return moved
-
-
 def _extent(reader: Reader) -> tuple[float, float, float, float]:
     a, b = reader.sensor.half_mm
     return (-a, a, -b, b)
 
 
-def _sensor_labels(axis: Axes) -> None:
-    axis.set_xlabel("x of the sensor, mm")
-    axis.set_ylabel("y of the sensor, mm")
+def _label(axis: Axes, frame: str) -> None:
+    axis.set_xlabel(f"x of the {frame}, mm")
+    axis.set_ylabel(f"y of the {frame}, mm")

@@ -16,7 +16,7 @@ import numpy as np
 from encoded_objects.base.errors import require
 from encoded_objects.base.pages import page_environment
 from recognizer.validation import pictures
-from recognizer.validation.campaign import FILES, PRINTED, series_of
+from recognizer.validation.campaign import FILES, PRINTED, Work, series_of
 from recognizer.validation.extremes import extremes
 from recognizer.validation.files import (
     TIMES,
@@ -27,10 +27,8 @@ from recognizer.validation.files import (
     write_text,
 )
 from recognizer.validation.flat_faces import flat_objects
-from recognizer.validation.pictures import work_precision
-from recognizer.validation.provenance import judging_limits, provenance
+from recognizer.validation.provenance import RULE, provenance
 from recognizer.validation.results import results_of, world_times
-from recognizer.validation.run import RunRecord
 from recognizer.validation.statistics import FAILS, HOLDS, UNTOLD
 from recognizer.validation.studies import (
     contact_study,
@@ -40,13 +38,14 @@ from recognizer.validation.studies import (
     work_avoided,
 )
 from recognizer.validation.touch_plan import TouchPlan
-from recognizer.validation.workers import prepare_reader
+from recognizer.validation.workers import reader_now
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 PAGE, REPORT = "report.html.j2", "report.html"
 TRIALS, RESULTS, TIMES_FILE = "trials.parquet", "results.json", "times.json"
+NONE = "–"  #: for what is not known
 
 
 def require_report(command: str) -> None:
@@ -68,7 +67,7 @@ def page_of(
         "pose": pictures.pose(rows),
         "against": pictures.accuracy(results),
         "margins": pictures.margins(rows),
-        "work": work_precision(study, times, level) if study else "",
+        "work": pictures.work_precision(study, times, level) if study else "",
     }
     page = environment().get_template(PAGE)
     return page.render(r=results, times=times, pictures=drawn, flat=flat)
@@ -91,38 +90,35 @@ def _interval(ends: tuple[float, float | None], digits: int = 3) -> str:
 
 
 def _size(value: float | None, digits: int = 3) -> str:
-    return "–" if value is None else f"{value:.{digits}f}"
+    return NONE if value is None else f"{value:.{digits}f}"
 
 
 def _percent(value: float | None, digits: int = 1) -> str:
-    return "–" if value is None else f"{100 * value:.{digits}f} %"
+    return NONE if value is None else f"{100 * value:.{digits}f} %"
 
 
-def _share(share: dict[str, Any], digits: int = 2) -> str:
+def _share(share: dict[str, Any]) -> str:
     """Return a share with its interval."""
     if share["share"] is None:
-        return "–"
-    low, high = (f"{100 * share[name]:.{digits}f}" for name in ("low", "high"))
-    return f"{100 * share['share']:.{digits}f} % ({low} … {high})"
+        return NONE
+    return f"{_percent(share['share'], 2)} ({100 * share['low']:.2f} … {100 * share['high']:.2f})"
 
 
 def _count(value: int | None) -> str:
-    return "–" if value is None else f"{value:,}"
+    return NONE if value is None else f"{value:,}"
 
 
-def write_results(record: RunRecord, folder: Path) -> dict[str, Any]:
+def write_results(work: Work, folder: Path) -> dict[str, Any]:
     """Write everything that follows from the touches; returns the results."""
-    campaign, work = record.campaign, record.work_now(folder)
-    series = series_of(campaign)
-    table = read_series(folder, series[0])
-    rows = columns_of(table)
-    spent = columns_of(read_series(folder, series[0], TIMES))
-    reader = prepare_reader(work)
-    origin = provenance(record, work.database)
+    campaign, reader = work.campaign, reader_now(work)
+    series = series_of(campaign)[0]
+    table = read_series(folder, series)
+    rows, spent = columns_of(table), columns_of(read_series(folder, series, TIMES))
+    origin = provenance(work, folder)
     results = results_of(rows, origin["campaign"])
     times: dict[str, Any] = {name: _cpu_ms(spent[name]) for name in ("drawing", "reading")}
     times["worlds"] = world_times(rows, spent, origin["campaign"])
-    results["rule"] = judging_limits()
+    results["rule"] = RULE
     results["study"], results["left_out"], results["engines"] = {}, [], engine_lines()
     if campaign.study:
         studies = {
@@ -130,9 +126,8 @@ def write_results(record: RunRecord, folder: Path) -> dict[str, Any]:
             "decoders": decoder_study(reader.lab.arrays[0], campaign.seed),
             "readers": reader_study(folder, campaign),
         }
-        plan = TouchPlan(work.database, campaign.seed, kind="face",
-                         files=campaign.surfaces == FILES, prints=work.prints,
-                         engine=campaign.engine)  # fmt: skip
+        plan = TouchPlan(work.database, campaign.seed, files=campaign.surfaces == FILES,
+                         prints=work.prints, engine=campaign.engine)  # fmt: skip
         avoided = work_avoided(reader, plan, studies["readers"])
         results["study"] = {name: study.counted for name, study in studies.items()}
         results["left_out"] = avoided.counted
@@ -153,7 +148,7 @@ def write_results(record: RunRecord, folder: Path) -> dict[str, Any]:
 
 
 def _cpu_ms(seconds: Any) -> dict[str, float]:
-    """Return quantiles of CPU times, ms."""
+    """Return median, 95 %, 99 % and mean of CPU times, ms."""
     at = {"median": 0.5, "p95": 0.95, "p99": 0.99}
     found = {name: float(np.quantile(seconds, q)) for name, q in at.items()}
     found["mean"] = float(np.mean(seconds))

@@ -2,16 +2,14 @@
 
 The order is that of the report: worlds and verdict, kinds and levels, confusion and faces, pose,
 what accuracy depends on, margins, the worst touches. A world is who computed the contact, what was
-touched, and which sensor. `studies` and `extremes` add theirs. CPU times are in `times.json`,
-because no two runs agree in them.
+touched, and which sensor. CPU times are in `times.json`, because no two runs agree in them.
 """
 
 from __future__ import annotations
 
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
 
@@ -44,12 +42,12 @@ FORMAT = 2  #: of `results.json`; 1 had no states of lines and no intervals of e
 WORST = 20
 QUANTILES = (0.5, 0.9, 0.99, 1.0)
 
-#: Edges of the bins of what accuracy is shown against, and the unit.
-BINS: dict[str, tuple[str, list[float]]] = {
-    "force_n": ("N", [20, 40, 60, 80, 100, 120]),
-    "tilt_deg": ("degrees", [0, 0.5, 1, 1.5, 2]),
-    "edge_mm": ("mm", [0, 3, 6, 9, 12, 15, 20, 30, 60]),
-    "symbols": ("symbols", [0, 2, 4, 6, 8, 10, 12, 14, 16, 20, 30, 60]),
+#: What accuracy is shown against: unit, edges of the bins, whether only for touches inside faces.
+BINS: dict[str, tuple[str, list[float], bool]] = {
+    "force_n": ("N", [20, 40, 60, 80, 100, 120], True),
+    "tilt_deg": ("degrees", [0, 0.5, 1, 1.5, 2], True),
+    "edge_mm": ("mm", [0, 3, 6, 9, 12, 15, 20, 30, 60], False),
+    "symbols": ("symbols", [0, 2, 4, 6, 8, 10, 12, 14, 16, 20, 30, 60], False),
 }
 SURFACES = {"files": "written files", "database": "registered faces"}
 ALL = "all of them"  #: sensors
@@ -90,21 +88,8 @@ def line_of(rows: Columns, where: Mask) -> dict[str, Any]:
     return line | {"state": state, "inside_state": inside_state}
 
 
-def face_is_bad(line: dict[str, Any]) -> bool:
-    """Return whether a face needs a look: its bound fails, or too few touches are answered.
-
-    The line is of all its touches that are not worn; a face whose touches all show too few symbols
-    is bad as well, though no answer is expected of it.
-    """
-    few = state_of(line["answered"], ">=", FACE_ANSWERED)
-    return FAILS in (line["state"], few)
-
-
 def _resampled(rows: Columns, where: Mask) -> int | None:
-    """Return how many draws were no touch: the plate slipped off, or found no rest.
-
-    None for rows of a version that did not count.
-    """
+    """Return how many draws were no touch; None for rows of a version that did not count."""
     texts: list[str | None] = rows["drawn_anew"][where].tolist() if "drawn_anew" in rows else [None]
     if None in texts:
         return None
@@ -144,10 +129,7 @@ def worlds_of(rows: Columns, campaign: Mapping[str, Any]) -> list[dict[str, Any]
 def world_times(
     rows: Columns, spent: Mapping[str, Any], campaign: Mapping[str, Any]
 ) -> list[dict[str, float]]:
-    """Return mean CPU times of a touch, ms, in the order of `worlds_of`.
-
-    `spent` has columns of CPU times in the order of the rows, s.
-    """
+    """Return mean CPU times of a touch, ms, in the order of `worlds_of`, from columns in s."""
     return [
         {
             name: round(1e3 * float(np.mean(spent[name][where])), 3)
@@ -166,14 +148,11 @@ def names_in(values: Any, order: Any) -> list[str]:
 
 def surface_name(campaign: Mapping[str, Any]) -> str:
     """Return in words what was touched; of prints also how they were made."""
-    surfaces = campaign.get("surfaces") or ("files" if campaign["files"] else "database")
-    name = SURFACES.get(surfaces, surfaces)
-    made = [
-        f"{word} {campaign[key]}"
-        for key, word in (("faults", "faults"), ("print_profile", "by"))
-        if campaign.get(key)
-    ]
-    return ", ".join([name, *made])
+    words = [SURFACES.get(campaign["surfaces"], campaign["surfaces"])]
+    for key, word in (("faults", "faults"), ("print_profile", "by")):
+        if campaign.get(key):
+            words.append(f"{word} {campaign[key]}")
+    return ", ".join(words)
 
 
 def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -181,12 +160,11 @@ def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict
 
     The campaign is as `results.json` has it; None: the usual one.
     """
-    given = asdict(Campaign()) if campaign is None else campaign
+    given = Campaign().as_json() if campaign is None else campaign
     verdicts, kinds, levels = rows["verdict"], rows["kind"], rows["level"]
     registered = rows["object"] != ""
     whole = registered & (kinds != "worn")
     fair = np.asarray(rows["enough"], bool)
-    inside = kinds == "face"
     everything = np.ones(len(kinds), bool)
     policy = {"policy": _until_answered(rows, given)} if given.get("policy") == NEXT else {}
     return policy | {
@@ -195,104 +173,87 @@ def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict
         "enough": line_of(rows, fair),
         "worlds": worlds_of(rows, given),
         "verdict": _verdict(rows, fair),
-        "kinds": [
-            {
-                "kind": kind,
-                "surface": surface,
-                **line_of(rows, (kinds == kind) & _surface_mask(rows, surface)),
-            }
-            for kind, surface in _kinds(rows, given["kinds"])
-        ],
+        "kinds": _kinds(rows, given["kinds"]),
         "levels": [
             {"level": level, **line_of(rows, (levels == level) & fair)}
             for level in names_in(levels[fair], given["levels"])
         ],
         "objects": _confusion(rows, registered),
         "reasons": dict(sorted(Counter(rows["reason"][verdicts == REJECTED].tolist()).items())),
-        "drawn_anew": _drawn_anew(rows),
+        "drawn_anew": dict(sorted(Counter(
+            why for text in rows["drawn_anew"] if text for why in text.split(" | ")
+        ).items())),
         "pose": _pose(rows, given["levels"]),
         "against": {
             name: {
                 "unit": unit,
-                "bins": _bins(rows, name, edges, inside if name in _INSIDE else whole),
+                "bins": _bins(rows, rows[name], edges, kinds == "face" if inside else whole),
             }
-            for name, (unit, edges) in BINS.items()
+            for name, (unit, edges, inside) in BINS.items()
         },
         "margins": _margins(rows),
         "worst": _worst_touches(rows, fair),
-    }
+    }  # fmt: skip
 
 
 def _until_answered(rows: Columns, given: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return how many touches it took until one was answered right, by kind; all faces first."""
-    right = rows["verdict"] == RIGHT
-    registered = rows["object"] != ""
-    found = []
-    masks = [("all faces", registered)]
+    masks = [("all faces", rows["object"] != "")]
     masks += [(kind, rows["kind"] == kind) for kind in names_in(rows["kind"], given["kinds"])]
+    found = []
     for kind, where in masks:
+        verdicts, made = rows["verdict"][where], rows["touches"][where]
         within = [
-            share_of(int((where & right & (rows["touches"] <= n)).sum()), int(where.sum()))
+            share_of(int(((verdicts == RIGHT) & (made <= n)).sum()), len(made))
             for n in range(1, MOST + 1)
         ]
-        made = rows["touches"][where]
         found.append(
             {
                 "kind": kind,
-                "touches": int(where.sum()),
+                "touches": len(made),
                 "within": within,
-                "wrong": int((where & (rows["verdict"] == WRONG)).sum()),
+                "wrong": int((verdicts == WRONG).sum()),
                 "made": round_digits(float(made.mean())) if len(made) else None,
             }
         )
     return found
 
 
-_INSIDE = ("force_n", "tilt_deg")  # shown for touches inside faces; the others for whole faces
-
-
-def _surface_mask(rows: Columns, surface: str) -> Mask:
-    found: Mask = np.ones(len(rows["kind"]), bool) if not surface else rows["surface"] == surface
-    return found
-
-
-def _kinds(rows: Columns, order: Any) -> list[tuple[str, str]]:
-    """Return every kind, those of several surfaces also by surface."""
+def _kinds(rows: Columns, order: Any) -> list[dict[str, Any]]:
+    """Return a line for every kind, and for each surface of those that have several."""
     found = []
     for kind in names_in(rows["kind"], order):
-        found.append((kind, ""))
-        surfaces = sorted(set(rows["surface"][rows["kind"] == kind].tolist()))
-        found += [(kind, name) for name in surfaces if len(surfaces) > 1]
+        of_kind = rows["kind"] == kind
+        found.append({"kind": kind, "surface": "", **line_of(rows, of_kind)})
+        surfaces = sorted(set(rows["surface"][of_kind].tolist()))
+        for name in surfaces if len(surfaces) > 1 else ():
+            line = line_of(rows, of_kind & (rows["surface"] == name))
+            found.append({"kind": kind, "surface": name, **line})
     return found
 
 
 def _verdict(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
     """Return each bound, what was found, and whether it holds."""
-    everything = line_of(rows, np.ones(len(fair), bool))
-    expected = line_of(rows, fair)
-    strong = rows["level"] == HARDEST
-    hard = line_of(rows, fair & strong) if (fair & strong).any() else expected
-    under = "under strong mismatch" if (fair & strong).any() else "all levels"
-    mm, degrees = (_size_found(hard, name) for name in ("mm", "deg"))
-    least, most = INSIDE
-    checks = [
-        ("wrong answers, all touches", everything["wrongly"], "=", 0.0, None, ""),
-        (_EXPECTED, expected["answered"], ">=", ANSWERED, None, ""),
-        (f"pose, rms, {under}", mm, "<=", RMS_MM, None, "mm"),
-        (f"turn, rms, {under}", degrees, "<=", RMS_DEG, None, "degrees"),
-        (_INSIDE_95, everything["inside_95"], "within", least, most, ""),
-    ]
+    everything, expected = line_of(rows, np.ones(len(fair), bool)), line_of(rows, fair)
+    strong = fair & (rows["level"] == HARDEST)
+    hard, under = expected, "all levels"
+    if strong.any():
+        hard, under = line_of(rows, strong), "under strong mismatch"
     found = []
-    for name, shown, sign, bound, upper, unit in checks:
+    for name, shown, sign, bound, upper, unit in (
+        ("wrong answers, all touches", everything["wrongly"], "=", 0.0, None, ""),
+        ("answered, of touches that show enough symbols", expected["answered"], ">=", ANSWERED,
+         None, ""),
+        (f"pose, rms, {under}", _size_found(hard, "mm"), "<=", RMS_MM, None, "mm"),
+        (f"turn, rms, {under}", _size_found(hard, "deg"), "<=", RMS_DEG, None, "degrees"),
+        ("right answers inside their own 95 % ellipsoid", everything["inside_95"], "within",
+         *INSIDE, ""),
+    ):  # fmt: skip
         state = state_of(shown, sign, bound, upper)
         line = {"name": name, "sign": sign, "bound": bound, "upper": upper, "unit": unit,
                 "holds": state == HOLDS, "state": state}  # fmt: skip
         found.append(line | shown)
     return found
-
-
-_EXPECTED = "answered, of touches that show enough symbols"
-_INSIDE_95 = "right answers inside their own 95 % ellipsoid"
 
 
 def _size_found(line: dict[str, Any], name: str) -> dict[str, Any]:
@@ -304,20 +265,17 @@ def _size_found(line: dict[str, Any], name: str) -> dict[str, Any]:
 def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
     """Return who was taken for whom: objects as a matrix, faces as the pairs that occurred."""
     names = sorted(set(rows["object"][on_face].tolist()), key=_natural_key)
-    answers = [str(answer).rpartition("/")[0] for answer in rows["answer"]]
     place = {name: i for i, name in enumerate(names)}
     matrix = np.zeros((len(names), len(names) + 1), int)
-    for i in np.flatnonzero(on_face).tolist():
-        matrix[place[rows["object"][i]], place.get(answers[i], len(names))] += 1
-    faces: dict[tuple[str, str], list[int]] = {}
+    faces: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
     confused: Counter[tuple[str, str]] = Counter()
-    for i in np.flatnonzero(on_face).tolist():
-        key = (rows["object"][i], rows["face"][i])
-        faces.setdefault(key, []).append(i)
+    for i, known in enumerate(on_face.tolist()):
+        held, face, answer = rows["object"][i], rows["face"][i], str(rows["answer"][i])
+        if known:
+            matrix[place[held], place.get(answer.rpartition("/")[0], len(names))] += 1
+            faces[held, face].append(i)
         if rows["verdict"][i] == WRONG:
-            confused[f"{key[0]}/{key[1]}", rows["answer"][i]] += 1
-    for i in np.flatnonzero(~on_face & (rows["verdict"] == WRONG)).tolist():
-        confused[rows["surface"][i], rows["answer"][i]] += 1
+            confused[f"{held}/{face}" if known else rows["surface"][i], answer] += 1
     return {
         "names": names,
         "matrix": matrix.tolist(),
@@ -331,17 +289,16 @@ def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
     }
 
 
-def _drawn_anew(rows: Columns) -> dict[str, int]:
-    """Return how often a touch was drawn again because the plate found no rest, by reason."""
-    found = Counter(why for text in rows["drawn_anew"] if text for why in text.split(" | "))
-    return dict(sorted(found.items()))
-
-
 def _face(rows: Columns, numbers: list[int]) -> dict[str, Any]:
-    """Return the line of a face, and whether it needs a look."""
+    """Return the line of a face, and whether it needs a look.
+
+    It does if, of its touches that are not worn, its bound fails or too few are answered, even
+    where no touch shows enough symbols.
+    """
     here = {name: values[numbers] for name, values in rows.items()}
     whole = line_of(here, here["kind"] != "worn")
-    return line_of(here, np.ones(len(numbers), bool)) | {"bad": face_is_bad(whole)}
+    few = state_of(whole["answered"], ">=", FACE_ANSWERED)
+    return line_of(here, np.ones(len(numbers), bool)) | {"bad": FAILS in (whole["state"], few)}
 
 
 def _natural_key(name: str) -> tuple[str | int, ...]:
@@ -370,12 +327,12 @@ def _pose(rows: Columns, order: Any) -> dict[str, Any]:
     return found
 
 
-def _bins(rows: Columns, name: str, edges: list[float], where: Mask) -> list[dict[str, Any]]:
+def _bins(rows: Columns, values: Any, edges: list[float], where: Mask) -> list[dict[str, Any]]:
     found = []
-    last = edges[-2]
     for low, high in pairwise(edges):
-        values = rows[name]
-        inside = where & (values >= low) & ((values < high) | (low == last) & (values <= high))
+        inside = (
+            where & (values >= low) & ((values < high) | (high == edges[-1]) & (values == high))
+        )
         if inside.any():
             found.append({"low": low, "high": high, **line_of(rows, inside)})
     return found

@@ -2,10 +2,10 @@
 
 Folder of a run::
 
-    asked.json               what decides the results, and where the set is (`record`)
+    asked.json               what decides the results, and where the set is (`write_record`)
     lab.db, parts/           the set, if it was made from specs
     sensor.yaml              the sensor type that it was made for, where it is not the usual one
-    shards/, times/          a file for a thousand touches (`shards`)
+    shards/, times/          a file for a thousand touches (`files`)
     trials.parquet           all touches
     results.json             what the report says, the same on every run
     times.json               CPU times of this run
@@ -22,14 +22,14 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
 from encoded_objects.base.output import ProgressBar
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from generator.database.open import normal_url
-from recognizer.validation.campaign import PRINTED, Campaign, batches_of, series_of, shards_of
+from recognizer.validation.campaign import PRINTED, Campaign, Work, campaign_from, series_of
 from recognizer.validation.encoded_set import (
     LAB,
     PARTS,
@@ -41,39 +41,16 @@ from recognizer.validation.encoded_set import (
 )
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import done_shards, write_json, write_shard, write_text
-from recognizer.validation.touch_plan import sensor_of
-from recognizer.validation.trial import REJECTED, RIGHT, WRONG, CpuTime, Row
-from recognizer.validation.workers import Work, Workers, code_digest
+from recognizer.validation.trial import REJECTED, RIGHT, WRONG, Row
+from recognizer.validation.workers import Workers, code_digest
 
 RECORD, SENSOR = "asked.json", "sensor.yaml"
 PRINTS = "printed.json"  #: which surface of the folder of prints is which face
 FORMAT = 2  #: of the record; another one is refused
 
 
-@dataclass(frozen=True, slots=True)
-class RunRecord:
-    """A run as its folder remembers it."""
-
-    campaign: Campaign
-    database: str  #: a SQLite file from the folder of the run, or a URL
-    set_digest: str
-    code_digest: str
-    specs: tuple[str, ...] = ()  #: as they were named
-
-    def work(self, folder: Path) -> Work:
-        """Return what the workers get."""
-        url = absolute_database(self.database, folder)
-        labs = labs_of(folder, [kind for kind, _ in self.campaign.kinds])
-        prints = str(folder.absolute() / PRINTS) if self.campaign.surfaces == PRINTED else ""
-        return Work(self.campaign, url, self.set_digest, self.code_digest, labs, prints)
-
-    def work_now(self, folder: Path) -> Work:
-        """Return the work for this version, which may not be that of the touches."""
-        return replace(self.work(folder), code_digest=code_digest())
-
-
-def read_record(folder: Path) -> RunRecord:
-    """Return the record of a folder's run.
+def read_record(folder: Path) -> Work:
+    """Return the work of a folder's run.
 
     Raises
     ------
@@ -89,38 +66,43 @@ def read_record(folder: Path) -> RunRecord:
                 fix="start anew in another folder",
                 place=str(path),
             )
-        given = values["campaign"]
-        for name in ("kinds", "levels"):
-            given[name] = tuple((key, float(share)) for key, share in given[name])
-        return RunRecord(
-            campaign=Campaign(**given),
-            database=values["database"],
-            set_digest=values["set"],
-            code_digest=values["code"],
-            specs=tuple(values["specs"]),
-        )
+        campaign = campaign_from(values["campaign"])
+        specs = tuple(values["specs"])
+        return _work(folder, campaign, values["database"], values["set"], values["code"], specs)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ValidationError(
             "no run of validate-set", fix="name the folder that -o named", place=str(folder)
         ) from error
 
 
-def write_record(record: RunRecord, folder: Path) -> None:
+def _work(
+    folder: Path, campaign: Campaign, database: str, set_digest: str, code: str,
+    specs: tuple[str, ...],
+) -> Work:  # fmt: skip
+    """Return the work of a run; `database` is a SQLite file from its folder, or a URL."""
+    if "://" not in database:
+        database = os.path.normpath(folder.absolute() / database)
+    labs = labs_of(folder, campaign.kind_names)
+    prints = str(folder.absolute() / PRINTS) if campaign.surfaces == PRINTED else ""
+    return Work(campaign, database, set_digest, code, labs, prints, specs)
+
+
+def write_record(work: Work, folder: Path) -> None:
     """Write the record of a run."""
     values = {
         "format": FORMAT,
-        "campaign": asdict(record.campaign),
-        "database": record.database,
-        "set": record.set_digest,
-        "code": record.code_digest,
-        "specs": list(record.specs),
+        "campaign": work.campaign.as_json(),
+        "database": relative_database(work.database, folder),
+        "set": work.set_digest,
+        "code": work.code_digest,
+        "specs": list(work.specs),
     }
     write_json(folder / RECORD, values)
 
 
-def check_same(before: RunRecord, now: RunRecord, folder: Path) -> None:
+def _check_same(before: Work, now: Work, folder: Path) -> None:
     """Raise `ValidationError` if options, specs, the set or this software have changed."""
-    old, new = asdict(before.campaign), asdict(now.campaign)
+    old, new = before.campaign.as_json(), now.campaign.as_json()
     differ = [f"{name} {old[name]}, now {new[name]}" for name in new if old[name] != new[name]]
     if before.specs != now.specs:
         differ.append(f"specs {', '.join(before.specs)}, now {', '.join(now.specs)}")
@@ -134,13 +116,6 @@ def check_same(before: RunRecord, now: RunRecord, folder: Path) -> None:
             fix="give the same options, or start anew in another folder with -o",
             place=str(folder),
         )
-
-
-def absolute_database(database: str, folder: Path) -> str:
-    """Return where the database of a record is."""
-    if "://" in database:
-        return database
-    return str(Path(os.path.normpath(folder.absolute() / database)))
 
 
 def relative_database(database: str, folder: Path) -> str:
@@ -190,7 +165,7 @@ class TouchProgress:
 
 def prepare_run(
     folder: Path, campaign: Campaign, specs: list[Path], database: str, *, resume: bool
-) -> RunRecord:
+) -> Work:
     """Make the set if it is not there, and write the record of the run.
 
     Without specs the set is what the database holds; an empty `database` is one in the folder.
@@ -209,50 +184,44 @@ def prepare_run(
             fix="go on with it by --resume, or name another folder with -o",
             place=str(folder),
         )
-    if before is not None:  # its set is there: it was made before the record was written
-        name = relative_database(database, folder) if database else before.database
-    else:
-        name = relative_database(database or str(folder / LAB), folder)
-        kinds = [kind for kind, _ in campaign.kinds]
+    known = before.database if before else str(folder / LAB)
+    name = relative_database(database or known, folder)
+    names = tuple(map(str, specs)) if specs or before is None else before.specs
+    work = _work(folder, campaign, name, "", code_digest(), names)
+    if before is None:  # else its set is there: it was made before the record was written
         if specs:
-            sensor = _sensor_file(campaign, folder)
-            make_parts(specs, folder / PARTS, absolute_database(name, folder), sensor)
+            make_parts(specs, folder / PARTS, work.database, _sensor_file(campaign, folder))
         elif database:
-            refuse_without_specs(kinds)
+            refuse_without_specs(campaign.kind_names)
         else:
             raise ValidationError("no set is named", fix="give SPEC.yaml files, or --database URL")
-        make_for_kinds(folder, absolute_database(name, folder), kinds, campaign.seed)
-    digest = set_digest(absolute_database(name, folder))
-    names = tuple(map(str, specs)) if specs or before is None else before.specs
-    record = RunRecord(campaign, name, digest, code_digest(), names)
+        make_for_kinds(folder, work.database, campaign.kind_names, campaign.seed)
+    work = replace(work, set_digest=set_digest(work.database))
     if before is None:
-        write_record(record, folder)
+        write_record(work, folder)
     else:
-        check_same(before, record, folder)
-    return record
+        _check_same(before, work, folder)
+    return work
 
 
 def _sensor_file(campaign: Campaign, folder: Path) -> str:
     """Write the type that touches where it is not the usual one; returns its file, or ""."""
-    sensor = sensor_of(campaign.sensor_type, campaign.overlay)
-    if sensor == SensorType():
+    if campaign.sensor == SensorType():
         return ""
-    write_text(folder / SENSOR, sensor_type_text(sensor))
+    write_text(folder / SENSOR, sensor_type_text(campaign.sensor))
     return str(folder / SENSOR)
 
 
-def touch_all(record: RunRecord, folder: Path, workers: Workers, progress: TouchProgress) -> None:
+def touch_all(work: Work, folder: Path, workers: Workers, progress: TouchProgress) -> None:
     """Touch what is not touched yet, and write every shard as soon as it is whole."""
-    work = record.work(folder)
-    for series in series_of(record.campaign):
-        done = done_shards(folder, series)
-        left = [shard for shard in range(shards_of(series)) if shard not in done]
-        shard_of = {batch: shard for shard in left for batch in batches_of(series, shard)}
+    for series in series_of(work.campaign):
+        left = set(range(series.shards)) - done_shards(folder, series)
+        shard_of = {batch: shard for shard in sorted(left) for batch in series.batches(shard)}
         touches = sum(batch.last - batch.first for batch in shard_of)
         progress.begin(series.name, series.touches, series.touches - touches)
         missing = Counter(shard_of.values())
         rows: defaultdict[int, list[Row]] = defaultdict(list)
-        times: defaultdict[int, list[CpuTime]] = defaultdict(list)
+        times: defaultdict[int, list[Row]] = defaultdict(list)
         for result in workers(work, list(shard_of)) if shard_of else ():
             shard = shard_of[result.batch]
             rows[shard] += result.rows
@@ -265,13 +234,7 @@ def touch_all(record: RunRecord, folder: Path, workers: Workers, progress: Touch
 
 @contextmanager
 def lock_folder(folder: Path) -> Iterator[None]:
-    """Hold a folder against other runs while this one works in it.
-
-    Raises
-    ------
-    ValidationError
-        Another run works in it.
-    """
+    """Hold a folder against other runs; raises `ValidationError` if one works in it."""
     folder.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(folder, os.O_RDONLY)
     try:

@@ -13,7 +13,6 @@ it, the touches are too few to tell. A count that must be zero fails by one touc
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -102,15 +101,15 @@ def quantiles_of(values: Array, at: tuple[float, ...]) -> list[float | None]:
     return [round_digits(float(value)) for value in np.quantile(values, at)]
 
 
-def chi2_quantile(probability: float, freedom: int = FREEDOM) -> float:
-    """Return below what chi2 lies with a probability.
+def chi2_quantile(probability: float) -> float:
+    """Return below what the chi2 of a pose lies with a probability.
 
     Examples
     --------
     >>> round(chi2_quantile(0.95), 3)
     7.815
     """
-    return 2.0 * float(gammaincinv(freedom / 2, probability))
+    return 2.0 * float(gammaincinv(FREEDOM / 2, probability))
 
 
 def calibration(chi2: Array) -> list[dict[str, Any]]:
@@ -133,48 +132,31 @@ def round_digits(value: float, digits: int = DIGITS) -> float:
 HOLDS, FAILS, UNTOLD = "holds", "fails", "too few touches to tell"
 
 
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """Between what and what something lies, 95 %; `high` None: no end is known."""
-
-    low: float
-    high: float | None
-
-
-def state_within(found: Interval, least: float | None, most: float | None) -> str:
-    """Return whether what was found lies within bounds; None: no bound on that side.
-
-    Examples
-    --------
-    >>> state_within(Interval(0.90, 1.0), 0.95, None)
-    'too few touches to tell'
-    >>> state_within(Interval(0.2, 0.4), 0.95, None), state_within(Interval(0.2, 0.4), None, 0.5)
-    ('fails', 'holds')
-    """
-    high = float("inf") if found.high is None else found.high
-    if (least is not None and high < least) or (most is not None and found.low > most):
-        return FAILS
-    if (least is None or found.low >= least) and (most is None or high <= most):
-        return HOLDS
-    return UNTOLD
-
-
 def state_of(found: dict[str, Any], sign: str, bound: float, upper: float | None = None) -> str:
     """Return whether a bound holds, fails, or the touches are too few to tell.
 
     Parameters
     ----------
     found
-        A share or a size with its interval: `low`, `high`, and `count` of a share.
+        A share or a size with its interval: `of`, `low`, `high` (None: no end is known), and
+        `count` of a share.
     sign
         `=` of a count, `>=`, `<=`, or `within`: from `bound` to `upper`.
     bound, upper
         In the unit of what was found.
+
+    Examples
+    --------
+    >>> state_of({"of": 40, "low": 0.90, "high": 1.0}, ">=", 0.95)
+    'too few touches to tell'
     """
     if sign == "=":
         return HOLDS if found["count"] == bound else FAILS
     if found["of"] == 0:
         return UNTOLD
-    least = bound if sign in (">=", "within") else None
-    most = {"<=": bound, "within": upper}.get(sign)
-    return state_within(Interval(found["low"], found["high"]), least, most)
+    least = bound if sign in (">=", "within") else -math.inf
+    most = bound if sign == "<=" else math.inf if upper is None else upper
+    low, high = found["low"], math.inf if found["high"] is None else found["high"]
+    if high < least or low > most:
+        return FAILS
+    return HOLDS if low >= least and high <= most else UNTOLD

@@ -51,6 +51,11 @@ class Study:
     counted: list[dict[str, Any]] = field(default_factory=list)
     spent: list[Any] = field(default_factory=list)  #: ms CPU
 
+    def add(self, ms: Any, **line: Any) -> None:
+        """Add a line and its time."""
+        self.counted.append(line)
+        self.spent.append(ms)
+
     def add_avoided(
         self, what: str, needed: int, of: int, unit: str,
         ms: float | None = None, whole_ms: float | None = None,
@@ -63,15 +68,11 @@ class Study:
 def contact_study() -> Study:
     """Return error and time of every contact level and engine, as they were measured once."""
     study = Study()
-    found = [
-        (f"{kind}, own engine", line.level, line.error, line.ms)
-        for kind, lines in table().items()
-        for line in lines
-    ]
-    found += [(f"tab, {each.engine}", each.level, each.error, each.ms) for each in engine_table()]
-    for series, level, error, ms in found:
-        study.counted.append({"series": series, "level": level, "error": error})
-        study.spent.append(ms)
+    for kind, lines in table().items():
+        for line in lines:
+            study.add(line.ms, series=f"{kind}, own engine", level=line.level, error=line.error)
+    for each in engine_table():
+        study.add(each.ms, series=f"tab, {each.engine}", level=each.level, error=each.error)
     return study
 
 
@@ -80,10 +81,13 @@ def reader_study(folder: Path, campaign: Campaign) -> Study:
     study = Study()
     for series in series_of(campaign)[1:]:
         rows = columns_of(read_series(folder, series))
-        line = {"reader": series.reader, "settings": settings_of(series.reader)}
-        study.counted.append(line | line_of(rows, np.ones(len(rows["number"]), bool)))
         spent = columns_of(read_series(folder, series, TIMES))["reading"]
-        study.spent.append(round(1e3 * float(np.mean(spent)), 3))
+        study.add(
+            round(1e3 * float(np.mean(spent)), 3),
+            reader=series.reader,
+            settings=settings_of(series.reader),
+            **line_of(rows, np.ones(len(rows["number"]), bool)),
+        )
     return study
 
 
@@ -105,42 +109,35 @@ def decoder_study(encoding: EmbossedArray, seed: int) -> Study:
         decode(windows[:2])
         start = time.process_time()
         found = decode(windows)
-        study.spent.append(round(1e3 * (time.process_time() - start) / WINDOWS, 5))
-        right = (found.rows == rows.astype(np.uint64)) & (
-            found.columns == columns.astype(np.uint64)
-        )
-        study.counted.append(
-            {
-                "decoder": name,
-                "view": list(shape),
-                "wrong_symbols": WRONG_SYMBOLS,
-                "windows": WINDOWS,
-                "right": int((found.answered & right).sum()),
-                "wrong": int((found.answered & ~right).sum()),
-                "rejected": int((~found.answered).sum()),
-            }
+        ms = round(1e3 * (time.process_time() - start) / WINDOWS, 5)
+        right = found.rows == rows.astype(np.uint64)
+        right &= found.columns == columns.astype(np.uint64)
+        study.add(
+            ms,
+            decoder=name,
+            view=list(shape),
+            wrong_symbols=WRONG_SYMBOLS,
+            windows=WINDOWS,
+            right=int((found.answered & right).sum()),
+            wrong=int((found.answered & ~right).sum()),
+            rejected=int((~found.answered).sum()),
         )
     return study
 
 
 def _decoders(encoding: EmbossedArray) -> Iterator[tuple[str, Callable[[Ints], Decodings]]]:
     array = encoding.array
-    places = array.rows * array.columns
     methods = ["logarithm"]
-    if places <= LARGEST_SERIAL:
+    if array.rows * array.columns <= LARGEST_SERIAL:
         methods = ["table", "serial", "milestones", *methods]
     for method in methods:
-        yield method, _exact(array, method)
+        yield method, partial(decode_exact, array, method=method)
     if isinstance(array, FoldedArray):
-        yield "good tuple", lambda windows: decode_good_tuple(array, windows)
+        yield "good tuple", partial(decode_good_tuple, array)
     yield "likelihood", Likelihood(array).decode
     at = np.divmod(encoding.keys, np.uint64(array.columns))
     prior = np.stack([part.astype(np.int64) for part in at], axis=1)
     yield "likelihood, registered cells", Likelihood(array, prior=prior).decode
-
-
-def _exact(array: Any, method: str) -> Callable[[Ints], Decodings]:
-    return lambda windows: decode_exact(array, windows, method)
 
 
 def work_avoided(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
@@ -150,11 +147,16 @@ def work_avoided(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
     reader as it is, and the last spends most.
     """
     study = Study()
-    _objects(study, reader)
-    _heights(study, plan, reader)
-    _levels(study, reader)
-    _triangles(study, plan, reader)
-    _cells(study, reader)
+    _add_objects(study, reader)
+    _add_heights(study, plan, reader)
+    _add_levels(study, reader)
+    _add_triangles(study, plan, reader)
+    for encoding in reader.lab.arrays:
+        rows, columns = encoding.array.rows, encoding.array.columns
+        study.add_avoided(
+            "Places that an answer may name: only those that were made, of all "
+            f"{rows} x {columns} of the array", len(encoding.keys), rows * columns, "places",
+        )  # fmt: skip
     if readers.counted:
         tried, most = (readers.counted[k]["settings"]["candidates"] for k in (0, -1))
         study.add_avoided(
@@ -164,47 +166,37 @@ def work_avoided(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
     return study
 
 
-def _objects(study: Study, reader: Reader) -> None:
-    """Objects read from the database: the one whose cells were found."""
+def _add_objects(study: Study, reader: Reader) -> None:
     with read_transaction(open_database(reader.lab.url, writable=False)) as connection:
         names = object_names(connection)
         spent = [_cpu_ms(partial(read_object, connection, name), 1) for name in names[:OBJECTS]]
     one = float(np.median(spent))
-    study.add_avoided(
-        "Objects loaded from the database: only the one that is touched",
-        1,
-        len(names),
-        "objects",
-        one,
-        one * len(names),
-    )
+    what = "Objects loaded from the database: only the one that is touched"
+    study.add_avoided(what, 1, len(names), "objects", one, one * len(names))
 
 
-def _heights(study: Study, plan: TouchPlan, reader: Reader) -> None:
-    """Heights computed: under the tips, not of the whole face."""
+def _add_heights(study: Study, plan: TouchPlan, reader: Reader) -> None:
     found = draw_touch(plan, 0, reader)
     scene = found.contact.scene
-    points = tip_points(reader.sensor, Tips())[0].reshape(-1, 2)
-    under = found.touch.on_surface(points)
+    under = found.touch.on_surface(tip_points(reader.sensor, Tips())[0].reshape(-1, 2))
     low, high = scene.region.box_mm
     sensor_area = 4 * reader.sensor.half_mm[0] * reader.sensor.half_mm[1]
     step = float(np.sqrt(sensor_area / len(under)))
     x, y = (np.arange(a, b, step) for a, b in zip(low, high, strict=True))
     whole = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    surface = scene.surface
-    surface.heights_mm(under)
+    heights = scene.surface.heights_mm
+    heights(under)
     study.add_avoided(
         "Places where the height of the surface is computed: only under the sensor's tips",
         len(under),
         len(whole),
         "places",
-        _cpu_ms(lambda: surface.heights_mm(under)),
-        _cpu_ms(lambda: surface.heights_mm(whole)),
+        _cpu_ms(lambda: heights(under)),
+        _cpu_ms(lambda: heights(whole)),
     )
 
 
-def _levels(study: Study, reader: Reader) -> None:
-    """Points or cells of the contact model: as many as its error needs."""
+def _add_levels(study: Study, reader: Reader) -> None:
     kind = reader.sensor.overlay.kind
     chosen = level_for(reader.sensor)
     lines = {line.level: line for line in table()[kind]}
@@ -220,23 +212,17 @@ def _levels(study: Study, reader: Reader) -> None:
     )
 
 
-def _triangles(study: Study, plan: TouchPlan, reader: Reader) -> None:
-    """Triangles of the part that the engine of the run gets, if it takes meshes of parts."""
+def _add_triangles(study: Study, plan: TouchPlan, reader: Reader) -> None:
+    """Add the triangles that the engine gets, if it takes meshes of parts."""
     triangles = engine_named(plan.engine).triangles
     if triangles is None:
         return
     found = draw_touch(plan, 0, reader)
     surface = found.contact.scene.under(found.touch).surface
     counted = triangles(surface, reader.sensor, found.touch)
-    if counted is None:
-        return
-    needed, of = counted
-    study.add_avoided(
-        f"Triangles of the part that engine {plan.engine} gets: only those under the sensor",
-        needed,
-        of,
-        "triangles",
-    )
+    if counted is not None:
+        what = f"Triangles of the part that engine {plan.engine} gets: only those under the sensor"
+        study.add_avoided(what, *counted, "triangles")
 
 
 def engine_lines() -> list[dict[str, Any]]:
@@ -246,17 +232,6 @@ def engine_lines() -> list[dict[str, Any]]:
         {"engine": name, "left_out": entry.left_out, "from_own": measured.get(name)}
         for name, entry in ENGINES.items()
     ]
-
-
-def _cells(study: Study, reader: Reader) -> None:
-    """Cells weighed: those that are registered, not all of the array."""
-    for encoding in reader.lab.arrays:
-        cells = encoding.array.rows * encoding.array.columns
-        what = (
-            f"Places that an answer may name: only those that were made, of all "
-            f"{encoding.array.rows} x {encoding.array.columns} of the array"
-        )
-        study.add_avoided(what, len(encoding.keys), cells, "places")
 
 
 def _cpu_ms(work: Callable[[], object], repeats: int = REPEATS) -> float:

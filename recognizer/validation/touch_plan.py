@@ -15,7 +15,7 @@ from pathlib import Path
 
 from sqlalchemy import Engine
 
-from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, force_share
+from encoded_objects.base.sensor_type import SensorType, force_share
 from generator.database.open import normal_url, open_database, part_path
 from generator.database.read import read_object
 from generator.database.registered import RegisteredObject, RegisteredPart
@@ -26,8 +26,7 @@ from probe.simulate.registered import (
     scene_of_face,
     scene_of_part,
 )
-from probe.simulate.scene import Scene
-from probe.simulate.touch import TouchRanges
+from probe.simulate.scene import Scene, TouchRanges
 from probe.simulate.world.levels import LEVELS, Level
 from recognizer.touch.lab import EmbossedArray
 from recognizer.validation.encoded_set import SIDE, is_extra
@@ -40,7 +39,7 @@ WORN = 0.2  #: probability that a symbol of a worn face is gone
 
 @dataclass(frozen=True, slots=True)
 class TouchPlan:
-    """What is drawn.
+    """How a touch is drawn.
 
     `kind` is `face` (the sensor's centre at least `draw.INSIDE_MM` from the edges), `edge` (nearer
     than that), `corner` (that near a corner), `worn` (a face with a share of its symbols gone),
@@ -53,38 +52,46 @@ class TouchPlan:
     seed: int = 1
     level: str = "typical"
     kind: str = "face"
+    counted_as: str = ""  #: kind as the campaign names it; empty: `kind`
     force_n: tuple[float, float] = FORCE_N
     tilt_rad: float = TILT_RAD
     worn: float = WORN
-    files: bool = False  #: touch the written STL files, not what the database says of them
+    files: bool = False  #: touch the written STL files, not the registered faces
     prints: str = ""  #: listing of the printed surfaces that are touched instead; empty: none
     engine: str = "own"  #: of contact, `probe.contact.engines`
     sensor_per: str = "touch"  #: or `run`: the errors of the sensor stay the same
     labs: tuple[str, ...] = ()  #: databases of other labs, of `same_profile`
-    policy: str = "one"  #: or `next`: touches follow until one is answered, `policy`
+    policy: str = "one"  #: or `next`: touches follow until one is answered, `trial`
     only: str = ""  #: object/face that is touched; empty: any
 
+    @property
+    def noise(self) -> Level:
+        """Faults of the sensor; a printed surface brings the print's faults itself."""
+        level = LEVELS[self.level]
+        return replace(level, wider_mm=0.0, scale=0.0) if self.prints else level
 
-def level_of(plan: TouchPlan) -> Level:
-    """Return the faults of the sensor; a printed surface brings the print's faults itself."""
-    level = LEVELS[plan.level]
-    return replace(level, wider_mm=0.0, scale=0.0) if plan.prints else level
+    def ranges(self, sensor: SensorType) -> TouchRanges:
+        """Return forces and tilts, those of the level if it has its own.
 
+        Forces are those on `fsr-16`; another sensor is pressed as hard (`force_share`).
+        """
+        level, share = self.noise, force_share(sensor)
+        tilt = self.tilt_rad if level.tilt_rad is None else level.tilt_rad
+        low, high = level.force_n or self.force_n
+        return TouchRanges(force_n=(low * share, high * share), tilt_rad=tilt)
 
-def sensor_of(sensor_type: str, overlay: str) -> SensorType:
-    """Return the sensor type of a campaign, given as YAML, with the overlay that it names."""
-    return choose_sensor_type(None, sensor_type, None, "--sensor-type").with_overlay(overlay)
+    def face(self, object_name: str, face: str, lab: str = "") -> tuple[Scene, float]:
+        """Return a face of the set, or of another lab's database, as the plan touches it.
 
+        Second is how far its inmost point lies from its edges, mm, nearly.
 
-def ranges_of(plan: TouchPlan, level: Level, sensor: SensorType) -> TouchRanges:
-    """Return forces and tilts of a plan, or those of a level that has its own.
-
-    Forces are those on `fsr-16`; another sensor is pressed as hard (`force_share`).
-    """
-    tilt = plan.tilt_rad if level.tilt_rad is None else level.tilt_rad
-    share = force_share(sensor)
-    low, high = level.force_n or plan.force_n
-    return TouchRanges(force_n=(low * share, high * share), tilt_rad=tilt)
+        Raises
+        ------
+        SetError
+            As `written_surface`.
+        """
+        prints = "" if lab else self.prints
+        return _face_of_run(lab or self.database, object_name, face, self.files, prints)
 
 
 @lru_cache(maxsize=512)
@@ -93,8 +100,8 @@ def faces_of_kind(
 ) -> list[int]:
     """Return the faces that a kind touches, in the order of their objects' names.
 
-    With prints, those that were printed; with `only`, that face. The order is by name because the
-    order of registration is random in a set made in parallel.
+    With prints, those that were printed; with `only`, that face. The order of registration is
+    random in a set made in parallel.
     """
     faces, names = encoding.faces.tolist(), encoding.names
     found = sorted(range(len(faces)), key=lambda n: (names[faces[n][0]], faces[n][1]))
@@ -125,15 +132,18 @@ def faces_of_lab(database: str) -> list[tuple[str, str]]:
 
 
 @lru_cache(maxsize=512)
-def scene_of(database: str, object_name: str, face: str, files: bool, prints: str = "") -> Scene:
-    """Return a face as it was printed, as it was written, or as the database has it."""
+def _face_of_run(
+    database: str, object_name: str, face: str, files: bool, prints: str
+) -> tuple[Scene, float]:
     if prints:
         from probe.simulate.printed import printed_scene
 
-        return printed_scene(prints, database, object_name, face)
-    if files:
-        return written_surface(database, object_name, face)
-    return scene_of_face(database, object_of_run(database, object_name), face)
+        scene = printed_scene(prints, database, object_name, face)
+    elif files:
+        scene = written_surface(database, object_name, face)
+    else:
+        scene = scene_of_face(database, _object_of_run(database, object_name), face)
+    return scene, scene.inradius_mm()
 
 
 def written_surface(database: str, object_name: str, face: str) -> Scene:
@@ -147,7 +157,7 @@ def written_surface(database: str, object_name: str, face: str) -> Scene:
     DatabaseError
         The database cannot be read, or does not hold the object.
     """
-    held = object_of_run(database, object_name)
+    held = _object_of_run(database, object_name)
     part = stl_part(held, face)
     path = part_path(normal_url(database), part.file)
     check_file(path, part)
@@ -155,7 +165,7 @@ def written_surface(database: str, object_name: str, face: str) -> Scene:
 
 
 @lru_cache(maxsize=64)
-def object_of_run(database: str, object_name: str) -> RegisteredObject:
+def _object_of_run(database: str, object_name: str) -> RegisteredObject:
     """Return an object of a set, which stays as it is while it is touched (`set_digest`)."""
     with read_transaction(_database_of_run(database)) as connection:
         return read_object(connection, object_name)

@@ -1,13 +1,14 @@
-"""One trial: draw a touch, simulate it, read it, compare; a touch as a row of the results.
+"""One trial: draw a touch, simulate it, read it, compare with the truth.
 
-TouchPlan + number -> Trial -> Row. The reader gets the counts alone. Of a plan whose policy is
-`next`, touches follow where the one before proposes, on the same surface and by the same sensor,
-a step away that the arm makes not quite as planned; the reader gets the step alone, and reads all
-touches so far as one belief (`recognizer.scan`). Where the plate finds no rest, it reads zeros.
+TouchPlan + number -> Trial, a row of the results. The reader gets the counts alone. Of a plan whose
+policy is `next`, touches follow where the one before proposes, on the same surface and by the same
+sensor, a step away that the arm makes not quite as planned; the reader gets the step alone, and
+reads all touches of the trial as one belief (`recognizer.scan`). Where the plate finds no rest, it
+reads zeros.
 
-Numbers of a row are kept to the digits that mean something (`COLUMNS`), so that two machines whose
-libraries differ in the last bit of a sum write the same bytes. CPU times are in rows of their own,
-because no two runs agree in them.
+Numbers of a row are kept to the digits that mean something, so that two machines whose libraries
+differ in the last bit of a sum write the same bytes. CPU times are in rows of their own, because no
+two runs agree in them.
 """
 
 from __future__ import annotations
@@ -15,13 +16,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
-from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.scan.places import surface_to_sensor
 from recognizer.scan.session import Scan
@@ -59,19 +58,22 @@ Proposal = Callable[[Recognition, np.random.Generator], NextTouch | None]
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """The outcome of a touch."""
+    """The outcome of a touch: all but `seconds` are the columns of a row."""
 
     number: int
-    kind: str
+    kind: str  #: as `campaign.KINDS` names it
+    surface: str  #: the kind, or which foreign surface
     level: str
     object: str  #: touched; empty for a foreign surface
     face: str
-    x_mm: float
+    x_mm: float  #: of the sensor, face frame
     y_mm: float
     theta_deg: float
     force_n: float
     tilt_deg: float
     edge_mm: float  #: from the sensor's centre to the nearest edge of the face
+    symbols: int  #: registered ones whose centre lies under the sensor
+    enough: bool  #: whether these are `ENOUGH` windows, on a face that is not worn
     verdict: str  #: right, wrong, rejected
     reason: str
     answer: str  #: object/face, empty if rejected
@@ -80,36 +82,43 @@ class Trial:
     chi2: float  #: squared pose error over the covariance, 3 degrees of freedom
     margin: float  #: nan where there is none
     noise: float
-    seconds: float  #: CPU, of reading
-    drawn_anew: str = ""  #: why the touch was drawn again, each time; ` | ` between
     touches: int = 1  #: until one was answered, or all that were made
+    drawn_anew: str = ""  #: why touches before it were none, ` | ` between; usually empty
+    seconds: float = 0.0  #: CPU, of reading
+
+    def row(self) -> Row:
+        """Return the columns, numbers as they are kept; -0 becomes 0."""
+        found = {name: getattr(self, name) for name in COLUMNS}
+        for name, kind in COLUMNS.items():
+            if kind == "float":
+                found[name] = round(float(found[name]), DECIMALS.get(name, 6)) + 0.0
+        return found
+
+
+#: Columns of a row and their types: str, int, bool, float.
+COLUMNS = {field.name: str(field.type) for field in fields(Trial) if field.name != "seconds"}
+DECIMALS = {"chi2": 4, "margin": 4}  #: after the point; 6 of the others
+OF_ANSWER = ("verdict", "reason", "answer", "error_mm", "error_deg", "chi2", "margin", "noise")
 
 
 def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
-    """Return the outcome of one touch, or of those that followed it."""
+    """Return the outcome of one touch, or of those that followed it: first place, last answer."""
     if plan.policy == NEXT:
-        return _trial_of_several(plan, number, reader)
+        made = list(touch_until_answered(plan, number, reader, MOST))
+        spent = sum(one.seconds for one in made)
+        first = judge(plan, number, made[0].found, made[0].answer, reader, spent)
+        last = judge(plan, number, made[-1].found, made[-1].answer, reader)
+        answered = {name: getattr(last, name) for name in OF_ANSWER}
+        return replace(first, touches=len(made), **answered)
     found = draw_touch(plan, number, reader)
     start = time.process_time()
     answer = recognise(reader, reader.signal(found.counts), number)
-    return judge(plan, number, found, answer, time.process_time() - start)
-
-
-def _trial_of_several(plan: TouchPlan, number: int, reader: Reader) -> Trial:
-    """Return the outcome of touches until one was answered: first place, last answer."""
-    made = list(touch_until_answered(plan, number, reader, MOST))
-    spent = sum(one.seconds for one in made)
-    first, last = (judge(plan, number, one.found, one.answer, spent) for one in (made[0], made[-1]))
-    return replace(
-        first, verdict=last.verdict, reason=last.reason, answer=last.answer,
-        error_mm=last.error_mm, error_deg=last.error_deg, chi2=last.chi2, margin=last.margin,
-        noise=last.noise, touches=len(made),
-    )  # fmt: skip
+    return judge(plan, number, found, answer, reader, time.process_time() - start)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PolicyTouch:
-    """A touch of a trial and what all touches so far say."""
+    """A touch of a trial, and the answer by all touches made by then."""
 
     found: DrawnTouch
     answer: Recognition
@@ -150,43 +159,49 @@ def _touch_at(
     force = step.force_n * math.exp(FORCE_OFF * off[3])
     moved = replace(at, x_mm=x, y_mm=y, theta_rad=at.theta_rad + turn, force_n=force)
     for _ in range(TRIES):
-        touch: Touch = draw_tilt(plan, moved, rng)
         try:
-            return draw_again(plan, before, touch, reader, rng)
+            return draw_again(plan, before, draw_tilt(plan, moved, rng), reader, rng)
         except ContactError:
             continue
     return replace(before, touch=moved, counts=np.zeros_like(before.counts))
 
 
 def judge(
-    plan: TouchPlan, number: int, found: DrawnTouch, answer: Recognition, seconds: float
+    plan: TouchPlan,
+    number: int,
+    found: DrawnTouch,
+    answer: Recognition,
+    reader: Reader,
+    seconds: float = 0.0,
 ) -> Trial:
-    """Compare an answer with the truth."""
+    """Compare an answer with the truth; `seconds` is the CPU time of reading."""
     scene, touch = found.truth_of(answer.object, answer.face)
     error, degrees, chi2, verdict = math.nan, math.nan, math.nan, REJECTED
     if answer:
         verdict = WRONG
         touched = scene and (scene.object_name, scene.face)
-        if (
-            (answer.object, answer.face) == touched
-            and answer.T_face_probe is not None
-            and answer.covariance is not None
-        ):
-            T = answer.T_face_probe
-            turn = math.atan2(T[1, 0], T[0, 0]) - touch.theta_rad
-            away = np.array(
-                [T[0, 3] - touch.x_mm, T[1, 3] - touch.y_mm, math.remainder(turn, 2 * math.pi)]
-            )
-            error, degrees = math.hypot(away[0], away[1]), math.degrees(away[2])
+        T = answer.T_face_probe
+        if (answer.object, answer.face) == touched and T is not None and (
+            answer.covariance is not None
+        ):  # fmt: skip
+            turn = math.remainder(math.atan2(T[1, 0], T[0, 0]) - touch.theta_rad, 2 * math.pi)
+            away = np.array([T[0, 3] - touch.x_mm, T[1, 3] - touch.y_mm, turn])
+            error, degrees = math.hypot(away[0], away[1]), math.degrees(turn)
             chi2 = float(away @ np.linalg.solve(answer.covariance, away))
-            near = error < NEAR_MM and abs(degrees) < NEAR_DEG
-            verdict = RIGHT if near else WRONG
-    edge = math.nan
+            verdict = RIGHT if error < NEAR_MM and abs(degrees) < NEAR_DEG else WRONG
+    edge, symbols, enough = math.nan, 0, False
     if scene is not None:
         edge = float(scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0])
+        held = find_face(reader.lab, scene.object_name, scene.face)
+        if held is not None:
+            c, s = np.cos(touch.theta_rad), np.sin(touch.theta_rad)
+            own = (held[0].centres_mm - (touch.x_mm, touch.y_mm)) @ np.array([[c, -s], [s, c]])
+            symbols = int((np.abs(own) < reader.sensor.half_mm).all(axis=1).sum())
+            enough = plan.kind != "worn" and symbols >= ENOUGH * held[1]
     return Trial(
         number=number,
-        kind=plan.kind,
+        kind=plan.counted_as or plan.kind,
+        surface=plan.kind,
         level=plan.level,
         object=scene.object_name if scene else "",
         face=scene.face if scene else "",
@@ -196,6 +211,8 @@ def judge(
         force_n=touch.force_n,
         tilt_deg=math.degrees(math.hypot(touch.tilt_x_rad, touch.tilt_y_rad)),
         edge_mm=edge,
+        symbols=symbols,
+        enough=enough,
         verdict=verdict,
         reason=answer.reason,
         answer=f"{answer.object}/{answer.face}" if answer else "",
@@ -204,87 +221,9 @@ def judge(
         chi2=chi2,
         margin=math.nan if answer.margin is None else answer.margin,
         noise=math.nan if answer.noise is None else answer.noise,
-        seconds=seconds,
         drawn_anew=" | ".join(found.resampled),
+        seconds=seconds,
     )
-
-
-#: Names and kinds: text, whole, truth, or decimals after the point.
-COLUMNS: dict[str, str | int] = {
-    "number": "whole",
-    "kind": "text",  #: as `campaign.KINDS` names it
-    "surface": "text",  #: the kind, or which foreign surface
-    "level": "text",
-    "object": "text",  #: touched; empty for a foreign surface
-    "face": "text",
-    "x_mm": 6,
-    "y_mm": 6,
-    "theta_deg": 6,
-    "force_n": 6,
-    "tilt_deg": 6,
-    "edge_mm": 6,
-    "symbols": "whole",  #: registered ones whose centre lies under the sensor
-    "enough": "truth",  #: whether that is enough (`JudgeSettings`)
-    "verdict": "text",
-    "reason": "text",
-    "answer": "text",
-    "error_mm": 6,
-    "error_deg": 6,
-    "chi2": 4,
-    "margin": 4,
-    "noise": 6,
-    "touches": "whole",  #: until one was answered, or all that were made
-    "drawn_anew": "text",  #: why touches before it were none, ` | ` between; usually empty
-}
-
-
-@dataclass(frozen=True, slots=True)
-class CpuTime:
-    """CPU seconds of a touch."""
-
-    number: int
-    drawing: float  #: surface, contact and reading of the sensor
-    reading: float  #: by the recognizer
-
-
-@dataclass(frozen=True, slots=True)
-class SymbolsInView:
-    """What of a face is under the sensor."""
-
-    symbols: int
-    enough: bool
-
-
-def row_of(trial: Trial, kind: str, seen: SymbolsInView) -> Row:
-    """Return the row of a trial, its numbers as they are kept."""
-    row: Row = {}
-    given: Row = {
-        "kind": kind,
-        "surface": trial.kind,
-        "symbols": seen.symbols,
-        "enough": seen.enough,
-    }
-    for name, what in COLUMNS.items():
-        value = given[name] if name in given else getattr(trial, name)
-        row[name] = round(float(value), what) + 0.0 if isinstance(what, int) else value
-    return row
-
-
-def symbols_in_view(lab: Lab, sensor: SensorType, trial: Trial) -> SymbolsInView:
-    """Return how many symbols a touch had in view, and whether they were enough.
-
-    Enough is `JudgeSettings.enough` times the cells of the array's window, on a face that is
-    not worn.
-    """
-    found = find_face(lab, trial.object, trial.face)
-    if found is None:
-        return SymbolsInView(0, enough=False)
-    face, window = found
-    angle = np.radians(trial.theta_deg)
-    c, s = np.cos(angle), np.sin(angle)
-    own = (face.centres_mm - (trial.x_mm, trial.y_mm)) @ np.array([[c, -s], [s, c]])
-    symbols = int((np.abs(own) < sensor.half_mm).all(axis=1).sum())
-    return SymbolsInView(symbols, enough=trial.kind != "worn" and symbols >= ENOUGH * window)
 
 
 def find_face(lab: Lab, object_name: str, face: str) -> tuple[EncodedFace, int] | None:

@@ -16,9 +16,9 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from multiprocessing import active_children, connection, get_context, parent_process
 from pathlib import Path
@@ -27,32 +27,19 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from encoded_objects.base.errors import require
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.validation.campaign import Batch, Campaign, plan_of, reader_with, series_of
+from recognizer.validation.campaign import Batch, Work, reader_with, series_of
 from recognizer.validation.encoded_set import set_digest
 from recognizer.validation.errors import WorkersError
-from recognizer.validation.touch_plan import sensor_of
-from recognizer.validation.trial import CpuTime, Row, row_of, symbols_in_view, trial
+from recognizer.validation.trial import Row, trial
 
 if TYPE_CHECKING:
     from distributed import Client
 
 LOSSES = 3  #: pools in a row that break before they have done anything
 CLUSTER_WAIT_S = 20.0  #: for the scheduler, and for its first worker
+PACKAGES = ("generator", "decoder", "probe", "recognizer")  #: whose source makes the results
 
 Result = TypeVar("Result")
-PACKAGES = ("generator", "decoder", "probe", "recognizer")
-
-
-@dataclass(frozen=True, slots=True)
-class Work:
-    """What all batches share."""
-
-    campaign: Campaign
-    database: str  #: as the workers find it
-    set_digest: str
-    code_digest: str
-    labs: tuple[str, ...] = ()  #: databases of other labs, as the workers find them
-    prints: str = ""  #: listing of the printed surfaces, as the workers find it; empty: none
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +48,7 @@ class BatchResult:
 
     batch: Batch
     rows: tuple[Row, ...]
-    times: tuple[CpuTime, ...]
+    times: tuple[Row, ...]  #: of `files.TIME_COLUMNS`
 
 
 #: Takes work and batches, yields finished batches in any order.
@@ -76,18 +63,17 @@ def touch(work: Work, batch: Batch) -> BatchResult:
     WorkersError
         The code or the set is not that of the run.
     """
-    reader = prepare_reader(work)
     series = next(s for s in series_of(work.campaign) if s.name == batch.series)
-    reading = reader_with(reader, series.reader)
+    reader = reader_with(prepare_reader(work), series.reader)
     rows, times = [], []
     for number in range(batch.first, batch.last):
-        kind, plan = plan_of(work.campaign, series, work.database, number, work.labs, work.prints)
+        plan = work.plan(series, number)
         start = time.process_time()
-        found = trial(plan, number, reading)
-        spent = time.process_time() - start
-        seen = symbols_in_view(reader.lab, reader.sensor, found)
-        rows.append(row_of(found, kind, seen))
-        times.append(CpuTime(number, round(spent - found.seconds, 6), round(found.seconds, 6)))
+        found = trial(plan, number, reader)
+        drawing = time.process_time() - start - found.seconds
+        rows.append(found.row())
+        times.append({"number": number, "drawing": round(drawing, 6),
+                      "reading": round(found.seconds, 6)})  # fmt: skip
     return BatchResult(batch, tuple(rows), tuple(times))
 
 
@@ -104,9 +90,12 @@ def prepare_reader(work: Work) -> Reader:
             f"a worker sees another set under {work.database}",
             fix="let all machines share the folder, or give a PostgreSQL database",
         )
-    return Reader(
-        open_lab(work.database), sensor_of(work.campaign.sensor_type, work.campaign.overlay)
-    )
+    return Reader(open_lab(work.database), work.campaign.sensor)
+
+
+def reader_now(work: Work) -> Reader:
+    """Return the reader by this version of the software, which need not be that of the touches."""
+    return prepare_reader(replace(work, code_digest=code_digest()))
 
 
 @lru_cache(maxsize=1)
@@ -135,13 +124,7 @@ def in_this_process(work: Work, batches: Iterable[Batch]) -> Iterator[BatchResul
 
 
 def in_processes(processes: int, work: Work, batches: Iterable[Batch]) -> Iterator[BatchResult]:
-    """Do batches in several processes at a time.
-
-    Raises
-    ------
-    WorkersError
-        Processes were lost again and again.
-    """
+    """Do batches in several processes at a time; `WorkersError` if they are lost repeatedly."""
     left = list(batches)
     lost = 0
     while left:
@@ -172,8 +155,11 @@ def run_pool(
     # Started fresh rather than forked: no open database and no thread is taken over.
     pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_worker)
     try:
-        waiting = [pool.submit(function, *call) for call in calls]
-        yield from _as_done(waiting)
+        left = {pool.submit(function, *call) for call in calls}
+        while left:  # an interrupt comes through within the timeout
+            done, left = wait(left, timeout=1.0, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield future.result()
     except BaseException:
         for process in active_children():
             process.terminate()
@@ -182,47 +168,31 @@ def run_pool(
         pool.shutdown(cancel_futures=True)
 
 
-def _as_done(waiting: list[Future[Result]]) -> Iterator[Result]:
-    """Yield what is done, as it is done; an interrupt comes through at once."""
-    left = set(waiting)
-    while left:
-        done, left = wait(left, timeout=1.0, return_when=FIRST_COMPLETED)
-        for future in done:
-            yield future.result()
-
-
 def _prepare_worker() -> None:
-    """Prepare a worker."""
+    """Leave interrupts to the process that started this one, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     parent = parent_process()
     if parent is not None:
-        end: Callable[[], None] = partial(_end_with, parent.sentinel)
-        threading.Thread(target=end, daemon=True).start()
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
 
 
 def _end_with(sentinel: int) -> None:
-    """Leave as soon as the process that started this one is gone."""
     connection.wait([sentinel])
     os._exit(1)
 
 
 def on_cluster(address: str, work: Work, batches: Iterable[Batch]) -> Iterator[BatchResult]:
-    """Do batches on the workers of a scheduler.
-
-    Parameters
-    ----------
-    address
-        Of the scheduler, `tcp://host:8786`.
-    work, batches
-        What is to be done.
+    """Do batches on the workers of a dask scheduler at `address`, `tcp://host:8786`.
 
     Raises
     ------
     WorkersError
         There is no scheduler or no worker, or they see other code or another set.
+    MissingExtraError
+        dask is not installed.
     """
-    client = connect(address)
+    client = _connect(address)
     futures: list[Any] = []
     try:
         from distributed import as_completed
@@ -239,16 +209,8 @@ def on_cluster(address: str, work: Work, batches: Iterable[Batch]) -> Iterator[B
         client.close()
 
 
-def connect(address: str) -> Client:
-    """Return a client of a scheduler that has a worker.
-
-    Raises
-    ------
-    WorkersError
-        Nobody answers.
-    MissingExtraError
-        dask is not installed.
-    """
+def _connect(address: str) -> Client:
+    """Return a client of a scheduler that has a worker."""
     require("distributed", extra="cluster", purpose="--cluster")
     from distributed import Client
 

@@ -22,6 +22,7 @@ import time
 import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,16 @@ from generator.array.lab_key import keyed_array
 SIZES = (12, 16, 20, 24, 32, 48, 64)
 BATCH = 10_000
 BUDGET_S = 4.0  # for one call with a batch
+
+
+def memory(value: Any) -> int:
+    """Return the bytes of the arrays that a value holds, without its sequence's elements."""
+    if isinstance(value, np.ndarray):
+        return value.nbytes
+    if isinstance(value, list | tuple):
+        return sum(map(memory, value))
+    held = {k: v for k, v in getattr(value, "__dict__", {}).items() if k != "elements"}
+    return sum(map(memory, held.values()))
 
 
 def main() -> None:
@@ -81,7 +92,7 @@ def times_of(
         conversion.cache_clear()
         start = time.process_time()
         try:
-            tables = conversion(array.sequence, method).nbytes
+            tables = memory(conversion(array.sequence, method))
         except MethodError:
             rows.append({"array": name, "method": method})
             print(f"{name:<17}{method:<12}{'-':>11}")

@@ -25,7 +25,7 @@ from encoded_objects.base.sensor_type import SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.errors import ContactError
 from probe.simulate.registered import registered_surface
-from probe.simulate.touch import TouchRanges, random_touches
+from probe.simulate.scene import TouchRanges, random_touches
 from probe.simulate.world.levels import TYPICAL, Level
 from probe.simulate.world.sensor import LevelSensor, SensorInstance, sample_sensor
 from recognizer.touch.recognise import recognise

@@ -25,7 +25,7 @@ from probe.contact.press import press
 from probe.port import open_port
 from probe.protocol import Command, Damage, FramePacket, Splitter, decode
 from probe.simulate.registered import registered_surface
-from probe.simulate.touch import TouchRanges, random_touches
+from probe.simulate.scene import TouchRanges, random_touches
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 

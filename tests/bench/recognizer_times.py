@@ -26,7 +26,7 @@ from recognizer.touch.signal import signal_of  # noqa: E402
 from recognizer.touch.symbols.fit import fit_lattices, search_image  # noqa: E402
 from recognizer.touch.verify import TouchImages, verify_hypotheses  # noqa: E402
 from recognizer.validation.draw import draw_touch  # noqa: E402
-from recognizer.validation.touch_plan import TouchPlan, sensor_of  # noqa: E402
+from recognizer.validation.touch_plan import TouchPlan  # noqa: E402
 from recognizer.validation.trial import judge  # noqa: E402
 
 EFFORTS = {
@@ -70,7 +70,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=9)
     parser.add_argument("--png")
     options = parser.parse_args()
-    reader = Reader(open_lab(options.database), sensor_of("", "tab"))
+    reader = Reader(open_lab(options.database))
     points = {}
     for level in ("typical", "mismatch"):
         plan = TouchPlan(options.database, options.seed, level)
@@ -84,7 +84,7 @@ def main() -> None:
             found = []
             for number, (touch, signal) in enumerate(zip(touches, signals, strict=True)):
                 reading, ms = clocked(lambda s=signal, r=one: read_touch(r, s))
-                found.append((judge(plan, number, touch, reading.answer, ms / 1e3), ms))
+                found.append((judge(plan, number, touch, reading.answer, reader, ms / 1e3), ms))
             right = [t for t, _ in found if t.verdict == "right"]
             wrong = sum(t.verdict == "wrong" for t, _ in found)
             rms = float(np.sqrt(np.mean([t.error_mm**2 for t in right])))

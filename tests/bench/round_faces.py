@@ -44,7 +44,7 @@ from generator.spec import read_specs  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
 from probe.errors import ContactError  # noqa: E402
 from probe.simulate.registered import registered_object  # noqa: E402
-from probe.simulate.touch import TouchRanges, random_touches  # noqa: E402
+from probe.simulate.scene import TouchRanges, random_touches  # noqa: E402
 from probe.simulate.world.levels import LEVELS  # noqa: E402
 from probe.simulate.world.sensor import LevelSensor  # noqa: E402
 from probe.simulate.written import RoundPart, round_part  # noqa: E402

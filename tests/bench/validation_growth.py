@@ -19,9 +19,9 @@ import numpy as np
 from database_scale import array_of, blocks, fill
 
 from generator.database.open import open_database
-from recognizer.validation.campaign import Batch, Campaign
+from recognizer.validation.campaign import Batch, Campaign, Work
 from recognizer.validation.encoded_set import set_digest
-from recognizer.validation.workers import Work, code_digest, prepare_reader, touch
+from recognizer.validation.workers import code_digest, prepare_reader, touch
 
 
 def main() -> None:
@@ -51,8 +51,7 @@ def main() -> None:
             opened = time.process_time() - start
             found = touch(work, Batch("touches", 0, options.touches))
             drawing, reading = (
-                float(np.median([getattr(t, name) for t in found.times]))
-                for name in ("drawing", "reading")
+                float(np.median([t[name] for t in found.times])) for name in ("drawing", "reading")
             )
             cells = sum(len(encoding.keys) for encoding in reader.lab.arrays)
             right = sum(row["verdict"] == "right" for row in found.rows)

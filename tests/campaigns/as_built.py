@@ -25,8 +25,8 @@ import numpy as np  # noqa: E402
 
 from encoded_objects import encode  # noqa: E402
 from probe.errors import ContactError  # noqa: E402
+from probe.simulate.scene import TouchRanges, random_touches  # noqa: E402
 from probe.simulate.target import part_surface  # noqa: E402
-from probe.simulate.touch import TouchRanges, random_touches  # noqa: E402
 from probe.simulate.world.levels import LEVELS  # noqa: E402
 from probe.simulate.world.sensor import LevelSensor  # noqa: E402
 from probe.simulate.written import written_triangles  # noqa: E402

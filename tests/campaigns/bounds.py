@@ -18,9 +18,8 @@ from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at, recognise
 from recognizer.touch.signal import Signal
 from recognizer.touch.verify import TouchImages, verify_hypotheses
-from recognizer.validation.campaign import LEVEL_SHARES, Campaign, plan_of, series_of
+from recognizer.validation.campaign import LEVEL_SHARES, Campaign, Work, series_of
 from recognizer.validation.draw import draw_touch
-from recognizer.validation.touch_plan import sensor_of
 from recognizer.validation.trial import RIGHT, judge
 
 SETS = (
@@ -52,20 +51,20 @@ def main() -> None:
     parser = runner.arguments(__doc__, "database", touches=400, seed=7)
     parser.add_argument("--engine", default="own")
     asked = runner.parse(parser)
-    reader = Reader(open_lab(asked.database), sensor_of("", "tab"))
+    reader = Reader(open_lab(asked.database))
     limit = reader.options.doubt
     heads = ("of", "likeliest place true", f"and doubt <= {limit:g}", "answered")
     runner.table((f"touches, {asked.engine}", *heads))
     for name, kind, levels in SETS:
         campaign = Campaign(asked.touches, asked.seed, ((kind, 1.0),), levels, engine=asked.engine)
-        series = series_of(campaign)[0]
+        work, series = Work(campaign, asked.database), series_of(campaign)[0]
         true = sure = answered = 0
         for number in range(asked.touches):
-            _, plan = plan_of(campaign, series, asked.database, number)
+            plan = work.plan(series, number)
             drawn = draw_touch(plan, number, reader)
 
             def judged(answer, plan=plan, number=number, drawn=drawn) -> str:
-                return judge(plan, number, drawn, answer, 0.0).verdict
+                return judge(plan, number, drawn, answer, reader).verdict
 
             signal = reader.signal(drawn.counts)
             doubt = doubt_of_best(reader, signal, judged) if signal.contact else None

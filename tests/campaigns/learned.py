@@ -51,7 +51,7 @@ def main() -> None:
 def read_all(reader: Reader, plan: TouchPlan, drawn: list[DrawnTouch]) -> list[Trial]:
     """Return what became of touches under what is known of their sensor."""
     return [
-        judge(plan, number, one, recognise(reader, reader.signal(one.counts), number), 0.0)
+        judge(plan, number, one, recognise(reader, reader.signal(one.counts), number), reader)
         for number, one in enumerate(drawn)
     ]
 

@@ -21,7 +21,7 @@ from encoded_objects.base.sensor_type_file import sensor_type_named
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NextTouch, Recognition
-from recognizer.validation.campaign import Campaign, kinds_of, levels_of, plan_of, series_of
+from recognizer.validation.campaign import Work, campaign_of, series_of
 from recognizer.validation.trial import Proposal, judge, touch_until_answered
 
 
@@ -42,21 +42,20 @@ def main() -> None:
     parser.add_argument("--policy", choices=("next", "walk"), action="append")
     parser.add_argument("--seconds", type=float, default=math.inf, help="end after so many")
     options = runner.parse(parser)
-    campaign = Campaign(
-        seed=options.seed, kinds=kinds_of(options.kinds), levels=levels_of(options.levels),
-        engine=options.engine, sensor_type=options.sensor_type,
-    )  # fmt: skip
-    series = series_of(campaign)[0]
-    reader = Reader(open_lab(options.database), sensor_type_named(options.sensor_type))
+    sensor = sensor_type_named(options.sensor_type)
+    given = {name: getattr(options, name) for name in ("seed", "kinds", "levels", "engine")}
+    campaign = campaign_of(given | {"sensor_type": sensor}, None)
+    work, series = Work(campaign, options.database), series_of(campaign)[0]
+    reader = Reader(open_lab(options.database), sensor)
     policies: dict[str, Proposal] = {"next": lambda answer, _: answer.next, "walk": walk}
     found: dict[tuple[str, str], Counter[tuple[str, int]]] = {}
     end, number = time.monotonic() + options.seconds, options.first
     while number < options.first + options.touches and time.monotonic() < end:
-        kind, plan = plan_of(campaign, series, options.database, number)
+        plan = work.plan(series, number)
         for name in options.policy or policies:
             made = list(touch_until_answered(plan, number, reader, options.most, policies[name]))
-            trial = judge(plan, number, made[-1].found, made[-1].answer, 0.0)
-            for key in ((name, plan.level + " " + kind), (name, "all")):
+            trial = judge(plan, number, made[-1].found, made[-1].answer, reader)
+            for key in ((name, plan.level + " " + plan.counted_as), (name, "all")):
                 found.setdefault(key, Counter())[trial.verdict, len(made)] += 1
         number += 1
     print(f"touches {options.first} ... {number - 1} of seed {options.seed}, {options.engine}")

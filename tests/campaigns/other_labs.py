@@ -117,7 +117,7 @@ def touch_labs(
             drawn = replace(drawn, contact=replace(drawn.contact, registered=False))
         return {
             "number": number, "lab": lab + 1, "kind": kind, "level": level,
-            "verdict": judge(plan, number, drawn, answer, 0.0).verdict,
+            "verdict": judge(plan, number, drawn, answer, reader).verdict,
             "answer": f"{answer.object}/{answer.face}" if answer else "",
             "reason": answer.reason, "doubt": answer.doubt if answer else None,
             "margin": answer.margin, "accepted": accepted,

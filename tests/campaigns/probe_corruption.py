@@ -20,7 +20,6 @@ import argparse
 import random
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,11 +27,10 @@ import numpy as np
 from probe.client.receiver import Receiver
 from probe.protocol import Damage, FramePacket, Splitter, decode, encode
 
+KINDS = ("flips", "burst", "drop", "splice", "lost whole")
 CHUNK = 2000
 STEP_US = 4545
 SILENT = 147 / 256  # tactels that never respond, of a real sensor
-
-Corruption = Callable[[random.Random, list[bytes], int], int]
 
 
 @dataclass
@@ -47,46 +45,24 @@ class Count:
     handed_on: int = 0
 
 
-def flips(rng: random.Random, wire: list[bytes], i: int) -> int:
-    data = bytearray(wire[i])
-    for _ in range(rng.randint(1, 8)):
-        data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
-    wire[i] = bytes(data)
+def corrupt(kind: str, rng: random.Random, wire: list[bytes], i: int) -> int:
+    """Corrupt packet `i` on the wire; returns how many packets that costs."""
+    data, at = wire[i], rng.randrange(len(wire[i]))
+    if kind == "flips":
+        flipped = bytearray(data)
+        for _ in range(rng.randint(1, 8)):
+            flipped[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        wire[i] = bytes(flipped)
+    elif kind == "burst":
+        garbage = rng.randbytes(min(rng.randint(1, 64), len(data) - at))
+        wire[i] = data[:at] + garbage + data[at + len(garbage) :]
+    elif kind == "drop":
+        wire[i] = data[:at] + data[at + rng.randint(1, 16) :]
+    else:  # splice, lost whole
+        after = at if kind == "lost whole" else rng.randrange(1, len(wire[i + 1]))
+        wire[i], wire[i + 1] = data[: max(at, 1)], wire[i + 1][max(after, 1) :]
+        return 2
     return 1
-
-
-def burst(rng: random.Random, wire: list[bytes], i: int) -> int:
-    at, length = rng.randrange(len(wire[i])), rng.randint(1, 64)
-    garbage = rng.randbytes(min(length, len(wire[i]) - at))
-    wire[i] = wire[i][:at] + garbage + wire[i][at + length :]
-    return 1
-
-
-def drop(rng: random.Random, wire: list[bytes], i: int) -> int:
-    at = rng.randrange(len(wire[i]))
-    wire[i] = wire[i][:at] + wire[i][at + rng.randint(1, 16) :]
-    return 1
-
-
-def splice(rng: random.Random, wire: list[bytes], i: int) -> int:
-    wire[i] = wire[i][: rng.randrange(1, len(wire[i]))]
-    wire[i + 1] = wire[i + 1][rng.randrange(1, len(wire[i + 1])) :]
-    return 2
-
-
-def lost_whole(rng: random.Random, wire: list[bytes], i: int) -> int:
-    at = rng.randrange(1, len(wire[i]))
-    wire[i], wire[i + 1] = wire[i][:at], wire[i + 1][at:]
-    return 2
-
-
-KINDS: dict[str, Corruption] = {
-    "flips": flips,
-    "burst": burst,
-    "drop": drop,
-    "splice": splice,
-    "lost whole": lost_whole,
-}
 
 
 def packets_of(rng: np.random.Generator, first: int, byte_wide: bool) -> list[FramePacket]:
@@ -113,7 +89,7 @@ def campaign(kind: str, byte_wide: bool, packets: int, seed: int) -> Count:
         # The last ones stay whole, so that each chunk can be judged by itself.
         while i < CHUNK - 8:
             if rng.random() < 0.5:
-                n = KINDS[kind](rng, wire, i)
+                n = corrupt(kind, rng, wire, i)
                 count.corrupted += n
                 i += n
             else:

@@ -227,7 +227,9 @@ def touch_face(face: Face, lab: str, number: int, most: int, reader: Reader, see
     level = LEVELS[int(np.random.default_rng([seed, number, 2]).integers(len(LEVELS)))]
     plan = TouchPlan(lab, seed, level, "anywhere", policy=NEXT, only=face.name)
     made = list(touch_until_answered(plan, number, reader, most))
-    first, last = (judge(plan, number, one.found, one.answer, 0.0) for one in (made[0], made[-1]))
+    first, last = (
+        judge(plan, number, one.found, one.answer, reader) for one in (made[0], made[-1])
+    )
     at = np.array([[first.x_mm, first.y_mm]])
     turn = np.array([np.radians(first.theta_deg)])
     views = views_at(face.loops, face.layout, face.pitch_mm, face.view, at, turn)

@@ -12,10 +12,11 @@ from functools import lru_cache
 
 import runner
 
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.validation.draw import FOREIGN
-from recognizer.validation.touch_plan import TouchPlan, sensor_of
+from recognizer.validation.touch_plan import TouchPlan
 from recognizer.validation.trial import Trial, trial
 
 BATCH = 50  #: touches that a process takes at once
@@ -31,7 +32,7 @@ def read_batch(job: tuple[TouchPlan, str, range]) -> list[Trial]:
 @lru_cache(maxsize=2)
 def reader_of(database: str, overlay: str) -> Reader:
     """Return the reader of a process."""
-    return Reader(open_lab(database), sensor_of("", overlay))
+    return Reader(open_lab(database), SensorType().with_overlay(overlay))
 
 
 def main() -> None:

@@ -160,7 +160,7 @@ def _by_bench(place: Path) -> Iterator[tuple[str, Any]]:
     from encoded_objects.base.sensor_type import SensorType
     from probe.contact.contract import Touch
     from probe.simulate.target import surface_of
-    from recognizer.bench.press_sequence import PressSequence, SimulationSettings
+    from recognizer.bench.simulated import PressSequence, SimulationSettings
 
     scene = surface_of(_inside(place, FACE))
     for noise in ("typical", "quiet"):

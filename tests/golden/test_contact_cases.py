@@ -27,9 +27,8 @@ from probe.errors import ContactError
 from probe.surface.face import endless_face
 from probe.surface.indenters import FlatPlate, RaisedStrip
 from probe.surface.polygon import polygon
-from recognizer.scan.mosaic.patch import patch_of
-from recognizer.scan.mosaic.planar import compose_poses
-from recognizer.scan.mosaic.register import register_patches
+from recognizer.scan.mosaic.mosaic import add_touch, no_touches
+from recognizer.scan.mosaic.planar import PlacedTouch, compose_poses, planar_belief
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.signal import signal_of
 
@@ -177,7 +176,7 @@ def test_case_12_raw_products_fail_where_registration_does_not(scene):
         return np.minimum(forces, 0.3) if scene == "saturated" else forces
 
     raw_wrong, wrong, answered, pairs = 0, 0, 0, 20
-    spread = np.diag([P**2, P**2, math.radians(0.5) ** 2])
+    spread = (P, P, math.radians(0.5))
     for pair in range(pairs):
         place = np.array([*rng.uniform(20, 120, 2), rng.uniform(0, 2 * math.pi)])
         true = np.array([4.25 * P * rng.choice([-1, 1]), 0.3 * P, 0.0])
@@ -185,10 +184,13 @@ def test_case_12_raw_products_fail_where_registration_does_not(scene):
         images = [felt(faces[pair % 2], at) for at in (place, compose_poses(place, true))]
         shift = raw_product(*images, believed[:2] / P, 4)
         raw_wrong += math.hypot(*(shift - true[:2] / P)) > 1
-        patches = [patch_of(TAB, signal_of(image, floor=0.0, options=FELT)) for image in images]
-        found = register_patches(*patches, believed, spread, period_mm=7.0)
-        answered += bool(found)
-        wrong += bool(found) and math.hypot(*(found.pose - true)[:2]) > P
+        first, second = (signal_of(image, floor=0.0, options=FELT) for image in images)
+        origin = planar_belief(np.zeros(3), (1e-3, 1e-3, 1e-5))
+        mosaic = add_touch(no_touches(TAB), PlacedTouch(first, origin))
+        mosaic = add_touch(mosaic, PlacedTouch(second, planar_belief(believed, spread)))
+        placed = mosaic.reasons == ("", "")
+        answered += placed
+        wrong += placed and math.hypot(*(mosaic.poses[1] - true)[:2]) > P
     assert raw_wrong >= 0.2 * pairs
     assert wrong == 0
     assert answered >= 0.95 * pairs

@@ -28,7 +28,7 @@ def lab(tmp_path_factory):
         spec = lab / f"{name}.yaml"
         spec.write_text(f"name: {name}\nshape: {shape}\n")
         encode(
-            read_specs([spec]), folder=lab / "out", formats=("stl", "glb"),
+            read_specs([spec]), folder=lab / "out", formats=("stl",),
             database=str(lab / "lab.db"),
         )  # fmt: skip
     return lab
@@ -64,10 +64,17 @@ def browser():
         chromium.close()
 
 
-@pytest.fixture
-def page(browser, bench):
-    """The page of a module's `bench`, showing the cube, with nothing touched."""
+@pytest.fixture(scope="module")
+def work(browser, bench):
+    """The page of a module's `bench`; its tests work it one after the other."""
     with opened(browser, bench) as page:
-        rest(page)
-        shown(page, "Cube")
         yield page
+
+
+@pytest.fixture
+def page(work):
+    """Return the module's page without dialogs, showing the cube, with nothing touched."""
+    work.evaluate("document.querySelectorAll('dialog[open]').forEach((one) => one.close())")
+    rest(work)
+    shown(work, "Cube")
+    return work

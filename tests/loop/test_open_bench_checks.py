@@ -23,21 +23,6 @@ def bench(served):
         yield address
 
 
-@pytest.fixture(scope="module")
-def work(browser, bench):
-    with opened(browser, bench) as page:
-        shown(page, "Cube")
-        yield page
-
-
-@pytest.fixture
-def page(work):
-    """Return the page as the last test left it, without its dialogs."""
-    work.evaluate("document.querySelectorAll('dialog[open]').forEach((one) => one.close())")
-    rest(work)
-    return work
-
-
 def at(page, x, y, theta=15, face="F1"):
     """Touch a place of a face of the cube by the form; returns what the page then says."""
     page.get_by_test_id("touch-face").select_option(face)

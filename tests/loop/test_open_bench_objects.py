@@ -6,7 +6,7 @@ import re
 
 import httpx
 import pytest
-from bench_page import PATIENCE_MS, opened, rest, shown, touched, until
+from bench_page import PATIENCE_MS, rest, shown, touched, until
 from playwright.sync_api import expect
 
 
@@ -16,22 +16,7 @@ def bench(served):
         yield address
 
 
-@pytest.fixture(scope="module")
-def work(browser, bench):
-    with opened(browser, bench) as page:
-        yield page
-
-
-@pytest.fixture
-def page(work):
-    """Return the page as the last test left it, without its dialogs."""
-    work.evaluate("document.querySelectorAll('dialog[open]').forEach((one) => one.close())")
-    rest(work)
-    return work
-
-
 def test_the_gallery_is_searched_and_chosen_from_by_keys_alone(page):
-    shown(page, "Cube")
     page.get_by_test_id("gallery-open").focus()
     page.keyboard.press("Enter")
     count, buttons = page.get_by_test_id("gallery-count"), page.locator("#gallery-list button")
@@ -47,9 +32,7 @@ def test_the_gallery_is_searched_and_chosen_from_by_keys_alone(page):
     expect(count).to_have_text("1 of 2 objects")
     expect(page.locator("#gallery-list button:visible")).to_have_text(re.compile("^Cylinder"))
     until(page, "[...document.querySelectorAll('#gallery-list img')].every((i) => i.complete)")
-    drawn = page.evaluate(
-        "[...document.querySelectorAll('#gallery-list img')].map((i) => i.naturalWidth)"
-    )
+    drawn = page.locator("#gallery-list img").evaluate_all("all => all.map((i) => i.naturalWidth)")
     assert min(drawn) > 0
     page.keyboard.press("Enter")
     until(page, "bench.shown === 'Cylinder'")
@@ -65,16 +48,13 @@ def test_the_gallery_is_searched_and_chosen_from_by_keys_alone(page):
 
 
 def test_what_was_felt_and_its_mosaic_are_on_the_part(page, bench):
-    shown(page, "Cube")
     part, faces = page.get_by_test_id("part"), page.get_by_test_id("face-list")
     page.get_by_test_id("tint").select_option("coverage")
     expect(faces.locator("li")).to_have_count(6)
     expect(faces).to_contain_text("F2: 0 % felt by 0 touches")
     assert touched(page, 0.42, 0.55).startswith("Cube F2")
     rest(page)
-    expect(faces).to_contain_text(
-        re.compile("F2: 1[78] % felt by 1 touch")
-    )  # 25.4 of 60 mm, squared
+    expect(faces).to_contain_text(re.compile("F2: 1[78] % felt by 1 touch"))  # (25.4 of 60 mm)^2
     felt = part.screenshot()
     page.get_by_test_id("tint").select_option("mosaic")
     expect(faces).to_contain_text("F2: mosaic of 1 touch")
@@ -92,7 +72,6 @@ def test_what_was_felt_and_its_mosaic_are_on_the_part(page, bench):
 
 
 def test_what_is_promised_colours_the_faces_and_is_said(page, bench):
-    shown(page, "Cube")
     plain = page.get_by_test_id("part").screenshot()
     page.get_by_test_id("tint").select_option("promise")
     faces = page.get_by_test_id("face-list")

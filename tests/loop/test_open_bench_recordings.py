@@ -55,8 +55,7 @@ def refused(answer, kind):
     return error["place"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_what_means_harm_is_refused_and_the_server_ends(folder, number):
+def test_what_means_harm_is_refused_and_the_server_ends(folder):
     kept = folder / "recordings"
     with started(folder) as (process, client):
         for kind in HOSTILE:
@@ -67,13 +66,14 @@ def test_what_means_harm_is_refused_and_the_server_ends(folder, number):
             assert refused(client.post("/api/replay", json={"name": "mine.h5"}), kind)
             assert client.post("/api/port", json={"url": "sim:"}).status_code == 200
             (kept / "mine.h5").unlink()
-        seconds, code = ended(process, number)
+        seconds, code = ended(process, signal.SIGTERM)
     assert code == 0
     assert seconds < SOON_S
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("work", ["two sent in", "one played"])
+@pytest.mark.parametrize(
+    ("work", "number"), [("two sent in", signal.SIGTERM), ("one played", signal.SIGINT)]
+)
 def test_the_server_ends_while_it_reads_long_recordings(folder, work, number):
     path = write_zeros(folder / "long.h5", LONG)
     (folder / "recordings" / "long.h5").write_bytes(path.read_bytes())

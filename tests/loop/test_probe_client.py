@@ -72,10 +72,9 @@ def test_frames_are_what_the_sensor_feels(probe):
 
 
 def test_sensor_and_bits_are_selected_and_told_again_after_a_reset(probe):
-    with Client(probe.url, sensor=5) as client:
+    with Client(probe.url, sensor=5, bits=8) as client:
         until(client, lambda f: sensor_of(f) == 5)
         client.select_sensor(2)
-        client.select_bits(8)
         until(client, lambda f: sensor_of(f) == 2 and f.counts.max() < 256)
         until(client, lambda f: client.ident.bits == 8)
         before = until(client, lambda f: f.seq > 30)

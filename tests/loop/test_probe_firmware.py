@@ -4,10 +4,8 @@ Counts are compared with the images that were felt, frame by frame. Free-running
 where time does not matter: they take an eighth of the time.
 """
 
-import os
 import re
 import subprocess
-import time
 
 import numpy as np
 import pytest
@@ -15,9 +13,8 @@ from reference.emulated_probe import FIRMWARE, build, emulated_probe
 
 from probe.circuit import QUIET, Electronics, invert_readings
 from probe.circuit.reading import shares
-from probe.errors import PortError
 from probe.port import open_port
-from probe.protocol import Damage, FramePacket, IdentPacket, Splitter, StatisticsPacket, decode
+from probe.protocol import FramePacket, IdentPacket, Splitter, StatisticsPacket, decode
 
 HERTZ = 16_000_000
 ADC_CLOCK = 16  # cycles
@@ -186,96 +183,6 @@ def test_a_reset_is_seen_by_the_boot_counter_and_the_ident(probe, line):
     assert ident.seq == 0
     assert ident.t_us < 10_000
     assert line.ask(b"g", FramePacket).seq == 0
-
-
-def test_no_frame_of_a_damaged_stream_is_wrong(probe, line):
-    image = images(1, seed=4)[0]
-    probe.show(image, WRIST_MV)
-    before = probe.statistics()
-    damages = good = 0
-    probe.fault("flip 300")
-    probe.fault("drop 300")
-    line.send(b"s")
-    for i, packet in enumerate(line.packets()):
-        if i % 100 == 50:
-            probe.fault("garbage 700")
-        if isinstance(packet, FramePacket) and i > 1:
-            good += 1
-            assert (packet.counts == counts_of(image)).all()
-        damages += isinstance(packet, Damage)
-        if i == 1000:
-            break
-    probe.fault("flip 0")
-    probe.fault("drop 0")
-    after = probe.statistics()
-    assert after.flipped > before.flipped
-    assert after.dropped > before.dropped
-    assert after.garbage - before.garbage == 7000
-    assert damages > 100
-    assert good > 500
-    line.quiet()
-    assert isinstance(line.ask(b"g", FramePacket), FramePacket)
-
-
-def test_unplugged_is_gone_and_comes_back_started_anew(probe):
-    with Line(probe.url) as line:
-        line.send(b"s")
-        line.take(3)
-        boots = probe.boots
-        probe.fault("unplug 0.3")
-        unplugged = time.monotonic()
-        with pytest.raises(PortError, match="went away"):
-            list(line.packets(1.0))
-    assert not os.path.lexists(probe.device)
-    while not os.path.lexists(probe.device):
-        assert time.monotonic() - unplugged < 5
-        time.sleep(0.01)
-    assert time.monotonic() - unplugged >= 0.25
-    with Line(probe.url) as line:
-        assert probe.boots == boots + 1
-        assert line.ask(b"g", FramePacket).seq == 0
-
-
-def test_a_listener_who_sleeps_loses_bytes_but_never_gets_a_wrong_frame(probe, line):
-    image = images(1, seed=5)[0]
-    probe.show(image, WRIST_MV)
-    line.ask(b"g", FramePacket)
-    before = probe.statistics()
-    line.send(b"s")
-    until = time.monotonic() + 10
-    while probe.statistics().overrun < before.overrun + 10_000:  # the emulation goes on
-        assert time.monotonic() < until
-        time.sleep(0.02)
-    line.send(b"x")
-    for packet in line.packets(0.2):
-        assert isinstance(packet, Damage) or (packet.counts == counts_of(image)).all()
-    assert (line.ask(b"g", FramePacket).counts == counts_of(image)).all()
-
-
-def test_nothing_is_kept_for_who_opens_the_port_later(probe):
-    with Line(probe.url) as line:
-        line.send(b"s")
-        line.take(2)
-    before = probe.statistics()
-    while probe.statistics().sent < before.sent + 50_000:
-        time.sleep(0.02)
-    after, scans = probe.statistics(), probe.scans
-    assert after.unheard - before.unheard == after.sent - before.sent
-    with Line(probe.url) as line:
-        oldest = line.next(FramePacket).seq
-        assert (oldest - scans) % 65536 < 32768 or (scans - oldest) % 65536 <= 3  # in flight
-        line.quiet()
-
-
-def test_another_speed_reads_nothing(probe):
-    with Line(probe.url) as line:
-        line.send(b"s")
-        line.take(1)
-    with Line(probe.url.replace("1000000", "500000")) as line:
-        assert {type(next(line.packets())) for _ in range(20)} == {Damage}
-    assert probe.statistics().garbled > 1000
-    with Line(probe.url) as line:
-        line.quiet()
 
 
 def pins_of(board):

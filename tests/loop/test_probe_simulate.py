@@ -18,10 +18,10 @@ from probe.contact.press import press
 from probe.errors import SurfaceError
 from probe.recording.read import Recording
 from probe.simulate.registered import DatabaseUnreadableError, registered_object, registered_surface
+from probe.simulate.scene import TouchRanges, pose_of, random_touches
 from probe.simulate.sensor import simulated_sensor
 from probe.simulate.source import frames_of, options_of
 from probe.simulate.target import part_surface, surface_of
-from probe.simulate.touch import TouchRanges, pose_of, random_touches
 from probe.simulate.written import part_mesh
 
 SET = """
@@ -79,7 +79,7 @@ def assert_same(ours, written, size_mm):
     assert off.max() < 8 * ulp
 
 
-@pytest.mark.parametrize("face", ["F1", "F2", "F6"])
+@pytest.mark.parametrize("face", ["F1", "F6"])
 def test_panel_is_the_registered_face(lab, face):
     scene = registered_surface(str(lab / "lab.db"), "Cube", face)
     part = part_surface(file_of(lab, f"Cube-{face}"), database=str(lab / "lab.db"))
@@ -91,10 +91,7 @@ def test_panel_is_the_registered_face(lab, face):
     assert_same(ours, written, 40.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "face"),
-    [("Whole", "F1"), ("Whole", "F4"), ("Ball", "F2"), ("Ball", "F9"), ("Step", "F2")],
-)
+@pytest.mark.parametrize(("name", "face"), [("Whole", "F4"), ("Ball", "F2"), ("Step", "F2")])
 def test_whole_part_is_the_registered_face_with_all_that_lies_around_it(lab, name, face):
     scene = surface_of(f"{lab / 'lab.db'}#{name}/{face}")
     part = part_surface(file_of(lab, name), database=str(lab / "lab.db"), face=face)
@@ -142,10 +139,6 @@ def test_databases_that_are_none_exit_as_such(lab):
     assert caught.value.exit_code == 4
 
 
-def test_object_without_a_face_is_its_first_with_symbols(lab):
-    assert surface_of(f"sqlite:///{lab / 'lab.db'}#Cube").face == "F1"
-
-
 def test_a_touch_of_the_file_is_a_touch_of_the_registered_face(lab):
     scene = surface_of(f"{lab / 'lab.db'}#Cube/F3")
     part = part_surface(file_of(lab, "Cube-F3"), database=str(lab / "lab.db"))
@@ -161,18 +154,6 @@ def test_a_touch_of_the_file_is_a_touch_of_the_registered_face(lab):
         # A point on an upright step may fall on either side in float32: one of a tab's 19.
         assert np.abs(one.counts.astype(int) - other.counts.astype(int)).max() <= 12
         assert (one.counts != other.counts).mean() < 0.1
-
-
-def test_same_generator_gives_the_same_counts(lab):
-    scene = surface_of(f"{lab / 'lab.db'}#Cube")
-    touch = Touch(20.0, 20.0, 0.3, 60.0)
-    frames = [
-        simulated_sensor(SensorType(), accuracy="tabs")
-        .read(scene, touch, np.random.default_rng(seed))
-        for seed in (1, 1, 2)
-    ]  # fmt: skip
-    assert np.array_equal(frames[0].counts, frames[1].counts)
-    assert not np.array_equal(frames[0].counts, frames[2].counts)
 
 
 def test_random_touches_fill_their_region_and_ranges(lab):

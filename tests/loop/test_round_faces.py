@@ -28,8 +28,7 @@ from generator.polyhedron.development import development
 from generator.polyhedron.winged import developable_from
 from generator.spec import read_specs
 from probe.simulate.registered import registered_object
-from probe.simulate.scene import bare_scene
-from probe.simulate.touch import TouchRanges, random_touches
+from probe.simulate.scene import TouchRanges, bare_scene, random_touches
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.sensor import LevelSensor
 from probe.simulate.written import round_part

@@ -17,7 +17,7 @@ from probe.recording.record import Recorder
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.simulate.registered import registered_surface
-from probe.simulate.touch import pose_of
+from probe.simulate.scene import pose_of
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
 from recognizer.command import run as recognize_object

@@ -20,7 +20,7 @@ from recognizer.touch.reader import Reader
 from recognizer.validation.command import run
 from recognizer.validation.draw import draw_touch
 from recognizer.validation.errors import SetError
-from recognizer.validation.touch_plan import TouchPlan, sensor_of, written_surface
+from recognizer.validation.touch_plan import TouchPlan, written_surface
 
 TOUCHES, SHARD = 18, 6
 COMMAND = [sys.executable, "-m", "recognizer.validation.command"]
@@ -203,32 +203,6 @@ def test_a_report_of_what_no_database_knows_shows_no_errors_of_right_answers(ref
     assert "How far off" in (reference[0] / "report.html").read_text()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [
-        (["--touches", "5"], 2, "no set is named"),
-        (["--touches", "0"], 2, "touches"),
-        (["--kinds", "facet"], 2, "'facet' is not known"),
-        (["--levels", "low=-1"], 2, "'-1'"),
-        (["--overlay", "felt"], 2, "'felt' is not known"),
-        (["--database", "nowhere.db"], 4, "nowhere.db"),
-        (["missing.yaml"], 2, "missing.yaml"),
-        (["repeat", "nowhere", "1"], 2, "no run of validate-set"),
-        (["report", "nowhere"], 2, "no run of validate-set"),
-        (["compare", "nowhere", "nowhere"], 2, "results.json"),
-    ],
-)
-def test_bad_input_is_refused(arguments, code, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert run(arguments) == code
-    told = capsys.readouterr()
-    assert said in told.err
-    assert "Traceback" not in told.err
-    assert not (tmp_path / "validation" / "asked.json").exists()
-    assert run([*arguments, "--json"]) == code
-    assert json.loads(capsys.readouterr().out)["error"]["exit_code"] == code
-
-
 def test_a_folder_is_not_taken_twice_nor_resumed_otherwise(spec, reference, capsys):
     folder = reference[0]
     assert run(asked(spec, folder)) == 2
@@ -239,7 +213,7 @@ def test_a_folder_is_not_taken_twice_nor_resumed_otherwise(spec, reference, caps
 
 def test_written_files_are_what_is_registered(reference):
     database = str(reference[0] / "lab.db")
-    reader = Reader(open_lab(database), sensor_of("", "tab"))
+    reader = Reader(open_lab(database))
     for number in range(4):
         said, written = (
             draw_touch(TouchPlan(database, level="low", files=files), number, reader)

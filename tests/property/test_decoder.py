@@ -3,13 +3,13 @@
 import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from reference.polynomials import mulmod
 
 from decoder import Likelihood, decode_exact, strength
 from decoder.element import Keys, elements_of
 from decoder.register import eliminate
 from generator.array import PROFILES, array_from
 from generator.array.field import field_of_order
-from generator.array.polynomial import mulmod
 
 FOLDS = [
     array_from({"family": "prba" if q == 2 else "prmva", "order": q, "degree": n})

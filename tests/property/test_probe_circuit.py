@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference.drawn_fsr import Spread, draw_fsr
 
 from probe.circuit import (
     QUIET,
     Electronics,
-    Spread,
     conductances,
-    draw_fsr,
     effective_resistances,
     invert_readings,
     read_counts,
@@ -35,7 +34,7 @@ def matrices(draw, decades=6.0):
     return scale * np.where(rng.random(shape) < draw(st.floats(0.05, 0.9)), 1.0, 10**-spread)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=40)
 @given(matrices(12.0))
 def test_foster_holds_and_more_conductance_never_means_more_resistance(g):
     resistance = effective_resistances(g)
@@ -45,7 +44,7 @@ def test_foster_holds_and_more_conductance_never_means_more_resistance(g):
     assert (effective_resistances(more) <= resistance * (1 + 1e-12)).all()
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=40)
 @given(matrices(), st.floats(0, 10), st.floats(0, 10))
 def test_a_driven_row_never_gives_more_current_than_its_tactels_into_a_short(g, row, column):
     current = transconductances(g, row / g.max(), column / g.max())
@@ -94,7 +93,7 @@ def test_every_board_is_inverted(g, readout, row, column, load):
     assert found.lost[saturated].all()
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=40)
 @given(seeds, sizes, st.floats(0.1, 20), st.floats(-0.02, 0.02))
 def test_the_scan_is_undone(seed, shape, settled, coupling):
     e = replace(Electronics(), settling_s=settled * 5e-6, coupling=coupling)

@@ -46,11 +46,11 @@ def test_gain_and_offset_leave_the_correlation_as_it_is(seed, gain, offset):
     rng = np.random.default_rng(seed)
     values, known = rng.normal(size=(14, 13)), rng.random((14, 13)) > 0.1
     image, seen = rng.normal(size=(9, 9)), rng.random((9, 9)) > 0.1
-    first = cross_correlate(KnownRaster(values, known, 0, 0, 1), KnownRaster(image, seen, 0, 0, 1))
-    other = KnownRaster(gain * image + offset, seen, 0, 0, 1)
-    second = cross_correlate(KnownRaster(values, known, 0, 0, 1), other)
-    assert second.rho == pytest.approx(first.rho, abs=1e-4, nan_ok=True)
-    assert np.nanmax(np.abs(first.rho)) <= 1
+    wide = KnownRaster(values, known, 0, 0, 1)
+    first, _ = cross_correlate(wide, KnownRaster(image, seen, 0, 0, 1))
+    second, _ = cross_correlate(wide, KnownRaster(gain * image + offset, seen, 0, 0, 1))
+    assert second == pytest.approx(first, abs=1e-4, nan_ok=True)
+    assert np.nanmax(np.abs(first)) <= 1
 
 
 @given(seeds, st.lists(poses, min_size=1, max_size=3))
@@ -73,7 +73,6 @@ def test_the_order_of_touches_does_not_matter_to_the_canvas(seed, places):
         two = image_of(back)
         assert (one.count == two.count).all()
         assert one.values == pytest.approx(two.values, abs=1e-9)
-        assert np.isfinite(one.error).all()
     for patch, how in some:
         there = add_to_canvas(there, patch, how, -1)
     assert not there.tiles

@@ -219,10 +219,7 @@ class CondensedPad:
 
 
 def condense(
-    lines: PadLines,
-    young: float,
-    poisson: float,
-    tactel_edges: tuple[Array, Array],
+    lines: PadLines, young: float, poisson: float, tactel_edges: tuple[Array, Array]
 ) -> CondensedPad:
     """Condense a pad to the nodes of its top and to the tactels.
 

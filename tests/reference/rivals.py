@@ -69,7 +69,8 @@ def rival_shares(array: FoldedArray, sets: Sequence[VisibleSet]) -> RivalShares:
     0.1
     """
     extent = 1 + np.max([one.cells.max(axis=0, initial=0) for one in sets], axis=0)
-    cells = array.coefficients(np.arange(extent[0])[:, None], np.arange(extent[1]))
+    offsets = array.offsets(np.arange(extent[0])[:, None], np.arange(extent[1]))
+    cells = array.sequence.coefficients(offsets)
     return code_shares(array.sequence.field, cells.reshape(*extent, -1), sets)
 
 

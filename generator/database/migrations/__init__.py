@@ -1,8 +1,7 @@
 """One module per schema version: how a database of the version before becomes one of it.
 
-`vN.py` has `upgrade(connection)`, which runs in the connection's `writing` transaction. A module
-is history: it names tables and columns as they were then and imports nothing of `tables`,
-which goes on. Plain DDL that SQLite and PostgreSQL share serves for it. On SQLite columns and
-tables are added and never rebuilt: dropping the old table would, with foreign keys on, remove the
-rows that refer to it.
+`vN.py` has `upgrade(connection)`, which runs in a write transaction. A module is history: it names
+tables and columns as they were then and imports nothing of `tables`. On SQLite columns and tables
+are added and never rebuilt: dropping the old table would, with foreign keys on, remove the rows
+that refer to it.
 """

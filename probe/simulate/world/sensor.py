@@ -125,15 +125,8 @@ class LevelSensor:
     def read(self, scene: Scene, touch: Touch, rng: np.random.Generator) -> SensorReading:
         """Return what the sensor reads of a touch.
 
-        Parameters
-        ----------
-        scene
-            What is touched, without the faults of its print, whose scale leaves the middle of the
-            scene in its place.
-        touch
-            Where and how.
-        rng
-            Draws the instance unless it is given, the direction of a slide, the noise.
+        The scene is without the faults of its print, whose scale leaves its middle in its place.
+        `rng` draws the instance unless it is given, the direction of a slide, the noise.
 
         Raises
         ------
@@ -182,7 +175,7 @@ class LevelSensor:
         Of a level count its print, `gain` (the depth made of a shade is off by a share that changes
         slowly over the gel, half of the spread of tactels), `exponent` (its law), `dead`
         (blemishes), `cross_talk` (blur, pixels), `noise_n` (over that of `typical`, times the
-        type's noise) and the wrist. A gel has no tips, no film and no rows.
+        type's noise) and the wrist.
         """
         from scipy.ndimage import gaussian_filter
 

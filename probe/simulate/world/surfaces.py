@@ -137,16 +137,8 @@ def worn_scene(
 ) -> Scene:
     """Return a face of which a share of the symbols is worn away, the same ones at every touch.
 
-    Parameters
-    ----------
-    scene
-        The face.
-    centres_mm, rotation_rad, pitch_mm
-        Where its symbols are: (n, 2) in the face frame, the turn of face x into array x.
-    share
-        Probability that a symbol is gone.
-    rng
-        Draws them.
+    `centres_mm` (n, 2) of its symbols are in the face frame, `rotation_rad` turns face x into array
+    x.
     """
     if isinstance(scene.surface, FaceSurface):
         salt = int(rng.integers(1 << 31)) if scene.surface.lattice is not None else 0
@@ -255,19 +247,8 @@ def place_adjacent(
 ) -> tuple[FramePlace, Array]:
     """Place a face edge to edge with another one, and draw a place near where they meet.
 
-    Parameters
-    ----------
-    first, second
-        Outlines, each in its own frame.
-    rng
-        Draws the edges, gap, step and place.
-
-    Returns
-    -------
-    place
-        Of the second's frame in the first's.
-    at_mm
-        (2,) a place on the first, at most `REACH_MM` from the edge, opposite the second's edge.
+    Returns the place of the second's frame in the first's, and (2,) a place on the first, at most
+    `REACH_MM` from the edge, opposite the second's edge.
 
     Raises
     ------
@@ -315,17 +296,12 @@ class Ridges:
     period_mm: float
     width_mm: float
     angle_rad: float
-    height_mm: float = 1.0
-
-    @property
-    def top_mm(self) -> float:
-        """Height of the ridges."""
-        return self.height_mm
+    top_mm: float = 1.0
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return the height of a ridge, or 0."""
         across = points_mm @ np.array([math.cos(self.angle_rad), math.sin(self.angle_rad)])
-        return np.where(across % self.period_mm < self.width_mm, self.height_mm, 0.0)
+        return np.where(across % self.period_mm < self.width_mm, self.top_mm, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -334,18 +310,13 @@ class Dots:
 
     period_mm: float
     diameter_mm: float
-    height_mm: float = 1.0
-
-    @property
-    def top_mm(self) -> float:
-        """Height of the dots."""
-        return self.height_mm
+    top_mm: float = 1.0
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return the height of a dot, or 0."""
         away = (points_mm / self.period_mm + 0.5) % 1.0 - 0.5
         inside = np.hypot(away[:, 0], away[:, 1]) * self.period_mm < self.diameter_mm / 2
-        return np.where(inside, self.height_mm, 0.0)
+        return np.where(inside, self.top_mm, 0.0)
 
 
 def draw_ridges(pitch_mm: float, stroke_mm: float, rng: np.random.Generator) -> HeightMap:
@@ -375,15 +346,8 @@ def draw_text(
 ) -> HeightMap:
     """Return lines of letters as high and as thick as the symbols.
 
-    Parameters
-    ----------
-    letters
-        Strokes of each, in lattice units.
-    reach
-        Lattice unit over pitch.
-    pitch_mm, relief
-        Of the lab's symbols; letters are .8 to 1.2 of the pitch apart, their strokes no wider
-        than they bear.
+    Strokes of letters are in lattice units, `reach` is the unit over the pitch. Letters are .8 to
+    1.2 of the lab's pitch apart, their strokes no wider than they bear.
     """
     pitch = pitch_mm * rng.uniform(0.8, 1.2)
     thin = Relief(relief.height_mm, min(relief.stroke_mm, 0.14 * pitch), relief.draft_rad)

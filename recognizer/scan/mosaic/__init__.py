@@ -5,7 +5,6 @@ patch       the image of a touch as a function, and its visible motions
 search      the best places on a reference image, by normalised correlation
 register    one touch against another by least squares
 pose_graph  beliefs, steps, registrations and decoded places -> poses, robustly
-canvas      the global tactile image with its uncertainty
-mosaic      touches with poses, covariances and outliers; the place of one more touch
-grow        one touch more, or all at once
+canvas      the global tactile image
+mosaic      touches with poses and covariances; the place of one more touch
 """

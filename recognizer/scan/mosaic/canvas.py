@@ -1,8 +1,8 @@
-"""The global tactile image and the sums that it is made of. Thesis 4.3.
+"""The global tactile image and its sums. Thesis 4.3.
 
 Cells of a quarter of a tactel in the mosaic's frame: cell (i, j) has its centre at
-((j + 1/2) h, -(i + 1/2) h). The sums stand in tiles that exist where touches lie. A canvas is a
-value: adding or removing a touch copies the tiles under it and shares the others.
+((j + 1/2) h, -(i + 1/2) h). Tiles exist where touches lie. A canvas is a value: adding or removing
+a touch copies the tiles under it and shares the others.
 
 A touch contributes f with variance floor^2 + (slope times the uncertainty of its pose)^2, so that
 an uncertain pose counts little at edges, where it matters, and fully on flat ground. Values are
@@ -30,7 +30,7 @@ from recognizer.scan.mosaic.search import MAGNIFIED, KnownRaster
 
 Array = NDArray[np.float64]
 
-WEIGHT, VALUE, SQUARE, COUNT = range(4)  #: sums of w, w f, w f^2 and 1
+WEIGHT, VALUE, COUNT = range(3)  #: sums of w, w f and 1
 TILE = 64  #: cells, as wide as a touch of 16 tactels
 FLOOR = 0.03  #: least standard deviation of a reading, share of the upper level
 
@@ -40,7 +40,7 @@ class Canvas:
     """Sums on tiles."""
 
     cell_mm: float
-    tiles: Mapping[tuple[int, int], Array]  #: tile row and column -> (4, tile, tile)
+    tiles: Mapping[tuple[int, int], Array]  #: tile row and column -> (3, tile, tile)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,8 +57,6 @@ class GlobalImage:
     """The image on cells of the plane; 0 where no touch lies. Cell (0, 0) is the upper left one."""
 
     values: Array  #: (h, w) weighted means
-    deviation: Array  #: (h, w) standard deviation of the touches about their mean
-    error: Array  #: (h, w) standard deviation of the mean
     count: NDArray[np.int64]  #: (h, w) touches
     step_mm: float
     corner_mm: tuple[float, float]  #: x and y of cell (0, 0), frame of the mosaic
@@ -94,17 +92,16 @@ def add_to_canvas(canvas: Canvas, patch: TouchPatch, entry: CanvasEntry, sign: i
     unit = entry.gain * patch.scale
     uncertain = np.einsum("ni,ij,nj->n", slopes, entry.covariance, slopes)
     variance = unit**2 * (FLOOR**2 + uncertain)
-    sums = np.zeros((4, points.shape[0]))
+    sums = np.zeros((3, points.shape[0]))
     weight = 1 / variance
     sums[WEIGHT, known], sums[COUNT, known] = weight, 1.0
     sums[VALUE, known] = weight * unit * values
-    sums[SQUARE, known] = weight * (unit * values) ** 2
-    return _add_sums(canvas, sign * sums.reshape(4, i1 - i0, j1 - j0), i0, j0)
+    return _add_sums(canvas, sign * sums.reshape(3, i1 - i0, j1 - j0), i0, j0)
 
 
 def rectangle_sums(canvas: Canvas, i0: int, j0: int, rows: int, columns: int) -> Array:
-    """Return the sums (4, rows, columns) of a rectangle of cells."""
-    found, size = np.zeros((4, rows, columns)), TILE
+    """Return the sums (3, rows, columns) of a rectangle of cells."""
+    found, size = np.zeros((3, rows, columns)), TILE
     for (k, m), tile in canvas.tiles.items():
         top, left = k * size - i0, m * size - j0
         if -size < top < rows and -size < left < columns:
@@ -130,22 +127,16 @@ def image_of(canvas: Canvas) -> GlobalImage:
     h = canvas.cell_mm
     if not canvas.tiles:
         none = np.zeros((0, 0))
-        return GlobalImage(none, none, none, none.astype(np.int64), h, (0.0, 0.0))
+        return GlobalImage(none, none.astype(np.int64), h, (0.0, 0.0))
     at = np.array(list(canvas.tiles))
     low, high = at.min(axis=0) * TILE, (at.max(axis=0) + 1) * TILE
     sums = rectangle_sums(canvas, low[0], low[1], *(high - low).tolist())
     rows, columns = (np.flatnonzero((sums[COUNT] > 0.5).any(axis=axis)) for axis in (1, 0))
     sums = sums[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     count = np.rint(sums[COUNT]).astype(np.int64)
-    weight = np.where(count > 0, sums[WEIGHT], 1.0)
-    mean = np.where(count > 0, sums[VALUE] / weight, 0.0)
-    rest = np.maximum(sums[SQUARE] / weight - mean**2, 0.0)
-    # touches that scatter more than expected are trusted less
-    excess = np.maximum(rest * weight / np.maximum(count - 1, 1), 1.0)
-    error = np.where(count > 0, np.sqrt(excess / weight), 0.0)
+    mean = np.where(count > 0, sums[VALUE] / np.where(count > 0, sums[WEIGHT], 1.0), 0.0)
     corner = (float(low[1] + columns[0] + 0.5) * h, -float(low[0] + rows[0] + 0.5) * h)
-    deviation = np.where(count > 1, np.sqrt(rest), 0.0)
-    return GlobalImage(mean, deviation, error, count, h, corner)
+    return GlobalImage(mean, count, h, corner)
 
 
 def _add_sums(canvas: Canvas, sums: Array, i0: int, j0: int) -> Canvas:
@@ -159,7 +150,7 @@ def _add_sums(canvas: Canvas, sums: Array, i0: int, j0: int) -> Canvas:
             part = sums[:, a:c, b:d]
             if not part[COUNT].any():
                 continue
-            tile = tiles[k, m].copy() if (k, m) in tiles else np.zeros((4, size, size))
+            tile = tiles[k, m].copy() if (k, m) in tiles else np.zeros((3, size, size))
             under = tile[:, a - top : c - top, b - left : d - left]
             under += part
             under[:, under[COUNT] < 0.5] = 0.0  # rounding alone is left

@@ -1,11 +1,12 @@
 """The mosaic of a face: touches, their poses and covariances, and the image. Thesis 4.3.
 
 Its frame is that of the face as soon as one touch is decoded, until then that of the arm's plane.
+`add_touch` costs the registration of the touch with its neighbours and one solution of the pose
+graph.
 
-`place_touch` finds a start and constraints for one more touch. A decoded touch has its pose; images
-of neighbours only check it. Any other touch is searched for on the mean of all touches near it,
-which shows more than each of them and excludes more places that look alike; then it is registered
-with each neighbour.
+A decoded touch has its pose; images of neighbours only check it. Any other touch is searched for on
+the mean of all touches near it, which shows more than each of them and excludes more places that
+look alike; then it is registered with each neighbour.
 """
 
 from __future__ import annotations
@@ -28,12 +29,20 @@ from recognizer.scan.mosaic.canvas import (
     image_of,
     reference,
 )
-from recognizer.scan.mosaic.patch import TouchPatch, covers_points, scales, seen_motions
+from recognizer.scan.mosaic.patch import (
+    TouchPatch,
+    covers_points,
+    far_apart,
+    patch_of,
+    scales,
+    seen_motions,
+)
 from recognizer.scan.mosaic.planar import (
     PlacedTouch,
     PlanarBelief,
     compose_poses,
     composed_covariance,
+    inverse,
     pose_difference,
     relative_covariance,
     relative_pose,
@@ -47,14 +56,13 @@ from recognizer.scan.mosaic.pose_graph import (
     PLANE,
     Constraint,
     Kind,
+    PoseGraphSolution,
+    covariances,
     robust_cost,
+    solve_pose_graph,
 )
 from recognizer.scan.mosaic.register import (
-    AMBIGUOUS,
     CONSTANT,
-    MARGIN,
-    MARGIN_BEYOND,
-    NEAR_TACTELS,
     NOISE,
     SIGNIFICANCE,
     ImageRegistration,
@@ -66,8 +74,12 @@ from recognizer.scan.mosaic.search import SIGMAS, search_reference, window_mm
 Array = NDArray[np.float64]
 
 ALONE = "no neighbour"
+AMBIGUOUS = "more than one place"
 PARTLY = "in one direction only"
 
+NEAR_TACTELS = 0.4  #: windows no wider than this need no search
+MARGIN = 3.0  #: nats over the next place, in a window within half a period
+MARGIN_BEYOND = 8.0  #: in a wider window
 PERIOD_MM = 7.0  #: pitch of symbols, after which the surface looks alike
 PARTNERS = 4  #: neighbours that a touch is registered with
 PARTNERS_DECODED = 2  #: of a decoded touch: they only check it
@@ -75,24 +87,25 @@ LEAST_COMMON = 0.3  #: share of the matrix that partners have in common
 WIDENED_TACTELS = 0.5  #: standard deviation added to beliefs while images are compared
 INFLATION = 1.5  #: of pairs' covariance: pairs of one touch share its noise; measured
 
+SHOWN = ("", ALONE, PARTLY, CONSTANT)  #: reasons with which a touch is part of the image
+MOVED_TACTELS = 0.2  #: less than one cell, by which a pose changes before its entry does
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mosaic:
-    """A value; `grow.add_touch` returns the next one."""
+    """A value; `add_touch` returns the next one."""
 
     sensor: SensorType
     period_mm: float  #: after which the surface looks alike; inf: never
     touches: tuple[PlacedTouch, ...]
     patches: tuple[TouchPatch, ...]
     poses: Array  #: (n, 3) T_plane_touch, mm and rad
-    covariances: Array  #: (n, 3, 3); of older touches too large until `grow.settle_mosaic`
+    covariances: Array  #: (n, 3, 3); of older touches too large
     reasons: tuple[str, ...]  #: "" where decoded or registered, otherwise why not
     gains: Array  #: (n,) factors that make the readings of touches equal
     arm: Array  #: (3,) T_plane_arm
     arm_covariance: Array  #: (3, 3); zero where the arm's plane is the frame
     constraints: tuple[Constraint, ...]
-    weights: Array  #: (m,) of the constraints
-    chi2: Array  #: (m,)
     entries: tuple[CanvasEntry | None, ...]  #: of each touch on the canvas
     canvas: Canvas
 
@@ -114,14 +127,6 @@ class Mosaic:
         if frame == PLANE:
             return np.zeros(3)
         return self.arm if frame == ARM else np.asarray(self.poses[frame])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Outlier:
-    """A constraint that disagrees with all others and is switched off."""
-
-    constraint: Constraint
-    chi2: float  #: of three numbers; 0.1 % of good ones pass 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,44 +164,77 @@ def no_touches(sensor: SensorType, period_mm: float = PERIOD_MM) -> Mosaic:
         arm=np.zeros(3),
         arm_covariance=np.zeros((3, 3)),
         constraints=(),
-        weights=np.zeros(0),
-        chi2=np.zeros(0),
         entries=(),
         canvas=empty_canvas(sensor.pitch_mm),
     )
 
 
-def outliers(mosaic: Mosaic) -> list[Outlier]:
-    """Return the constraints that are switched off, the worst first."""
-    found = [
-        Outlier(constraint, float(chi2))
-        for constraint, weight, chi2 in zip(
-            mosaic.constraints, mosaic.weights, mosaic.chi2, strict=True
+def add_touch(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
+    """Return the mosaic of one face with one touch added; the first is `no_touches`.
+
+    The first decoded touch turns the mosaic's frame into that of the face; it needs a place in the
+    old frame, too.
+
+    Raises
+    ------
+    MosaicError
+        Another sensor's image, or a touch without a frame.
+    """
+    shape = touch.signal.forces.shape
+    if shape != (mosaic.sensor.rows, mosaic.sensor.columns):
+        raise MosaicError(
+            f"an image of {shape[0]} x {shape[1]} tactels",
+            fix=f"the sensor has {mosaic.sensor.rows} x {mosaic.sensor.columns}",
+            place=f"touch {touch.seq}",
         )
-        if weight < OUTLIER_WEIGHT
-    ]
-    return sorted(found, key=lambda outlier: -outlier.chi2)
+    number = len(mosaic)
+    patch = patch_of(mosaic.sensor, touch.signal)
+    mosaic = _frame_for_touch(mosaic, touch, patch)
+    place = _place_touch(mosaic, touch, patch)
+    constraints = mosaic.constraints + place.constraints
+    met = {constraint.a for constraint in place.constraints if constraint.kind == "pair"}
+    reasons = ["" if n in met and why == ALONE else why for n, why in enumerate(mosaic.reasons)]
+    grown = replace(
+        mosaic,
+        touches=(*mosaic.touches, touch),
+        patches=(*mosaic.patches, patch),
+        poses=np.concatenate([mosaic.poses, place.pose[None]]),
+        covariances=np.concatenate([mosaic.covariances, np.full((1, 3, 3), np.nan)]),
+        reasons=(*reasons, place.reason),
+        gains=np.append(mosaic.gains, place.gain),
+        entries=(*mosaic.entries, None),
+        constraints=constraints,
+    )
+    fresh = {number, *(constraint.a for constraint in place.constraints if constraint.a >= 0)}
+    found = _solve(grown)
+    doubted = [k for k, constraint in enumerate(constraints) if constraint.kind == "decoded"]
+    if any(found.weights[k] < OUTLIER_WEIGHT for k in doubted):
+        found = _vote_on_frame(grown, found)
+    return _apply_solution(grown, found, fresh)
 
 
-def place_touch(
-    mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch, number: int
-) -> TouchPlacement:
-    """Return start and constraints of a touch; the mosaic may contain it under its number."""
+def _place_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> TouchPlacement:
+    """Return start and constraints of a new touch."""
+    number = len(mosaic)
     given = _given_constraints(touch, number)
-    predicted = _predict_pose(mosaic, touch, number)
-    if touch.decoded is not None and _contradicts_decoded(mosaic, touch, number):
-        # neighbours decide which source is right
-        other = place_touch(mosaic, replace(touch, decoded=None), patch, number)
+    predicted = _predict_pose(mosaic, touch)
+    if _contradicts_decoded(mosaic, touch):  # neighbours decide which source is right
+        other = _place_touch(mosaic, replace(touch, decoded=None), patch)
         if not other.reason:
             return replace(other, constraints=(given[0], *other.constraints))
-    near = _overlapping_neighbours(mosaic, patch, predicted, number)
-    reason, start = _search_mosaic(mosaic, patch, predicted, near, number)
+    near = _overlapping_neighbours(mosaic, patch, predicted)
+    reason, start = _search_mosaic(mosaic, patch, predicted, near)
     pairs: list[tuple[int, ImageRegistration]] = []
-    if not reason:
-        pairs = _register_neighbours(mosaic, patch, predicted, start, near)
+    widened = np.diag((WIDENED_TACTELS * scales(mosaic.sensor)) ** 2)
+    for j in near if not reason else ():
+        at, sure = mosaic.poses[j], mosaic.covariances[j]
+        spread = relative_covariance(at, predicted.pose, sure, predicted.covariance) + widened
+        believed, near_start = relative_pose(at, predicted.pose), relative_pose(at, start)
+        pair = register_patches(mosaic.patches[j], patch, believed, spread, near_start)
+        pairs.append((j, pair))
     softer = 1 / INFLATION
     constraints = given + [
-        Constraint(j, number, pair.pose, pair.information * softer, "pair", math.log(pair.gain))
+        Constraint(j, number, pair.pose, pair.information * softer, "pair")
         for j, pair in pairs
         if pair
     ]
@@ -233,17 +271,17 @@ def _given_constraints(touch: PlacedTouch, number: int) -> list[Constraint]:
     return constraints
 
 
-def _contradicts_decoded(mosaic: Mosaic, touch: PlacedTouch, number: int) -> bool:
+def _contradicts_decoded(mosaic: Mosaic, touch: PlacedTouch) -> bool:
     """Whether a decoded pose contradicts the arm or the step."""
     if touch.decoded is None or not len(mosaic) or not (touch.believed or touch.stepped):
         return False
-    expected = _predict_pose(mosaic, replace(touch, decoded=None), number)
+    expected = _predict_pose(mosaic, replace(touch, decoded=None))
     away = pose_difference(touch.decoded.pose, expected.pose)
     spread = expected.covariance + touch.decoded.covariance
     return float(away @ np.linalg.solve(spread, away)) > FREE_CHI2
 
 
-def _predict_pose(mosaic: Mosaic, touch: PlacedTouch, number: int) -> PlanarBelief:
+def _predict_pose(mosaic: Mosaic, touch: PlacedTouch) -> PlanarBelief:
     """Return the expected pose of a touch, without its image."""
     if touch.decoded is not None:
         return touch.decoded
@@ -252,9 +290,9 @@ def _predict_pose(mosaic: Mosaic, touch: PlacedTouch, number: int) -> PlanarBeli
         pose, covariance = touch.believed.pose, touch.believed.covariance
         spread = composed_covariance(mosaic.arm, pose, mosaic.arm_covariance, covariance)
         found.append(PlanarBelief(compose_poses(mosaic.arm, pose), spread))
-    if touch.stepped is not None and number > 0:
+    if touch.stepped is not None and len(mosaic):
         pose, covariance = touch.stepped.pose, touch.stepped.covariance
-        before, sure = mosaic.poses[number - 1], mosaic.covariances[number - 1]
+        before, sure = mosaic.poses[-1], mosaic.covariances[-1]
         spread = composed_covariance(before, pose, sure, covariance)
         found.append(PlanarBelief(compose_poses(before, pose), spread))
     if not found:
@@ -267,14 +305,13 @@ def _predict_pose(mosaic: Mosaic, touch: PlacedTouch, number: int) -> PlanarBeli
 
 
 def _overlapping_neighbours(
-    mosaic: Mosaic, patch: TouchPatch, predicted: PlanarBelief, number: int
+    mosaic: Mosaic, patch: TouchPatch, predicted: PlanarBelief
 ) -> list[int]:
     """Return the neighbours for registration, the largest overlap first."""
     sensor = mosaic.sensor
     away = np.hypot(*(mosaic.poses[:, :2] - predicted.pose[:2]).T)
-    some = [j for j in np.flatnonzero(away < 2 * sensor.reach_mm).tolist() if j != number]
     shares = {}
-    for j in some:
+    for j in np.flatnonzero(away < 2 * sensor.reach_mm).tolist():
         if mosaic.entries[j] is not None and mosaic.reasons[j] != CONSTANT:
             T_j_touch = relative_pose(mosaic.poses[j], predicted.pose)
             shares[j] = float(
@@ -287,11 +324,7 @@ def _overlapping_neighbours(
 
 
 def _search_mosaic(
-    mosaic: Mosaic,
-    patch: TouchPatch,
-    predicted: PlanarBelief,
-    near: Sequence[int],
-    number: int,
+    mosaic: Mosaic, patch: TouchPatch, predicted: PlanarBelief, near: Sequence[int]
 ) -> tuple[str, Array]:
     """Return the pose of a touch on the mean of the others, and a reason or ""."""
     pitch = mosaic.sensor.pitch_mm
@@ -305,51 +338,23 @@ def _search_mosaic(
     turn = SIGMAS * math.sqrt(spread[2, 2]) * mosaic.sensor.reach_mm
     if max(*reach, turn) <= NEAR_TACTELS * pitch:
         return "", predicted.pose
-    canvas = mosaic.canvas
-    if number < len(mosaic) and (own := mosaic.entries[number]) is not None:
-        canvas = add_to_canvas(canvas, patch, own, -1)
     around = mosaic.sensor.reach_mm + math.hypot(*reach) + pitch
-    shown = reference(canvas, float(predicted.pose[0]), float(predicted.pose[1]), around)
-    found = search_reference(shown, patch, predicted.pose, spread)
-    if not found.candidates:
+    x_mm, y_mm = predicted.pose[:2].tolist()
+    shown = reference(mosaic.canvas, x_mm, y_mm, around)
+    candidates, tried = search_reference(shown, patch, predicted.pose, spread)
+    if not candidates or candidates[0].images < SIGNIFICANCE + math.log(tried):
         return NOISE, predicted.pose
-    best = found.candidates[0]
-    if best.images < SIGNIFICANCE + math.log(found.tried):
-        return NOISE, predicted.pose
+    best = candidates[0]
     motions = seen_motions(patch, good, np.zeros(3))
     back = rotation(-float(best.pose[2]))  # to the patch's axes
     beyond = max(reach) > mosaic.period_mm / 2
     least = MARGIN_BEYOND if beyond else MARGIN
-    for other in found.candidates[1:]:
+    for other in candidates[1:]:
         away = pose_difference(other.pose, best.pose)
         apart = float(np.linalg.norm(motions.T @ (back @ away / scales(mosaic.sensor))))
         if apart > 1.0 and best.score - other.score < least:
             return AMBIGUOUS, predicted.pose
     return "", best.pose
-
-
-def _register_neighbours(
-    mosaic: Mosaic,
-    patch: TouchPatch,
-    predicted: PlanarBelief,
-    start: Array,
-    near: Sequence[int],
-) -> list[tuple[int, ImageRegistration]]:
-    widened = (WIDENED_TACTELS * scales(mosaic.sensor)) ** 2
-    pairs = []
-    for j in near:
-        at, sure = mosaic.poses[j], mosaic.covariances[j]
-        belief = relative_covariance(at, predicted.pose, sure, predicted.covariance)
-        pair = register_patches(
-            mosaic.patches[j],
-            patch,
-            relative_pose(at, predicted.pose),
-            belief + np.diag(widened),
-            starts=[relative_pose(at, start)],
-            period_mm=mosaic.period_mm,
-        )
-        pairs.append((j, pair))
-    return pairs
 
 
 def _rank(mosaic: Mosaic, constraints: Sequence[Constraint]) -> int:
@@ -380,3 +385,115 @@ def _gain(mosaic: Mosaic, pairs: Sequence[tuple[int, ImageRegistration]]) -> flo
         return 1.0
     logs, weights = np.log([g for g, _ in found]), np.array([rho for _, rho in found]) ** 2
     return float(np.exp(weights @ logs / weights.sum()))
+
+
+def _frame_for_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> Mosaic:
+    """Return the mosaic in the frame in which a touch can be placed."""
+    if touch.decoded is None:
+        if not mosaic.on_face or touch.believed is None or _uses_arm(mosaic):
+            return mosaic
+        # the arm's frame is not known: no decoded touch has a pose by the arm
+        return replace(mosaic, arm_covariance=np.full((3, 3), np.inf))
+    believed = touch.believed
+    if believed is not None and not _uses_arm(mosaic) and (mosaic.on_face or not len(mosaic)):
+        mosaic = replace(mosaic, arm=compose_poses(touch.decoded.pose, inverse(believed.pose)))
+    if mosaic.on_face or not len(mosaic):
+        return mosaic
+    if believed is None and touch.stepped is None:
+        raise MosaicError(
+            "the first decoded touch has no pose by the arm",
+            fix="give the arm's pose of it, too",
+            place=f"touch {touch.seq}",
+        )
+    pose = _place_touch(mosaic, replace(touch, decoded=None), patch).pose
+    T_face_plane = compose_poses(touch.decoded.pose, inverse(pose))
+    return _change_frame(mosaic, T_face_plane)
+
+
+def _change_frame(mosaic: Mosaic, T_new_old: Array) -> Mosaic:
+    """Return the mosaic in another frame."""
+    turn = rotation(float(T_new_old[2]))
+    canvas, entries = empty_canvas(mosaic.sensor.pitch_mm), list(mosaic.entries)
+    for n, entry in enumerate(mosaic.entries):
+        if entry is not None:
+            pose = compose_poses(T_new_old, entry.pose)
+            moved = CanvasEntry(pose, turn @ entry.covariance @ turn.T, entry.gain)
+            entries[n] = moved
+            canvas = add_to_canvas(canvas, mosaic.patches[n], moved)
+    return replace(
+        mosaic,
+        poses=compose_poses(T_new_old, mosaic.poses),
+        covariances=turn @ mosaic.covariances @ turn.T,
+        arm=compose_poses(T_new_old, mosaic.arm),
+        arm_covariance=turn @ mosaic.arm_covariance @ turn.T,
+        entries=tuple(entries),
+        canvas=canvas,
+    )
+
+
+def _uses_arm(mosaic: Mosaic) -> bool:
+    return any(constraint.a == ARM for constraint in mosaic.constraints)
+
+
+def _solve(mosaic: Mosaic) -> PoseGraphSolution:
+    fixed = not mosaic.on_face
+    return solve_pose_graph(mosaic.constraints, mosaic.poses, mosaic.arm, arm_fixed=fixed)
+
+
+def _vote_on_frame(mosaic: Mosaic, found: PoseGraphSolution) -> PoseGraphSolution:
+    """Return a better solution, if other decoded touches give the face another pose.
+
+    The first decoded touch fixes the frame. If it is wrong, all later ones look wrong: each of them
+    proposes a frame, and the cost decides.
+    """
+    for constraint in mosaic.constraints:
+        if constraint.kind == "decoded":
+            shift = compose_poses(constraint.pose, inverse(found.poses[constraint.b]))
+            if far_apart(shift, np.zeros(3), mosaic.sensor) < 0.1:
+                continue
+            moved = replace(
+                mosaic, poses=compose_poses(shift, found.poses), arm=compose_poses(shift, found.arm)
+            )
+            other = _solve(moved)
+            if other.cost < found.cost - 1e-6:
+                found = other
+    return found
+
+
+def _apply_solution(mosaic: Mosaic, found: PoseGraphSolution, fresh: set[int]) -> Mosaic:
+    """Return the mosaic with the poses of a solution, and its image with them."""
+    numbers = sorted(fresh)
+    free = mosaic.on_face and _uses_arm(mosaic)
+    spread = covariances(found.normal, [*numbers, len(mosaic)] if free else numbers)
+    kept = mosaic.covariances.copy()
+    kept[numbers] = spread[: len(numbers)]
+    canvas, entries = mosaic.canvas, list(mosaic.entries)
+    for n, entry in enumerate(entries):
+        canvas, entries[n] = _move_entry(mosaic, canvas, found, n, entry)
+    return replace(
+        mosaic,
+        poses=found.poses,
+        covariances=kept,
+        arm=found.arm,
+        arm_covariance=spread[-1] if free else np.zeros((3, 3)),
+        entries=tuple(entries),
+        canvas=canvas,
+    )
+
+
+def _move_entry(
+    mosaic: Mosaic, canvas: Canvas, found: PoseGraphSolution, n: int, now: CanvasEntry | None
+) -> tuple[Canvas, CanvasEntry | None]:
+    """Return the canvas with a touch at its pose, and its entry."""
+    pose, gain = found.poses[n], float(mosaic.gains[n])
+    shown = mosaic.reasons[n] in SHOWN and mosaic.patches[n].scale >= 0
+    if now is not None:
+        near = far_apart(now.pose, pose, mosaic.sensor) < MOVED_TACTELS
+        if shown and near and abs(gain / now.gain - 1) < 0.02:
+            return canvas, now
+        canvas = add_to_canvas(canvas, mosaic.patches[n], now, -1)
+    if not shown:
+        return canvas, None
+    block = found.normal[3 * n : 3 * n + 3, 3 * n : 3 * n + 3].toarray()
+    entry = CanvasEntry(np.array(pose), np.asarray(np.linalg.inv(block), np.float64), gain)
+    return add_to_canvas(canvas, mosaic.patches[n], entry), entry

@@ -24,6 +24,12 @@ from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
 
+# Standard deviations of x, y (mm) and the turn (rad) where no covariance is given.
+FIRST_SD = (0.01, 0.01, 0.001)  #: of the first touch against itself
+ARM_SD = (0.4, 0.4, 0.004)  #: of a pose by the arm
+#: of a step without any measurement. Wide: a step of 14 mm must not look less likely than one of
+#: 2 mm, a pitch away
+BY_HAND_SD = (8.0, 8.0, math.radians(2))
 LEAST_FACING_COS = 0.5  #: a sensor turned by more than 60 degrees does not face the plane
 
 

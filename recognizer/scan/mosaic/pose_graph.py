@@ -16,7 +16,7 @@ covariance scaling", ICRA 2013. Kuemmerle et al., "g2o", ICRA 2011.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 from recognizer.scan.mosaic.planar import pose_difference, relative_pose, wrap_angle
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 PLANE, ARM = -2, -1  #: the mosaic's frame, which is fixed, and the arm's
 
@@ -50,7 +49,6 @@ class Constraint:
     pose: Array  #: (3,) T_a_b, mm and rad
     information: Array  #: (3, 3) inverse covariance, axes of a; may be singular
     kind: Kind
-    log_gain: float = 0.0  #: of readings of a over those of b
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,10 +57,8 @@ class PoseGraphSolution:
 
     poses: Array  #: (n, 3) T_plane_touch
     arm: Array  #: (3,) T_plane_arm
-    chi2: Array  #: (m,) of each constraint
     weights: Array  #: (m,) 0 ... 1; under `OUTLIER_WEIGHT` a constraint counts as wrong
     cost: float
-    steps: int
     normal: Any  #: sparse matrix (3 n + 3) square, inverse covariance of poses and arm
 
 
@@ -77,29 +73,27 @@ def solve_pose_graph(
     from scipy.sparse import diags
     from scipy.sparse.linalg import splu
 
-    graph = _graph(constraints, len(poses), arm_fixed=arm_fixed)
-    at = np.concatenate([poses, arm[None]])
-    damping, steps = 1e-6, 0
-    now = _linearise(graph, at)
-    while steps < STEPS:
-        steps += 1
-        diagonal = diags(now.normal.diagonal() * damping)
-        step = splu((now.normal + diagonal).tocsc()).solve(now.pull).reshape(-1, 3)
+    linearise = _linearise(constraints, len(poses), arm_fixed=arm_fixed)
+    at, damping = np.concatenate([poses, arm[None]]), 1e-6
+    cost, weights, normal, pull = linearise(at)
+    for _ in range(STEPS):
+        diagonal = diags(normal.diagonal() * damping)
+        step = splu((normal + diagonal).tocsc()).solve(pull).reshape(-1, 3)
         moved = at + step
         moved[:, 2] = wrap_angle(moved[:, 2])
-        then = _linearise(graph, moved)
-        if then.cost > now.cost * (1 + 1e-12) and damping < 1e6:
+        then = linearise(moved)
+        if then[0] > cost * (1 + 1e-12) and damping < 1e6:
             damping *= 10
             continue
         damping = max(damping / 10, 1e-9)
-        at, now = moved, then
+        at, (cost, weights, normal, pull) = moved, then
         if np.abs(step[:, :2]).max() < DONE_MM and np.abs(step[:, 2]).max() < DONE_RAD:
             break
-    return PoseGraphSolution(at[:-1], at[-1], now.chi2, now.weights, now.cost, steps, now.normal)
+    return PoseGraphSolution(at[:-1], at[-1], weights, cost, normal)
 
 
 def covariances(normal: Any, numbers: Sequence[int]) -> Array:
-    """Return covariances (k, 3, 3) of some poses, x, y (mm) and theta (rad); the arm is the n-th."""
+    """Return covariances (k, 3, 3) of some poses (mm and rad); the arm is the n-th."""
     from scipy.sparse.linalg import splu
 
     factor, size = splu(normal.tocsc()), normal.shape[0]
@@ -122,82 +116,52 @@ def robust_cost(chi2: Array) -> tuple[Array, Array]:
     return np.asarray(cost), np.maximum(scale**2, LEAST_WEIGHT)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Graph:
-    """Constraints as arrays; the plane has the number n + 1, the arm n."""
+def _linearise(
+    constraints: Sequence[Constraint], n: int, *, arm_fixed: bool
+) -> Callable[[Array], tuple[float, Array, Any, Array]]:
+    """Return the cost, weights (m,), normal matrix and its right side by poses (n + 1, 3).
 
-    a: Ints
-    b: Ints
-    pose: Array  #: (m, 3)
-    information: Array  #: (m, 3, 3)
-    n: int
-    fixed: NDArray[np.bool_]  #: (n + 2,) frames that do not move
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Linearisation:
-    cost: float
-    chi2: Array
-    weights: Array
-    normal: Any
-    pull: Array
-
-
-def _graph(constraints: Sequence[Constraint], n: int, *, arm_fixed: bool) -> _Graph:
-    number = {PLANE: n + 1, ARM: n}
-    fixed = np.zeros(n + 2, np.bool_)
-    arm_used = any(constraint.a == ARM for constraint in constraints)
-    fixed[n + 1], fixed[n] = True, arm_fixed or not arm_used
-    return _Graph(
-        a=np.array([number.get(constraint.a, constraint.a) for constraint in constraints]),
-        b=np.array([constraint.b for constraint in constraints]),
-        pose=np.array([constraint.pose for constraint in constraints]),
-        information=np.array([constraint.information for constraint in constraints]),
-        n=n,
-        fixed=fixed,
-    )
-
-
-def _linearise(graph: _Graph, at: Array) -> _Linearisation:
-    """Return cost, gradient and normal equations at poses (n + 1, 3), the arm's last."""
+    The arm's pose is the last one; the plane, which is fixed, has the number n + 1.
+    """
     from scipy.sparse import coo_matrix
 
-    every = np.concatenate([at, np.zeros((1, 3))])
-    relative = relative_pose(every[graph.a], every[graph.b])
-    residual = pose_difference(relative, graph.pose)
-    pushed = (graph.information @ residual[:, :, None])[:, :, 0]
-    chi2 = (residual * pushed).sum(axis=1)
-    costs, weights = robust_cost(chi2)
-    by_a, by_b = _slopes(every[graph.a, 2], relative)
-    heavy = graph.information * weights[:, None, None]
-    rows, columns, blocks = [], [], []
-    pull = np.zeros((graph.n + 2, 3))
-    for one, by_one in ((graph.a, by_a), (graph.b, by_b)):
-        left = by_one.swapaxes(1, 2) @ heavy
-        free = ~graph.fixed[one]
-        np.add.at(pull, one[free], -(left @ residual[:, :, None])[free, :, 0])
-        for other, by_other in ((graph.a, by_a), (graph.b, by_b)):
-            both = free & ~graph.fixed[other]
-            rows.append(one[both])
-            columns.append(other[both])
-            blocks.append((left @ by_other)[both])
-    held = np.flatnonzero(graph.fixed[:-1])  # the arm, where it is fixed
-    rows.append(held)
-    columns.append(held)
-    blocks.append(np.broadcast_to(np.eye(3), (len(held), 3, 3)))
-    row, column = (3 * np.concatenate(k) for k in (rows, columns))
+    number = {PLANE: n + 1, ARM: n}
+    a = np.array([number.get(constraint.a, constraint.a) for constraint in constraints])
+    b = np.array([constraint.b for constraint in constraints])
+    measured = np.array([constraint.pose for constraint in constraints])
+    information = np.array([constraint.information for constraint in constraints])
+    fixed = np.zeros(n + 2, np.bool_)
+    fixed[n + 1], fixed[n] = True, arm_fixed or not (a == n).any()
+    held = np.flatnonzero(fixed[:-1])  # the arm, where it is fixed
     i, j = np.mgrid[:3, :3]
-    normal = coo_matrix(
-        (
-            np.concatenate(blocks).reshape(-1),
-            (
-                (row[:, None, None] + i).reshape(-1),
-                (column[:, None, None] + j).reshape(-1),
-            ),
-        ),
-        shape=(3 * graph.n + 3, 3 * graph.n + 3),
-    ).tocsc()
-    return _Linearisation(float(costs.sum()), chi2, weights, normal, pull[:-1].reshape(-1))
+
+    def linearise(at: Array) -> tuple[float, Array, Any, Array]:
+        every = np.concatenate([at, np.zeros((1, 3))])
+        relative = relative_pose(every[a], every[b])
+        residual = pose_difference(relative, measured)
+        chi2 = (residual * (information @ residual[:, :, None])[:, :, 0]).sum(axis=1)
+        costs, weights = robust_cost(chi2)
+        by_a, by_b = _slopes(every[a, 2], relative)
+        heavy = information * weights[:, None, None]
+        rows, columns = [held], [held]
+        blocks = [np.broadcast_to(np.eye(3), (len(held), 3, 3))]
+        pull = np.zeros((n + 2, 3))
+        for one, by_one in ((a, by_a), (b, by_b)):
+            left = by_one.swapaxes(1, 2) @ heavy
+            free = ~fixed[one]
+            np.add.at(pull, one[free], -(left @ residual[:, :, None])[free, :, 0])
+            for other, by_other in ((a, by_a), (b, by_b)):
+                both = free & ~fixed[other]
+                rows.append(one[both])
+                columns.append(other[both])
+                blocks.append((left @ by_other)[both])
+        row, column = (3 * np.concatenate(k)[:, None, None] for k in (rows, columns))
+        places = (row + i).reshape(-1), (column + j).reshape(-1)
+        size = 3 * n + 3
+        normal = coo_matrix((np.concatenate(blocks).reshape(-1), places), shape=(size, size))
+        return float(costs.sum()), weights, normal.tocsc(), pull[:-1].reshape(-1)
+
+    return linearise
 
 
 def _slopes(theta_a: Array, relative: Array) -> tuple[Array, Array]:

@@ -57,14 +57,6 @@ class KnownRaster:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Correlation:
-    """Correlations by the shift of an image over a reference; shift 0 is in the middle."""
-
-    rho: Array  #: (2 rows + 1, 2 columns + 1) -1 ... 1, NaN where undefined
-    overlap: Array  #: of that shape, cells that both know
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class PlaceCandidate:
     """A place that explains the images."""
 
@@ -73,23 +65,13 @@ class PlaceCandidate:
     images: float  #: nats, images alone
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SearchResult:
-    """Candidates of a search."""
-
-    candidates: tuple[PlaceCandidate, ...]  #: best first
-    tried: float  #: independent places in the window
-
-
 def search_reference(
-    reference: KnownRaster,
-    patch: TouchPatch,
-    believed: Array,
-    covariance: Array,
-) -> SearchResult:
-    """Return the poses at which a patch may lie on a reference of quarter tactels.
+    reference: KnownRaster, patch: TouchPatch, believed: Array, covariance: Array
+) -> tuple[list[PlaceCandidate], float]:
+    """Return the poses at which a patch may lie on a reference of quarter tactels, best first.
 
-    `believed` (3,) T_reference_patch has `covariance` (3, 3).
+    `believed` (3,) T_reference_patch has `covariance` (3, 3). The second value is the number of
+    independent places in the window.
     """
     image = magnify_patch(patch)
     h = image.cell_mm
@@ -107,18 +89,18 @@ def search_reference(
         at = np.array([believed[0], believed[1], believed[2] + turn])
         # shifts are along the turned axes: equal for the prior to second order
         away = np.stack([right * h, -down * h, np.full(right.shape, turn)], axis=-1)
-        seen = cross_correlate(resample(reference, wide, at), image)
-        tactels = seen.overlap / MAGNIFIED**2
-        images = nats(seen.rho, tactels)
+        rho, overlap = cross_correlate(resample(reference, wide, at), image)
+        tactels = overlap / MAGNIFIED**2
+        images = nats(rho, tactels)
         score = images - 0.5 * np.einsum("kni,ij,knj->kn", away, prior, away)
-        score[~(seen.rho > 0) | (tactels < LEAST_OVERLAP * patch.good.size)] = -np.inf
+        score[~(rho > 0) | (tactels < LEAST_OVERLAP * patch.good.size)] = -np.inf
         for i, j, value in peaks(score, CANDIDATES):
             shift = np.array([(j - columns) * h, (rows - i) * h, 0.0])
             alone = float(images[round(i), round(j)])
             found.append(PlaceCandidate(compose_poses(at, shift), value, alone))
     found.sort(key=lambda candidate: -candidate.score)
     tried = down.size * len(turns) / MAGNIFIED**2
-    return SearchResult(tuple(found[:CANDIDATES]), tried)
+    return found[:CANDIDATES], tried
 
 
 def nats(rho: Array, tactels: Array) -> Array:
@@ -134,10 +116,11 @@ def window_mm(covariance: Array) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def cross_correlate(reference: KnownRaster, image: KnownRaster) -> Correlation:
+def cross_correlate(reference: KnownRaster, image: KnownRaster) -> tuple[Array, Array]:
     """Correlate an image (rows, columns) with a reference (rows + 2 k, columns + 2 m).
 
-    Element (i, j) belongs to the image shifted down by i - k and right by j - m cells.
+    Return rho -1 ... 1, NaN where undefined, and the number of cells that both know; element (i, j)
+    belongs to the image shifted down by i - k and right by j - m cells.
     """
     from scipy.fft import irfft2, next_fast_len, rfft2
 
@@ -158,11 +141,10 @@ def cross_correlate(reference: KnownRaster, image: KnownRaster) -> Correlation:
     overlap = np.rint(count)
     cells = np.maximum(overlap, 1.0)
     a_rest, b_rest = a_squares - a_sum**2 / cells, b_squares - b_sum**2 / cells
-    flat = FLAT
-    varies = (a_rest > flat * (a * a).sum()) & (b_rest > flat * (b * b).sum()) & (overlap > 1)
+    varies = (a_rest > FLAT * (a * a).sum()) & (b_rest > FLAT * (b * b).sum()) & (overlap > 1)
     scale = np.sqrt(np.where(varies, a_rest * b_rest, 1.0))
     rho = np.clip((product - a_sum * b_sum / cells) / scale, -1.0, 1.0)
-    return Correlation(np.where(varies, rho, np.nan), overlap)
+    return np.where(varies, rho, np.nan), overlap
 
 
 def peaks(scores: Array, most: int) -> list[tuple[float, float, float]]:

@@ -10,6 +10,7 @@ errors. Sensor frame, mm, rad.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ from recognizer.touch.symbols.image import Image, bounded_gain
 from recognizer.touch.symbols.linearize import ascend, damped_step
 
 Array = NDArray[np.float64]
+Smooth = Callable[[Array], Array]  #: values (b, n) -> means (b, n)
 
 DIRECTIONS = 18  #: of lines, over half a turn
 STEPS = 6  #: of damped least squares
@@ -54,8 +56,8 @@ def guess_bends(
     symbol = image.pressing.symbol * height
     points = sensor.centres_mm().reshape(-1, 2)
     falls = np.array([bend.raised(symbol).falls_mm(points) / height for bend in bends])
-    smooth = _Average(image)
-    seen = np.sqrt(np.maximum(smooth.of(image.forces[None])[0], 0.0))
+    smooth = _average(image)
+    seen = np.sqrt(np.maximum(smooth(image.forces[None])[0], 0.0))
     whole = float(seen @ seen)
     if not whole > 0:
         return []
@@ -67,8 +69,7 @@ def guess_bends(
         if any(_same_bend(bends[b], one.bend, APART_RAD) for one in found):
             continue
         scale = 2.0 * math.log(max(float(fitted.scale[b]), 1e-9))
-        gain = np.array([[scale, *fitted.plane[b]]])
-        gain = bounded_gain(gain)[0]
+        gain = bounded_gain(np.array([[scale, *fitted.plane[b]]]))[0]
         found.append(BendGuess(bends[b], gain, -float(fitted.value[b]) / whole))
     return found
 
@@ -78,24 +79,17 @@ def _same_bend(a: Bend, b: Bend, apart: float) -> bool:
     return a.radius_mm == b.radius_mm and abs(turn) < apart
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Average:
-    """Means over the neighbourhood of each tactel, of trusted ones."""
+def _average(image: Image) -> Smooth:
+    """Return the means (b, n) of values (b, n) over the trusted tactels about each one."""
+    from scipy.ndimage import uniform_filter
 
-    image: Image
-
-    def of(self, values: Array) -> Array:
-        """Return the means (b, n) of values (b, n)."""
-        return self._sum(values * self.image.trust) / np.maximum(
-            self._sum(self.image.trust[None]), 1e-9
-        )
-
-    def _sum(self, values: Array) -> Array:
-        from scipy.ndimage import uniform_filter
-
-        square = values.reshape(-1, *self.image.shape)
+    def summed(values: Array) -> Array:
+        square = values.reshape(-1, *image.shape)
         sums = uniform_filter(square, (0, AROUND, AROUND), mode="constant")
         return np.asarray(sums.reshape(values.shape))
+
+    known = np.maximum(summed(image.trust[None]), 1e-9)
+    return lambda values: summed(values * image.trust) / known
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +103,7 @@ class _Strips:
     right: Array  # (b, 4)
 
 
-def _fit_gains(image: Image, falls: Array, smooth: _Average, seen: Array) -> _Strips:
+def _fit_gains(image: Image, falls: Array, smooth: Smooth, seen: Array) -> _Strips:
     """Return the planes under which bends explain an image best."""
     pressing, basis, ink = image.pressing, image.plane, image.template.ink
 
@@ -119,11 +113,11 @@ def _fit_gains(image: Image, falls: Array, smooth: _Average, seen: Array) -> _St
         force += (1.0 - ink) * pressing.force(depth - pressing.symbol)
         slope = ink * pressing.slope(depth)
         slope += (1.0 - ink) * pressing.slope(depth - pressing.symbol)
-        root = np.sqrt(np.maximum(smooth.of(force), 1e-9))
+        root = np.sqrt(np.maximum(smooth(force), 1e-9))
         scale = (root @ seen) / (root * root).sum(axis=1)
         away = seen - scale[:, None] * root
         half = 0.5 * scale[:, None] / np.maximum(root, FAINT)
-        columns = [half * smooth.of(slope * one) for one in basis.T]
+        columns = [half * smooth(slope * one) for one in basis.T]
         jacobian = np.stack([*columns, root], axis=-1)
         return _Strips(
             plane=plane,

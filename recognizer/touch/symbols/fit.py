@@ -62,9 +62,8 @@ UNSEEN = 1e-8  #: least eigenvalue of a normal matrix of unit diagonal
 class Lattices:
     """Candidates: sensor point s lies at R(theta) s + (x, y) in the lattice frame."""
 
-    pose: (
-        Array  #: (b, 7) x, y (mm), theta (rad); stroke excess, cross-talk, exponent - 1, scale - 1
-    )
+    #: (b, 7) x, y (mm), theta (rad); stroke excess, cross-talk, exponent - 1, scale - 1
+    pose: Array
     gain: Array  #: (b, 4) logarithm of the scale; depth at the centre, slopes per half width
     value: Array  #: (b,) log-likelihood of the image, nats, up to a constant of the image
     normal: Array  #: (b, 11, 11) inverse covariance of pose and gain under `FIRST_NOISE`

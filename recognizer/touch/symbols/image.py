@@ -15,38 +15,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.compiled import addresses
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend
-from recognizer.touch.options import TIE_NATS, ReaderOptions
-from recognizer.touch.sensor_state import PRIOR
-from recognizer.touch.signal import Signal, combine_around, mean_of_strongest
+from recognizer.touch.options import ReaderOptions
+from recognizer.touch.sensor_state import ASIDE_SD_MM
+from recognizer.touch.signal import Signal, combine_around, mean_of_strongest, sorted_around
 from recognizer.touch.symbols.kernels import (
-    DAMPING,
     DEEPEST,
-    DEEPEST_GAIN,
-    DISPLACED_MM,
-    EASIER,
-    FAR,
-    FIRST_NOISE,
     FORM_MOST,
     FULL_PRESS,
-    GRAZED,
-    HARDER,
-    LARGEST_STEP,
-    LEAST_DIAGONAL,
     LEAST_GAIN,
     LEAST_PRESS,
-    LOUD,
-    MOST_NATS,
-    QUIET,
-    SETTLED,
-    SHALLOWER,
     STEEPEST,
     Scene,
 )
@@ -156,33 +139,20 @@ class Image:
     @cached_property
     def scene(self) -> Scene:
         """The image as the compiled loops take it, without lattices."""
-        given = {
+        arrays = {
             "points": (self.points_mm, np.float64), "forces": (self.forces, np.float64),
             "trust": (self.trust, np.float64), "plane": (self.plane, np.float64),
             "loaded": (self.loaded, np.bool_), "drop": (self.falls, np.float64),
             "rimmed": (self.template.rimmed, np.float32),
         }  # fmt: skip
-        held: dict[str, NDArray[Any]] = {
-            name: np.ascontiguousarray(array, kind)
-            for name, (array, kind) in given.items()
-            if array is not None
-        }
         template, pressing = self.template, self.pressing
-        scene = Scene(
-            n=len(self.forces), q=template.order, size=template.size,
+        return Scene.of_image(
+            arrays, n=len(self.forces), q=template.order, size=template.size,
             hardens=int(pressing.hardens), falls=0 if self.falls is None else len(self.falls),
             symbol=pressing.symbol, deepest=pressing.deepest, pitch=template.pitch_mm,
-            half=template.half_mm, step=template.step_mm, noise=self.noise, least_gain=LEAST_GAIN,
-            full_press=FULL_PRESS, least_press=LEAST_PRESS, steepest=STEEPEST, quiet=QUIET,
-            displaced=DISPLACED_MM, loud=LOUD, most=MOST_NATS, first=FIRST_NOISE, far=FAR,
-            grazed=GRAZED, tie=TIE_NATS, damping=DAMPING, easier=EASIER, harder=HARDER,
-            settled=SETTLED, shallower=SHALLOWER, deepest_gain=DEEPEST_GAIN, least=LEAST_DIAGONAL,
-            largest=LARGEST_STEP, limits=self.limits,
+            half=template.half_mm, step=template.step_mm, noise=self.noise, limits=self.limits,
             usual_scale=math.log(pressing.scale) if self.newtons else 0.0,
-            **dict(zip(held, addresses(*held.values()), strict=True)),
         )  # fmt: skip
-        scene.held = tuple(held.values())
-        return scene
 
     @cached_property
     def reach_mm(self) -> float:
@@ -210,7 +180,7 @@ def image_of_signal(
     points, aside = sensor.centres_mm().reshape(-1, 2), np.ones(signal.forces.size)
     if signal.state is not None:
         points = points + signal.state.aside_mm.reshape(-1, 2)
-        learned = signal.state.aside_deviation_mm.reshape(-1, 2) / PRIOR.aside_mm
+        learned = signal.state.aside_deviation_mm.reshape(-1, 2) / ASIDE_SD_MM
         aside = (learned**2).mean(axis=1)
     return Image(
         points_mm=points,
@@ -294,10 +264,7 @@ def _percentiles_around(forces: Array, around: int, shares: tuple[float, ...]) -
     As `scipy.ndimage.percentile_filter(..., mode="nearest")`, whose import takes longer than
     reading a touch.
     """
-    before = around // 2
-    wide = np.pad(forces, (before, around - 1 - before), mode="edge")
-    each = np.lib.stride_tricks.sliding_window_view(wide, (around, around))
-    ordered = np.sort(each.reshape(forces.size, around**2), axis=1)
+    ordered = sorted_around(forces, around, mode="edge").reshape(forces.size, -1)
     return [ordered[:, int(around**2 * share / 100.0)] for share in shares]
 
 
@@ -346,11 +313,8 @@ def _percentiles_among(
     image: Image, known: NDArray[np.bool_], shares: tuple[float, ...]
 ) -> list[Array]:
     """Return percentiles (n,) of the known forces about each tactel; 0 where none is known."""
-    around, before = AROUND, AROUND // 2
     forces = np.where(known, image.forces, np.inf).reshape(image.shape)
-    wide = np.pad(forces, (before, around - 1 - before), constant_values=np.inf)
-    each = np.lib.stride_tricks.sliding_window_view(wide, (around, around))
-    ordered = np.sort(each.reshape(known.size, around**2), axis=1)
+    ordered = sorted_around(forces, AROUND, constant_values=np.inf).reshape(known.size, -1)
     count = np.isfinite(ordered).sum(axis=1)
     rows = np.arange(known.size)
     return [

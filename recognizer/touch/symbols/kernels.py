@@ -10,6 +10,7 @@ nothing presses. Losses are bounded per tactel: a dead one or a spike costs a kn
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.compiled import POINTER, REAL, WHOLE, load_library
+from encoded_objects.base.compiled import POINTER, REAL, WHOLE, addresses, load_library
+from recognizer.touch.options import TIE_NATS
 
 FOLDER = Path(__file__).parent.parent
 
@@ -80,6 +82,27 @@ class Scene(ctypes.Structure):
             "points", "forces", "trust", "plane", "loaded", "drop", "rimmed",
         )),
     ]  # fmt: skip
+
+    @classmethod
+    def of_image(
+        cls, arrays: Mapping[str, tuple[NDArray[Any] | None, type]], **given: Any
+    ) -> Scene:
+        """Return the scene of an image: its arrays with their kinds, and its own numbers."""
+        held: dict[str, NDArray[Any]] = {
+            name: np.ascontiguousarray(array, kind)
+            for name, (array, kind) in arrays.items()
+            if array is not None
+        }
+        scene = cls(
+            least_gain=LEAST_GAIN, full_press=FULL_PRESS, least_press=LEAST_PRESS,
+            steepest=STEEPEST, quiet=QUIET, displaced=DISPLACED_MM, loud=LOUD, most=MOST_NATS,
+            first=FIRST_NOISE, far=FAR, grazed=GRAZED, tie=TIE_NATS, damping=DAMPING,
+            easier=EASIER, harder=HARDER, settled=SETTLED, shallower=SHALLOWER,
+            deepest_gain=DEEPEST_GAIN, least=LEAST_DIAGONAL, largest=LARGEST_STEP, **given,
+            **dict(zip(held, addresses(*held.values()), strict=True)),
+        )  # fmt: skip
+        scene.held = tuple(held.values())
+        return scene
 
     def of_lattices(
         self,

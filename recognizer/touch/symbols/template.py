@@ -90,11 +90,7 @@ class ResponseTemplate:
 
 
 @lru_cache(maxsize=16)
-def template_of(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-) -> ResponseTemplate:
+def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> ResponseTemplate:
     """Return the template of an alphabet, as embossed and on a sensor."""
     step, (low, high) = STEP_MM, EXPONENTS
     pad = sensor.overlay.kind == "pad"
@@ -126,10 +122,7 @@ def template_of(
 
 
 def _tab_responses(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-    axis: Array,
+    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array
 ) -> Array:
     """Return the responses (order, n, n) of tabs."""
     x, y = np.meshgrid(axis, axis)
@@ -145,10 +138,7 @@ def _tab_responses(
 
 
 def _pad_responses(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-    axis: Array,
+    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array
 ) -> Array:
     """Return the responses (order, n, n) of a pad, 1 where they are highest."""
     from scipy.ndimage import correlate1d
@@ -164,12 +154,7 @@ def _pad_responses(
     return np.asarray(tactels / np.percentile(tactels, PAD_PEAK))
 
 
-def _pressures(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-    axis_mm: Array,
-) -> Array:
+def _pressures(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis_mm: Array) -> Array:
     """Return the pressure under a pad (order, n, n) over a cell, 1 where it is highest.
 
     A pad passes a load on farther than a cell and bridges symbols that stand close together: its
@@ -219,10 +204,7 @@ def _pressures(
 
 
 def _gel_responses(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-    axis: Array,
+    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array
 ) -> Array:
     """Return the responses (order, n, n) of the pixels of a gel."""
     from scipy.ndimage import correlate1d, gaussian_filter

@@ -3,29 +3,32 @@
 import json
 import subprocess
 import sys
+from typing import Annotated
 
 import pytest
-import typer
 from typer.testing import CliRunner
 
 from encoded_objects.base import console
+from encoded_objects.base.options import Argument, Option, command
 
 PROGRAM = """
 import gc, json, os, sys
 from encoded_objects.base import console
+from encoded_objects.base.options import command
+
+app = console.application()
 
 class Cycle:
     def __init__(self): self.own = self
     def __del__(self): print("walked")
 
+@command(app)
 def act():
     state = [gc.get_threshold()[0], os.environ["PYDANTIC_DISABLE_PLUGINS"]]
     print(json.dumps(state))
     Cycle()
     return 3
 
-app = console.application()
-app.command()(lambda: act)
 console.main("do", lambda _: app, [], bare=True)
 """
 
@@ -52,38 +55,36 @@ def test_plugins_that_somebody_asks_for_are_left():
     assert json.loads(done.stdout)[1] == "one"
 
 
-app = console.application()
+app = console.application(help="Do things.", version_of="do")
 part = console.application()
-app.add_typer(part, name="part")
+app.groups["part"] = part
 
 
-@app.callback()
-def head(loud: bool = False) -> None:
-    """Do things."""
-
-
-@app.command()
-def one(number: int = typer.Argument(help="How [bold]many[/].")) -> None:
+@command(app)
+def one(number: Annotated[int, Argument("How [bold]many[/].")]) -> int:
     """Do one."""
+    return number
 
 
-@part.command()
-def two(name: str = "x") -> None:
+@command(part)
+def two(name: Annotated[str, Option("Whose.")] = "x") -> int:
     """Do two."""
+    return len(name)
 
 
-@part.command()
-def three() -> None:
+@command(part)
+def three() -> int:
     """Do three."""
+    return 3
 
 
 @pytest.mark.parametrize(
     "words",
     [["--help"], ["-h"], ["one", "--help"], ["part", "-h"], ["part", "two", "--help"],
-     ["--loud", "one", "-h"], ["part", "two", "--name", "y", "--help"]],
+     ["--json", "one", "-h"], ["part", "two", "--name", "y", "--help"]],
 )  # fmt: skip
 def test_page_is_that_of_typer(words, capsys):
-    expected = CliRunner().invoke(app, words, prog_name="do")
+    expected = CliRunner().invoke(app.for_typer(), words, prog_name="do")
     assert console.run("do", lambda _: app, words) == expected.exit_code == 0
     assert capsys.readouterr().out == expected.output
 

@@ -8,7 +8,7 @@ import pytest
 
 from encoded_objects.base import console
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.options import Argument, Json, Option, Options, command, read_plain
+from encoded_objects.base.options import Argument, Json, Option, Options, command
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +91,8 @@ def test_version_needs_nothing_else(capsys):
 )  # fmt: skip
 def test_a_plain_line_is_read_as_typer_reads_it(words):
     taken.clear()
-    read_plain(app, words)()
-    app(words, standalone_mode=False)()
+    app.read_plain(words)()
+    app.for_typer()(words, standalone_mode=False)()
     assert taken[0] == taken[1]
 
 
@@ -102,4 +102,4 @@ def test_a_plain_line_is_read_as_typer_reads_it(words):
      ["-p3"], ["--heat"], ["--json=yes"], ["--salt", "-1"], ["--", "soup"], ["--keep-war"]],
 )  # fmt: skip
 def test_all_else_is_left_to_typer(words):
-    assert read_plain(app, words) is None
+    assert app.read_plain(words) is None

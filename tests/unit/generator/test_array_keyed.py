@@ -1,21 +1,31 @@
-"""Arrays of a lab's own: as good as the published one, another one for every key."""
+"""Arrays and keys of labs: as good as the published array; what people type; touches needed."""
 
+import secrets
 from math import gcd
 
 import numpy as np
 import pytest
+from reference.polynomials import windows_are_unique
 from reference.rivals import rival_shares
 from reference.visible import PoseGrid, visible_sets
 
-from generator.array import FoldedArray, Sequence, array_from, profile
+from generator.array import FoldedArray, Sequence, profile
+from generator.array.contract import touches_needed
 from generator.array.field import field_of_order
 from generator.array.fold import translation
-from generator.array.lab_key import decimated_polynomial, keyed_array, lab_key_of
+from generator.array.lab_key import (
+    CHARACTERS,
+    LENGTH,
+    decimated_polynomial,
+    draw_lab_key,
+    keyed_array,
+    lab_key_of,
+    read_lab_key,
+)
 from generator.array.polynomial import is_primitive, primitive_polynomial
 from generator.array.profiles import PROFILES, next_larger
-from generator.array.window import windows_are_unique
 from generator.database.cells import array_key
-from generator.errors import ArrayError
+from generator.errors import ArrayError, LabKeyError
 
 KEY = "0123-4567-89AB-CDER"
 KEYS = [lab_key_of(np.random.default_rng(seed).bytes(16)) for seed in range(20)]
@@ -29,15 +39,6 @@ def test_the_array_of_a_key_stays_what_it_is():
         "rows": 63, "columns": 65, "window": [3, 2],
         "permutation": [2, 3, 0, 1], "first": [4, 17],
     }  # fmt: skip
-
-
-@pytest.mark.parametrize("name", ["one-touch", "large"])
-def test_an_array_is_made_again_from_its_definition(name):
-    array = keyed_array(profile(name).array(), KEY)
-    again = array_from(array.definition())
-    assert again.definition() == array.definition()
-    rows, columns = np.indices((51, 63))
-    np.testing.assert_array_equal(again.symbols(rows, columns), array.symbols(rows, columns))
 
 
 def test_keys_give_arrays_of_their_own():
@@ -96,8 +97,8 @@ def test_decimation_gives_every_primitive_polynomial(order, degree, number):
     assert all(is_primitive(field, h) for h in found)
     step = steps[len(steps) // 2]
     terms = sequence.symbols(step * np.arange(3 * degree) % sequence.period).tolist()
-    going_on = Sequence(field, decimated_polynomial(sequence, step)).forward(terms[:degree])
-    assert [next(going_on) for _ in terms] == terms
+    going_on = Sequence(field, decimated_polynomial(sequence, step), terms[:degree])
+    assert going_on.symbols(range(len(terms))).tolist() == terms
 
 
 def test_translations_are_what_shifts_and_other_polynomials_do_not_give():
@@ -113,12 +114,13 @@ def test_translations_are_what_shifts_and_other_polynomials_do_not_give():
     assert len(every) == 24
     sequence = profile("one-touch").array().sequence
     terms = sequence.symbols(np.arange(200))
-    states = {sequence.state(t) for t in range(sequence.period)}
+    ring = sequence.symbols(np.arange(sequence.period + 5))
+    states = set(map(tuple, np.lib.stride_tricks.sliding_window_view(ring, 6).tolist()))
     for row in scaled[1:]:
         assert tuple(np.array(row)[terms][:6].tolist()) in states  # a shift of the same one
-    conjugate = Sequence(field, tuple((0, 1, 3, 2)[c] for c in sequence.polynomial))
-    going_on = conjugate.forward(np.array([0, 1, 3, 2])[terms[:6]])
-    assert [next(going_on) for _ in terms] == np.array([0, 1, 3, 2])[terms].tolist()
+    swapped = np.array([0, 1, 3, 2])
+    conjugate = Sequence(field, swapped[list(sequence.polynomial)].tolist(), swapped[terms[:6]])
+    np.testing.assert_array_equal(conjugate.symbols(np.arange(200)), swapped[terms])
 
 
 def small(**options):
@@ -159,10 +161,69 @@ def test_what_is_no_permutation_or_cell_is_refused(options, said):
         small(**options)
 
 
-@pytest.mark.parametrize("wrong", [[0, 1], "0123", [0, 1, 2, True], 4])
-def test_definitions_are_read_with_care(wrong):
-    given = small(permutation=(2, 3, 0, 1)).definition()
-    with pytest.raises(ArrayError, match="no list of 4"):
-        array_from(given | {"permutation": wrong})
-    with pytest.raises(ArrayError, match="no list of 2"):
-        array_from(given | {"first": [1]})
+def test_a_key_is_drawn_from_the_whole_range(monkeypatch):
+    monkeypatch.setattr("generator.array.lab_key.token_bytes", secrets.token_bytes)
+    keys = {draw_lab_key() for _ in range(64)}
+    assert len(keys) == 64
+    assert all(read_lab_key(key) == key for key in keys)
+    assert set("".join(keys)) == {*CHARACTERS, "-"}
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [KEY, KEY.lower(), "0123456789abcder", " 0123 4567\t89AB-CDER\n", "oI23-4567-89ABCDER"],
+)
+def test_what_people_type_is_understood(typed):
+    assert read_lab_key(typed) == KEY
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("", "0 characters"),
+        (KEY[:-1], "15 characters"),
+        (KEY + "0", "17 characters"),
+        ("0123-4567-89AB-CDEU", "it holds U"),
+        ("0123-4567-89AB-C*ER", "it holds \\*"),
+        ("0123-4567-89AB-CDEQ", "last character does not fit"),
+    ],
+)
+def test_what_is_no_key_is_refused_with_the_reason(typed, said):
+    with pytest.raises(LabKeyError, match=said) as caught:
+        read_lab_key(typed)
+    assert caught.value.exit_code == 2
+    assert "encode-object lab" in caught.value.fix
+
+
+def test_every_wrong_character_and_every_exchange_is_found():
+    rng = np.random.default_rng(1)
+    plain = lab_key_of(rng.bytes(LENGTH)).replace("-", "")
+    wrong = {
+        plain[:k] + character + plain[k + 1 :]
+        for k in range(LENGTH)
+        for character in CHARACTERS
+        if character != plain[k]
+    }
+    for a in range(LENGTH):
+        for b in range(a):
+            if plain[a] != plain[b]:
+                swapped = list(plain)
+                swapped[a], swapped[b] = swapped[b], swapped[a]
+                wrong.add("".join(swapped))
+    assert len(wrong) > LENGTH * 31
+    for typed in wrong:
+        with pytest.raises(LabKeyError):
+            read_lab_key(typed)
+
+
+def test_profiles_are_read_by_as_many_touches_as_was_measured():
+    assert touches_needed(2, 63 * 65, 12.0) == 8  # thesis
+    assert touches_needed(8, 15 * 15, 15.0) == 5  # product, of the 80 mm cube
+    assert touches_needed(4, 63 * 65, 7.0) == 1  # one-touch
+    assert touches_needed(4, 1 << 62, 7.0) == touches_needed(4, 1 << 20, 7.0)
+
+
+def test_larger_sensors_and_closer_symbols_need_fewer():
+    by_pitch = [touches_needed(2, 4095, pitch) for pitch in (5.0, 8.0, 12.0, 16.0)]
+    assert by_pitch == sorted(by_pitch)
+    assert touches_needed(2, 4095, 12.0, sensor_mm=50.0) == 1

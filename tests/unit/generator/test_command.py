@@ -1,6 +1,5 @@
 """The command `encode-object` as people run it: help, routes, exit codes, JSON, interruption."""
 
-import json
 import os
 import select
 import signal
@@ -23,13 +22,6 @@ ENTRY = "import sys; from generator.command import main; main()"
 def _in_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")
-
-
-def command(*arguments):
-    """Run the command in a process of its own."""
-    return subprocess.run(
-        [sys.executable, "-c", ENTRY, *map(str, arguments)], capture_output=True, text=True
-    )
 
 
 def write(text, name="c.yaml"):
@@ -64,67 +56,11 @@ def test_a_scene_loads_what_it_needs():
     assert done.stdout.splitlines()[-1] == "[] 0", done.stderr
 
 
-def test_made_object_end_to_end():
-    done = command(FIXTURES / "cube.yaml", "-o", "made", "--format", "stl", "--database", "d.db",
-                   "--json")  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, "")
-    value = json.loads(done.stdout)
-    (cube,) = value["objects"]
-    assert (cube["name"], cube["faces"]) == ("Cube", 6)
-    assert cube["symbols"] > 300
-    assert all(Path(file).is_file() for file in cube["files"])
-    assert {Path(file).parts[0] for file in cube["files"]} == {"made"}
-    assert any(file.endswith(".stl") for file in cube["files"])
-    assert not any(file.endswith((".step", ".3mf")) for file in cube["files"])
-    assert value["array"] == {"rows": 51, "columns": 1285, "used_cells": cube["symbols"]}
-    assert value["database"] == "sqlite:///d.db"
-    assert value["seconds"] > 0
-    listed = command("list", "--database", "d.db", "--json")
-    (entry,) = json.loads(listed.stdout)["objects"]
-    assert (entry["name"], entry["symbols"]) == ("Cube", cube["symbols"])
-    table = command("list", "--database", "d.db")
-    assert table.returncode == 0
-    assert "large 51x1285" in table.stdout
-
-
-def test_dry_run_says_what_would_be_made_and_writes_nothing(capsys):
-    name = write("name: Cube\nshape: {cube: 60 mm}\n")
-    assert run(["--dry-run", name]) == 0
-    text, messages = capsys.readouterr()
-    assert text.startswith("Cube: would be made; 6 faces, ")
-    assert "nothing was written" in text
-    assert messages == ""
-    assert os.listdir() == [name]
-
-
 def test_problem_of_the_shape_points_at_its_line(capsys):
     text = (FIXTURES / "specs/full.yaml").read_text().replace("[0, 4, 5, 3]", "[0, 3, 5, 4]")
     assert run(["--dry-run", write(text)]) == 2
     first = capsys.readouterr().err.splitlines()[0]
     assert first.startswith("c.yaml:5:1: error: ")
-
-
-def test_missing_database_has_exit_code_4(capsys):
-    assert run(["list"]) == 4
-    assert ": error: " in capsys.readouterr().err
-    assert run(["list", "--json"]) == 4
-    error = json.loads(capsys.readouterr().out)["error"]
-    assert (error["kind"], error["exit_code"]) == ("DatabaseError", 4)
-    assert os.listdir() == []
-
-
-def test_init_writes_a_spec_that_can_be_made(capsys):
-    assert run(["init", "tetrahedron", "-o", "t.yaml"]) == 0
-    assert capsys.readouterr().out == "wrote t.yaml; make it with: encode-object t.yaml\n"
-    assert run(["t.yaml", "--dry-run"]) == 0
-    assert os.listdir() == ["t.yaml"]
-    capsys.readouterr()
-    assert run(["init", "box", "-o", "t.yaml", "--force", "--json"]) == 0
-    value = json.loads(capsys.readouterr().out)
-    assert (value["shape"], value["file"]) == ("box", "t.yaml")
-    assert Path("t.yaml").read_text() == value["spec"]
-    assert run(["init"]) == 0
-    assert "shape: {cube: 60 mm}" in capsys.readouterr().out
 
 
 def test_interruption_has_exit_code_130():

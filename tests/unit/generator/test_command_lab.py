@@ -75,20 +75,6 @@ def test_the_same_key_gives_the_same_bytes(capsys):
     assert "registered before" in capsys.readouterr().out
 
 
-def test_the_key_is_printed_with_the_arrays_and_what_is_left(capsys):
-    make("Cube", "a.db", "--lab-key", KEY)
-    value = said(capsys, "lab", "--database", "a.db")
-    assert (value["lab_key"], value["database"]) == (KEY, "sqlite:///a.db")
-    (array,) = value["arrays"]
-    assert (array["taken"], array["objects"], array["own"]) == (150, 1, True)
-    assert array["room"] == int(0.8 * 51 * 1285) - 150
-    capsys.readouterr()
-    assert run(["lab", "--database", "a.db"]) == 0
-    text = capsys.readouterr().out
-    for word in (KEY, "large 51x1285", "150 of 65535", "this lab's key", "0% full"):
-        assert word in text
-
-
 @pytest.mark.parametrize(
     ("given", "said_of_it"),
     [
@@ -112,11 +98,6 @@ def test_a_wrong_key_is_one_message(capsys, given, said_of_it):
     assert "spec.yaml:3:" in from_spec
     assert Path("a.db").read_bytes() == before
     assert not Path("a.db-Second").exists()
-
-
-def test_a_misspelt_key_leaves_no_database(capsys):
-    make("Cube", "new.db", "--lab-key", "0123-4567-89AB-CDEQ", code=2)
-    assert not Path("new.db").exists()
 
 
 def test_objects_of_one_run_agree_on_a_key(capsys):

@@ -1,6 +1,5 @@
 """Prints as they came out: kept with their object, printer and material, and gone with it."""
 
-import sqlite3
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +8,6 @@ from sqlalchemy import insert
 
 from generator.database import tables
 from generator.database.as_built import AsBuilt, read_as_built, write_as_built
-from generator.database.migrations import v3
 from generator.database.open import open_database
 from generator.database.register import remove_object
 from generator.database.transaction import read_transaction, write_transaction
@@ -129,13 +127,3 @@ def test_prints_go_with_their_object_to_another_lab(engine, new_database, monkey
     with read_transaction(engine) as source, write_transaction(other) as target:
         copy_objects(source, target)
         same(read_as_built(target, 1)[0], measured())
-
-
-def test_the_migration_makes_the_table_that_new_databases_have(tmp_path):
-    path = tmp_path / "lab.db"
-    open_database(str(path))
-    with sqlite3.connect(path) as connection:
-        (made,) = connection.execute("SELECT sql FROM sqlite_master WHERE name = 'as_built'")
-    migrated = v3.AS_BUILT.format(number="INTEGER", real="DOUBLE_BLOB")
-    said = [sorted(text.replace(",", " ").split()) for text in (made[0], migrated)]
-    assert said[0] == said[1]

@@ -1,12 +1,9 @@
 """Databases of earlier schema versions, as they were written then, become today's."""
 
-import logging
 import os
 import shutil
 import signal
 import sqlite3
-import subprocess
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -66,19 +63,6 @@ def first_file(tmp_path):
     return tmp_path / "lab.db"
 
 
-def everything(path):
-    """All rows of a SQLite file, by table, as they are."""
-    connection = sqlite3.connect(path)
-    names = [r[0] for r in connection.execute("SELECT name FROM sqlite_master WHERE type='table'")]
-    found = {}
-    for name in sorted(names):
-        cursor = connection.execute(f'SELECT * FROM "{name}" ORDER BY 1, 2')
-        columns = [column[0] for column in cursor.description]
-        found[name] = sorted(list(zip(columns, row, strict=True)) for row in cursor)
-    connection.close()
-    return found
-
-
 def test_objects_of_earlier_versions_are_all_there(version, earlier):
     engine = open_database(earlier)
     with read_transaction(engine) as connection:
@@ -128,42 +112,6 @@ def test_the_migrated_schema_is_the_one_that_new_databases_get(earlier, new_data
             listed = f'PRAGMA table_info("{table}")'
             columns = [sorted(row[1:] for row in c.execute(listed)) for c in (old, new)]
             assert columns[0] == columns[1]
-
-
-def test_every_row_stays_as_it_was_and_the_old_file_beside_it(version, tmp_path, caplog):
-    first_file = tmp_path / "lab.db"
-    shutil.copy(FIRST / f"v{version}.db", first_file)
-    before = everything(first_file)
-    open_database(str(first_file))
-    after = everything(first_file)
-    added = {"lab_key"}
-    if version == 1:
-        added |= {"retired_utc", "imported_from", "imported_utc"}
-    for table, rows in before.items():
-        if table != "meta":
-            kept = [[(k, v) for k, v in row if k not in added] for row in after[table]]
-            assert kept == rows
-    copy = first_file.with_name(f"lab.v{version}.db")
-    assert everything(copy) == before
-    assert sorted(os.listdir(first_file.parent)) == ["lab.db", copy.name]
-    (record,) = caplog.records
-    assert record.levelno == logging.WARNING
-    said = f"{first_file}: brought from schema version {version} to 3; as it was: {copy}"
-    assert said in caplog.text
-    caplog.clear()
-    open_database(str(first_file))  # once is enough
-    assert caplog.records == []
-    assert sorted(os.listdir(first_file.parent)) == ["lab.db", copy.name]
-
-
-def test_the_message_goes_to_stderr_and_json_stays_json(first_file):
-    command = "from generator.command import main; main(['list', '--json', '--database', 'lab.db'])"
-    done = subprocess.run(
-        [sys.executable, "-c", command], capture_output=True, text=True, cwd=first_file.parent
-    )
-    assert done.returncode == 0
-    assert done.stdout.startswith("{")
-    assert "brought from schema version 1 to 3" in done.stderr
 
 
 def test_a_reader_finds_an_older_database_and_migrates_it(first_version):
@@ -282,11 +230,3 @@ def test_an_older_database_that_may_not_be_written_says_what_to_do():
             folder.chmod(0o755)
         assert "encode-object list" in e.value.fix
         assert (folder / "lab.db").read_bytes() == (FIRST / "v1.db").read_bytes()
-
-
-def test_a_newer_schema_is_refused_on_either_engine(lab_url):
-    with write_transaction(open_database(lab_url)) as connection:
-        connection.execute(text("UPDATE meta SET value = '4' WHERE key = 'schema_version'"))
-    for writable in (True, False):
-        with pytest.raises(DatabaseError, match="version 4, newer than 3"):
-            open_database(lab_url, writable=writable)

@@ -156,30 +156,6 @@ def test_another_programs_database_is_left_alone(tmp_path):
         assert path.read_bytes() == before
 
 
-@pytest.mark.parametrize("version", ["4", "77"])
-def test_a_newer_schema_is_refused(tmp_path, version):
-    path = tmp_path / "lab.db"
-    engine = open_database(str(path))
-    with write_transaction(engine) as connection:
-        connection.execute(
-            text("UPDATE meta SET value = :v WHERE key = 'schema_version'"), {"v": version}
-        )
-    said = refused(path)
-    assert f"schema version {version}, newer than {SCHEMA_VERSION}" in said
-    assert "pip install --upgrade" in said
-    assert version in refused(path, writable=False)
-
-
-@pytest.mark.parametrize("value", ["", "one", "0", "-1", "1.5"])
-def test_a_version_that_is_none_is_refused(tmp_path, value):
-    path = tmp_path / "lab.db"
-    with write_transaction(open_database(str(path))) as connection:
-        connection.execute(
-            text("UPDATE meta SET value = :v WHERE key = 'schema_version'"), {"v": value}
-        )
-    assert "schema version" in refused(path)
-
-
 @pytest.fixture
 def unprivileged():
     """A folder of its own, seen as a person who is not root: root may write anywhere."""

@@ -7,7 +7,7 @@ import sys
 from contextlib import closing
 
 import pytest
-from sqlalchemy import insert, inspect, select, text
+from sqlalchemy import insert, select, text
 
 from generator.database import tables
 from generator.database.open import open_database
@@ -61,12 +61,6 @@ def filled(engine):
 def cell(**changes):
     row = {"array_id": 1, "row": 5, "column": 2**63 - 2, "object_id": 1, "face_id": 0}
     return {**row, "position": 0, "label": 3, "x_mm": 1.0, "y_mm": 2.0, **changes}
-
-
-def test_the_six_tables_of_the_thesis_stand_under_its_names(engine):
-    inspector = inspect(engine)
-    for table, fields in THESIS.items():
-        assert fields <= {column["name"] for column in inspector.get_columns(table)}
 
 
 def test_a_cell_cannot_be_used_twice(filled):

@@ -54,9 +54,8 @@ def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
     assert larger.plans[36].spec.name == "A-37"
 
 
-@pytest.mark.parametrize("profile", ["auto", "one-touch"])
-@pytest.mark.parametrize("copies", [1, 3])
-def test_a_run_opens_the_database_once(tmp_path, monkeypatch, profile, copies):
+@pytest.mark.parametrize("copies", [1, 2])
+def test_a_run_opens_the_database_once(tmp_path, monkeypatch, copies):
     calls, database_engine = [], open_module.database_engine
 
     def connectable(*arguments, **options):
@@ -64,7 +63,7 @@ def test_a_run_opens_the_database_once(tmp_path, monkeypatch, profile, copies):
         return database_engine(*arguments, **options)
 
     monkeypatch.setattr(open_module, "database_engine", connectable)
-    text = f"name: A\nprofile: {profile}\nshape: {{cube: 30 mm}}\ncopies: {copies}\n"
+    text = f"name: A\nshape: {{cube: 22 mm}}\nprint: {{parts: whole}}\ncopies: {copies}\n"
     dry(tmp_path, text)
     assert (calls, [file.name for file in tmp_path.iterdir()]) == ([], ["spec.yaml"])
     for options in ({"dry_run": False, "formats": ()}, {"dry_run": False, "formats": ()}, {}):
@@ -171,14 +170,6 @@ def test_panels_of_a_round_object_are_refused_where_they_are_asked_for(tmp_path)
     text = "name: A\nshape: {cylinder: {diameter: 40 mm, height: 30 mm}}\nprint: {parts: panels}\n"
     with pytest.raises(SpecError, match=r":3:16: error: a round face cannot be printed as a flat"):
         dry(tmp_path, text)
-
-
-def test_what_is_made_with_a_larger_array_is_told(tmp_path):
-    text = "name: A\nshape: {cube: 150 mm}\nprint: {parts: whole}\ncopies: 6\n"
-    result = dry(tmp_path, text)
-    assert (result.rows, result.columns) == (511, 513)
-    assert "profile large-511x513 is taken" in result.objects[0].warnings[0]
-    assert not any("is taken" in w for made in result.objects[1:] for w in made.warnings)
 
 
 def test_a_set_too_large_for_the_profile_it_names_is_told_of_auto(tmp_path):

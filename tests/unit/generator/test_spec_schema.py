@@ -33,30 +33,6 @@ def test_every_setting_is_described_and_typed():
             assert {"$ref", "type", "anyOf", "enum", "const"} & set(setting), name
 
 
-def test_schema_says_what_a_person_may_write():
-    definitions = spec_schema()["$defs"]
-    text = str(definitions)
-    assert "'null'" not in text
-    assert "'ge'" not in text
-    cube = definitions["ObjectSettings"]
-    assert cube["required"] == ["name", "shape"]
-    assert cube["properties"]["copies"]["minimum"] == 1
-    assert cube["properties"]["profile"]["enum"][0] == "one-touch"
-    shape = definitions["Shape"]
-    assert shape["if"] == {"required": ["scale"]}
-    assert shape["then"] == {"required": ["file"], "maxProperties": 2}
-    assert shape["else"] == {"minProperties": 1, "maxProperties": 1}
-    length, text = definitions["Symbols"]["properties"]["pitch"]["anyOf"]
-    assert length == {"type": "number", "exclusiveMinimum": 0}
-    for written in ("40", "40 mm", "1.6 in", "4cm", " .5 um "):
-        assert re.search(text["pattern"], written)
-    for wrong in ("40 mn", "-3 mm", "4,5 mm"):
-        assert not re.search(text["pattern"], wrong)
-    assert {"type": "string"} in definitions["SetSettings"]["properties"]["objects"]["items"][
-        "anyOf"
-    ]
-
-
 def test_examples_cover_all_shapes():
     assert tuple(EXAMPLES) == KINDS
     assert list(spec_schema()["$defs"]["Shape"]["properties"]) == [*KINDS, "scale"]

@@ -72,20 +72,6 @@ def test_later_stages_point_at_the_setting(case):
     assert problem.fix
 
 
-def test_message_with_line_caret_and_fix():
-    with open("bad.yaml", "w") as file:
-        file.write("name: Cube\nshape: {cube: 60 mm}\nprint:\n  wal: 3 mm\n")
-    with pytest.raises(SpecError) as caught:
-        read_specs(["bad.yaml"])
-    assert str(caught.value) == (
-        "bad.yaml:4:3: error: unknown setting 'wal' in 'print'\n"
-        "    4 |   wal: 3 mm\n"
-        "      |   ^\n"
-        "  fix: did you mean 'wall'?"
-    )
-    assert caught.value.exit_code == 2
-
-
 def test_too_many_objects_are_refused_before_they_are_made():
     entries = "".join(f"- {{name: A{k}, shape: {{cube: 60}}, copies: 1000}}\n" for k in range(11))
     (problem,) = problems("objects:\n" + entries)

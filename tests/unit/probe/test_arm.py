@@ -27,6 +27,7 @@ from probe.wrist import Wrist, WristPose, distances_at, wrist_pose
 ARM = Arm()
 DEG = math.pi / 180
 DOWN = np.diag([1.0, -1.0, -1.0])
+LEVEL = WristPose(10, 0, 0, np.zeros((3, 3)))
 
 
 def matrix_of_the_thesis(q):
@@ -57,26 +58,12 @@ def test_the_link_table_gives_the_corrected_matrix():
         assert forward(ARM, q) == pytest.approx(np.array(matrix_of_the_thesis(q)), abs=1e-11)
 
 
-def test_the_printed_matrix_is_no_rotation():
-    q = [0.3, 0.4, 0.5, 0.6, 0.7]
-    printed = np.array(matrix_of_the_thesis(q))
-    printed[1, 0] = math.sin(0.3) * math.cos(1.5) * math.cos(0.7) - math.cos(0.3) * math.cos(0.7)
-    turn = printed[:3, :3]
-    assert not np.allclose(turn @ turn.T, np.eye(3), atol=0.1)
-
-
 def test_the_stretched_arm():
     frames = joint_frames(ARM, np.zeros(5))
     assert frames[1, :3, 3].tolist() == [0, 0, 260.4]
     assert frames[3, :3, 3] == pytest.approx([457.2, 0, 260.4])
     assert frames[5, :3, 3] == pytest.approx([466.7, 0, 185.4])
     assert frames[5, :3, 2] == pytest.approx([0, 0, -1])  # it points down
-
-
-@pytest.mark.parametrize("bad", [[0, 0, 0, 0], [0, 0, 0, 0, math.nan], "arm"])
-def test_angles_that_are_none(bad):
-    with pytest.raises((PoseError, ValueError)):
-        forward(ARM, bad)
 
 
 def test_four_branches_reach_one_pose():
@@ -126,12 +113,23 @@ def test_five_axes_cannot_reach_a_sideways_approach():
     assert inverse(ARM, at(300, 0, 200, in_plane))
 
 
-def test_what_is_no_pose_is_refused():
-    for bad in (np.zeros((4, 4)), np.eye(3), 2 * np.eye(4), np.full((4, 4), np.nan)):
-        with pytest.raises(PoseError, match="no rigid transform"):
-            inverse(ARM, bad)
-    with pytest.raises(PoseError, match="closed form holds"):
-        inverse(Arm(alpha_rad=(0.0,) * 5), at(300, 0, 200))
+@pytest.mark.parametrize(
+    ("call", "cause"),
+    [
+        (lambda: forward(ARM, [0, 0, 0, 0]), "give 5 angles"),
+        (lambda: forward(ARM, [0, 0, 0, 0, math.nan]), "give 5 angles"),
+        (lambda: inverse(ARM, np.eye(3)), "no rigid transform"),
+        (lambda: inverse(ARM, 2 * np.eye(4)), "no rigid transform"),
+        (lambda: inverse(ARM, np.full((4, 4), np.nan)), "no rigid transform"),
+        (lambda: inverse(Arm(alpha_rad=(0.0,) * 5), at(300, 0, 200)), "closed form holds"),
+        (lambda: joint_speeds(ARM, np.zeros(5), [1, 2, 3]), "give 3 speeds"),
+        (lambda: joint_speeds(ARM, np.zeros(5), [math.nan] * 6), "give 3 speeds"),
+        (lambda: sensor_pose(ARM, np.zeros(5), [1e-3], Wrist(), LEVEL), "standard deviations"),
+    ],
+)
+def test_what_is_no_pose_is_refused(call, cause):
+    with pytest.raises(PoseError, match=cause):
+        call()
 
 
 def test_over_the_base_axis():
@@ -144,15 +142,6 @@ def test_over_the_base_axis():
         pose = at(radius * math.cos(40 * DEG), radius * math.sin(40 * DEG), 600, tilted)
         for q in inverse(ARM, pose):
             assert forward(ARM, q) == pytest.approx(pose, abs=1e-9)
-
-
-def test_stretched_and_folded():
-    for bend in (0.0, 1e-12, 1e-9, 1e-6, math.pi - 1e-6, math.pi):
-        pose = forward(ARM, [0.2, -0.6, bend, 0.9, 0.1])
-        branches = inverse(ARM, pose)
-        for q in branches:
-            assert forward(ARM, q) == pytest.approx(pose, abs=1e-6)
-    assert len(inverse(ARM, forward(ARM, [0, 0, 0, 0.5, 0]))) >= 1
 
 
 # --- speeds ------------------------------------------------------------------------------
@@ -169,17 +158,6 @@ def test_the_jacobian_is_the_derivative():
             move = (after - before)[:3, 3] / 2e-6
             turn = Rotation.from_matrix(after[:3, :3] @ before[:3, :3].T).as_rotvec() / 2e-6
             assert analytic[:, i] == pytest.approx([*move, *turn], abs=1e-4)
-
-
-def test_the_jacobian_of_another_point():
-    q = [0.3, -0.5, 0.8, 0.1, 0.2]
-    offset = np.array([10.0, -20.0, 30.0])
-    tip = jacobian(ARM, q)
-    other = jacobian(ARM, q, forward(ARM, q)[:3, 3] + offset)
-    assert other[3:] == pytest.approx(tip[3:])
-    moved = tip[:3].T + np.cross(tip[3:].T, offset)
-    linear = other[:3].T
-    assert linear == pytest.approx(moved)
 
 
 def test_away_from_singularities_a_twist_is_followed_exactly():
@@ -224,12 +202,6 @@ def test_speeds_do_not_jump_on_the_way_into_the_singularity():
     assert jumps < 0.1 * np.abs(speeds).max()
 
 
-def test_a_twist_that_is_none():
-    for bad in ([1, 2, 3], [math.nan] * 6):
-        with pytest.raises(PoseError, match="give 3 speeds"):
-            joint_speeds(ARM, np.zeros(5), bad)
-
-
 # --- the sensor ------------------------------------------------------------------------------
 
 
@@ -239,20 +211,18 @@ def hanging(wrist, z, x, y):
 
 def test_the_sensor_hangs_under_the_gripper():
     wrist = Wrist(tips_mm=12)
-    level = WristPose(10, 0, 0, np.zeros((3, 3)))
-    found = sensor_pose(ARM, np.zeros(5), np.zeros(5), wrist, level)
+    found = sensor_pose(ARM, np.zeros(5), np.zeros(5), wrist, LEVEL)
     assert found.T_base_sensor[:3, 3] == pytest.approx([466.7, 0, 185.4 - 22])
     assert found.T_base_sensor[:3, 2] == pytest.approx([0, 0, 1])  # away from the object
     assert not found.covariance.any()
 
 
-@pytest.mark.parametrize("gamma", [90, 70])
-def test_the_covariance_of_the_sensor_is_that_of_drawn_errors(gamma):
-    wrist = Wrist(gamma_rad=gamma * DEG, reading_mm=0.02)
+def test_the_covariance_of_the_sensor_is_that_of_drawn_errors():
+    wrist = Wrist(gamma_rad=70 * DEG, reading_mm=0.02)
     q = np.array([0.4, -0.7, 1.1, 0.5, -0.3])
     true = (6.0, 5 * DEG, -4 * DEG)
     sd = np.array([1e-4, 2e-4, 1e-4, 3e-4, 5e-4])
-    told = sensor_pose(ARM, q, sd, wrist, hanging(wrist, *true))
+    told = sensor_pose(ARM, q, np.diag(sd**2), wrist, hanging(wrist, *true))
     rng = np.random.default_rng(7)
     drawn = []
     for _ in range(1500):
@@ -264,15 +234,3 @@ def test_the_covariance_of_the_sensor_is_that_of_drawn_errors(gamma):
     measured = np.cov(drawn, rowvar=False)
     assert np.abs((measured - told.covariance) / np.outer(spread, spread)).max() < 0.12
     assert np.linalg.eigvalsh(told.covariance / np.outer(spread, spread)).min() > 0
-
-
-def test_a_joint_covariance_may_be_full():
-    wrist = Wrist()
-    pose = WristPose(10, 0, 0, np.zeros((3, 3)))
-    q = [0.4, -0.7, 1.1, 0.5, -0.3]
-    sd = np.full(5, 1e-3)
-    by_sd = sensor_pose(ARM, q, sd, wrist, pose)
-    by_matrix = sensor_pose(ARM, q, np.diag(sd**2), wrist, pose)
-    assert by_matrix.covariance == pytest.approx(by_sd.covariance)
-    with pytest.raises(PoseError, match=r"give \(5,\) standard deviations"):
-        sensor_pose(ARM, q, [1e-3], wrist, pose)

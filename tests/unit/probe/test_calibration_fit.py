@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from reference.drawn_fsr import DATASHEET, MEASURED, Spread, draw_fsr
 
 from probe.calibration import (
     Condition,
@@ -15,17 +16,7 @@ from probe.calibration import (
 )
 from probe.calibration.fit import FittedLaw, fit_laws, law_s, shrink_laws
 from probe.calibration.load import average_frames
-from probe.circuit import (
-    DATASHEET,
-    MEASURED,
-    Electronics,
-    Noise,
-    Spread,
-    draw_fsr,
-    fsr_of,
-    read_counts,
-    read_sequence,
-)
+from probe.circuit import Electronics, Noise, fsr_of, read_counts, read_sequence
 from probe.errors import CalibrationError
 
 BOARD = Electronics()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from probe.circuit import DATASHEET, MEASURED, Spread, conductances, draw_fsr, fsr_of
+from probe.circuit import conductances, fsr_of
 from probe.errors import CircuitError
 
 
@@ -79,25 +79,6 @@ def test_dead_stuck_and_preloaded_tactels():
     assert loaded[0, 2] > loaded[5, 5]
 
 
-def test_drawn_sensors_are_at_least_as_bad_as_the_measured_one():
-    assert MEASURED.dead * 256 >= 147
-    assert MEASURED.preloaded * 256 >= 5
-    fsr = draw_fsr(np.random.default_rng(2))
-    assert fsr.dead.sum() == 147
-    assert (fsr.preload_n > fsr.break_n.min()).sum() == 5
-    assert 0.2 < np.log(fsr.gain_s).std() < 0.4
-    assert 0.05 < fsr.exponent.std() < 0.11
-
-
-def test_the_same_seed_draws_the_same_sensor_and_a_sound_one_has_no_faults():
-    a, b = (draw_fsr(np.random.default_rng(5), DATASHEET) for _ in range(2))
-    np.testing.assert_array_equal(a.gain_s, b.gain_s)
-    assert not a.dead.any()
-    assert not a.stuck_s.any()
-    assert not a.preload_n.any()
-    assert draw_fsr(np.random.default_rng(5), rows=4, columns=6).shape == (4, 6)
-
-
 def test_what_is_refused():
     fsr = fsr_of()
     for bad in (np.zeros((15, 16)), np.full((16, 16), -1.0), np.full((16, 16), np.nan)):
@@ -112,14 +93,3 @@ def test_what_is_refused():
         replace(fsr, exponent=np.ones((3, 3)))
     with pytest.raises(CircuitError, match="leak"):
         replace(fsr, leak_s=0.0)
-    with pytest.raises(CircuitError, match="at most 1"):
-        Spread(dead=0.9, stuck=0.2)
-
-
-def test_a_value_cannot_be_changed_from_outside():
-    gains = np.full((16, 16), 1e-4)
-    fsr = replace(fsr_of(), gain_s=gains)
-    gains[:] = 7
-    assert (fsr.gain_s == 1e-4).all()
-    with pytest.raises(ValueError, match="read-only"):
-        fsr.gain_s[0, 0] = 1

@@ -68,7 +68,7 @@ def test_floating_rows_over_six_decades(decades):
 )
 def test_the_errors_of_a_10_bit_board_at_a_contrast_of_1000(pressed, median):
     errors = {"floating": [], "grounded": []}
-    for seed in range(6):
+    for seed in range(4):
         g = 1e-4 * few(pressed, seed)
         on = g > 1e-5
         for readout, load, known in (("floating", 1e4, errors["floating"]),
@@ -102,11 +102,8 @@ def test_what_lies_under_the_noise_is_lost_and_what_does_not_is_not(readout):
     assert not found.lost[4:8, 4:8].any()
     assert found.lost[g < 1e-8].mean() > 0.5
     assert (found.conductance_s <= 5 * found.sigma_s + 1e-9)[g < 1e-8].all()
-    assert 16 <= found.rank < 200
-    assert "not determined" in found.reason()
     sharp = invert_readings(offered(1e-4 * few(60, 1), e), e, sigma_counts=1e-7)
-    assert sharp.reason() == ""
-    assert sharp.rank == 256
+    assert not sharp.lost.any()
 
 
 def test_a_hidden_tactel_of_floating_rows_is_named():
@@ -150,7 +147,6 @@ def test_frames_side_by_side_are_inverted_as_alone(readout):
         alone = invert_readings(counts[i], e)
         np.testing.assert_allclose(together.conductance_s[i], alone.conductance_s, rtol=1e-9)
         np.testing.assert_array_equal(together.lost[i], alone.lost)
-        assert together.rank[i] == alone.rank
 
 
 def test_what_is_refused():

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from reference.drawn_fsr import DATASHEET, draw_fsr
 
 from probe.circuit import (
-    DATASHEET,
     QUIET,
     Electronics,
     Noise,
     conductances,
-    draw_fsr,
     effective_resistances,
     fsr_of,
     read_counts,
@@ -54,16 +53,6 @@ def test_counts_rise_with_force_and_stop_at_full_scale():
     assert counts[-1] == 1023
 
 
-def test_eight_bits_are_a_quarter_of_ten():
-    forces = pressed()
-    ten, eight = read(IDEAL, forces), read(replace(IDEAL, bits=8), forces)
-    assert np.abs(ten.astype(float) * 255 / 1023 - eight).max() <= 0.65
-
-
-def test_no_force_and_no_noise_give_an_even_image():
-    assert (read(Electronics(noise=QUIET), np.zeros((16, 16))) == 4).all()
-
-
 def test_the_tactel_before_is_seen_as_much_as_the_settling_leaves():
     board = replace(IDEAL, settling_s=10e-6, tau_s=5e-6)
     share = np.zeros((16, 16))
@@ -91,7 +80,7 @@ def test_the_default_board_is_at_least_as_bad_as_the_measured_one():
     assert board.residue * 1023 >= 0.86
     assert board.coupling <= -1e-3
     counts, _ = read_sequence(
-        np.broadcast_to(forces, (1500, 16, 16)),
+        np.broadcast_to(forces, (800, 16, 16)),
         board,
         draw_fsr(np.random.default_rng(1), DATASHEET),
         None,
@@ -109,7 +98,7 @@ def test_the_default_board_is_at_least_as_bad_as_the_measured_one():
 
 def test_the_contact_s_noise_does_not_average_out_at_once():
     board = replace(Electronics(), noise=Noise(0.0, 1.2, 0.05, 0.0, 0.0))
-    forces = np.full((2000, 16, 16), 0.5)
+    forces = np.full((1000, 16, 16), 0.5)
     counts, _ = read_sequence(forces, board, fsr_of(), None, np.random.default_rng(0))
     away = counts - counts.mean(axis=0)
     kept = (away[1:] * away[:-1]).mean() / (away**2).mean()

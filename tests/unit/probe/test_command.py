@@ -6,30 +6,23 @@ import json
 import subprocess
 import sys
 
-import h5py
 import numpy as np
 import pytest
-from scipy.io import savemat
+from recorded import record
 
-from encoded_objects.base.output import write_json
 from probe.calibration import calibration_from, even_load, write_calibration
-from probe.circuit import QUIET, Electronics, fsr_of, read_sequence
+from probe.circuit import Electronics, fsr_of, read_sequence
 from probe.command import run
-from probe.command.calibrated import board_from
-from probe.command.loads import loads_given
+from probe.command.calibrated import board_from, loads_given
 from probe.errors import CalibrationError, CircuitError
 from probe.frame import frame_from, median_filter
 from probe.recording.read import Recording
-from probe.recording.record import Recorder
 
 FORCES = (0, 40, 100, 200, 400)
-STEP_NS = 4_545_455
 
 
 def recorded(path, counts, **named):
-    with Recorder(path, **named) as recorder:
-        for i, image in enumerate(counts):
-            recorder.append(frame_from(image, t_ns=i * STEP_NS, seq=i))
+    record(path, (frame_from(c, t_ns=i * 4_545_455, seq=i) for i, c in enumerate(counts)), **named)
     return path
 
 
@@ -66,140 +59,50 @@ def asked(capsys):
     return ask
 
 
+HEAVY = [
+    "numpy",
+    "scipy",
+    "matplotlib",
+    "h5py",
+    "skfem",
+    "skimage",
+    "sqlalchemy",
+    "serial",
+    "generator",
+    "pydantic",
+]
+PLATE = b"".join(
+    np.array(
+        [[0, 0, 1], *np.array([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]])[corners]], "<f4"
+    ).tobytes()
+    + b"\0\0"
+    for corners in ([0, 1, 2], [0, 2, 3])
+)
+
+
+@pytest.mark.parametrize(
+    ("words", "heavy"),
+    [
+        (["--help"], HEAVY),
+        (["simulate", "--help"], HEAVY),
+        (["calibrate", "loads", "--help"], HEAVY),
+        (["simulate", "plate.stl", "-o", "a.h5"], ["sqlalchemy", "scipy.signal", "skfem"]),
+    ],
+)
+def test_nothing_heavy_is_loaded_where_it_is_not_needed(tmp_path, words, heavy):
+    (tmp_path / "plate.stl").write_bytes(bytes(80) + np.uint32(2).tobytes() + PLATE)
+    script = f"import sys; from probe.command import run; code = run({words}); "
+    script += f"print([name for name in {heavy} if name in sys.modules], code)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
+                          cwd=tmp_path)  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "[] 0", done.stderr
+
+
 def error_of(result):
     code, out, err = result
     assert out == ""
     assert err.count("error: ") == 1, err
     return code, err
-
-
-def test_a_part_alone_is_touched_without_a_database(tmp_path):
-    part = tmp_path / "plate.stl"
-    corners = np.array([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]], "<f4")
-    facets = np.zeros(2, [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    facets["corners"] = corners[[[0, 1, 2], [0, 2, 3]]]
-    part.write_bytes(bytes(80) + np.uint32(2).tobytes() + facets.tobytes())
-    script = (
-        "import sys\n"
-        "from probe.command import run\n"
-        f"code = run(['simulate', {str(part)!r}, '--x', '0', '--y', '0', '-o', 'a.h5'])\n"
-        "heavy = ('sqlalchemy', 'scipy.signal', 'skfem')\n"
-        "print([name for name in heavy if name in sys.modules], code)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path
-    )
-    assert done.stdout.splitlines()[-1] == "[] 0", done.stderr
-
-
-def test_the_help_loads_nothing_heavy():
-    script = (
-        "import sys\n"
-        "from probe.command import run\n"
-        "codes = [run(words) for words in (['--help'], ['simulate', '--help'], ['list', '-h'],\n"
-        "                                  ['calibrate', 'loads', '--help'])]\n"
-        "heavy = 'numpy scipy matplotlib h5py skfem skimage sqlalchemy serial generator'.split()\n"
-        "heavy += ['pydantic', 'markdown_it']\n"
-        "print([name for name in heavy if name in sys.modules], codes)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == "[] [0, 0, 0, 0]"
-    assert "Exit codes: 0 done, 1 ran but failed, 2 bad input, 3 device, 4 database" in done.stdout
-
-
-def test_without_a_command_the_help_is_shown_and_the_code_is_2(asked):
-    for words, name in (((), "simulate"), (("calibrate",), "loads")):
-        code, out, _ = asked(*words)
-        assert code == 2
-        assert "Usage: probe-sensor" in out
-        assert name in out
-
-
-def test_the_version(asked):
-    code, out, _ = asked("--version", "--json")
-    assert code == 0
-    assert asked("--version")[1] == f"probe-sensor {json.loads(out)['version']}\n"
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["simulate", "washer", "--force", "-1"], "'--force': Input should be greater"),
-        (["simulate", "washer", "--nope"], "No such option: --nope"),
-        (["simulate", "washer", "--overlay", "wool"], "--overlay wool: give tab or pad"),
-        (["simulate", "washer", "--noise", "loud"], "--noise loud: give typical or quiet"),
-        (["simulate"], "Missing argument 'TARGET'"),
-        (["record", "sim:"], "Missing option '-o' / '--output'"),
-        (["info", "sim:", "--sensor", "8"], "'--sensor': Input should be less"),
-        (["replay", "x.h5", "--speed", "fast"], "'--speed': Input should be a valid number"),
-        (["replay", "x.h5", "--speed", "nan"], "'--speed': Input should be greater"),
-        (["export", "x.h5"], "nothing to write: give --csv, --npy, --png or --mcap"),
-        (["calibrate", "port", "sim:", "-o", "a.json", "--newtons", "1,b"], "--newtons 1,b"),
-        (["fly"], "No such command 'fly'"),
-    ],
-)
-def test_a_misused_option_is_named(asked, words, said):
-    code, err = error_of(asked(*words))
-    assert code == 2
-    assert f"error: {said}" in err
-    called = {"fly": [], "calibrate": words[:2]}.get(words[0], words[:1])
-    assert f"fix: see {' '.join(['probe-sensor', *called])} --help" in err
-    code, out, err = asked(*words, "--json")
-    if words[0] == "fly":
-        return
-    assert (code, err) == (2, "")
-    assert json.loads(out)["error"]["cause"].startswith(said)
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "said"),
-    [
-        (["info", "gone.h5"], 2, "there is no such recording"),
-        (["info", "gone.json"], 2, "cannot be read: No such file"),
-        (["info", "/dev/ttyGONE"], 3, "write serial:///dev/ttyGONE"),
-        (["info", "serial:///dev/ttyGONE"], 3, "there is no /dev/ttyGONE"),
-        (["info", "sim:?firmware=avr"], 3, "its options are rate, sensor_type"),
-        (["live", "sim:nothing"], 2, "this names no surface"),
-        (["live", "sim:gone.db#Cube/F1"], 4, "this database does not exist"),
-        (["record", "file:gone.h5", "-o", "a.h5"], 2, "there is no such recording"),
-        (["record", "sim:", "-o", "a.csv"], 2, "take a name like touch.h5"),
-        (["record", "sim:", "-o", "gone/a.h5", "--frames", "1"], 2, "make the folder first"),
-        (["record", "sim:", "-o", "a.h5", "--calibration", "gone.json"], 2, "No such file"),
-        (["replay", "gone.h5"], 2, "there is no such recording"),
-        (["export", "gone.h5", "--csv", "a.csv"], 2, "there is no such recording"),
-        (["export", "gone.h5", "--npy", "a.txt"], 2, "write a.npy"),
-        (["export", "gone.h5", "--png", "gone/a.png"], 2, "there is no folder gone"),
-        (["import", "gone.npy", "-o", "a.h5"], 2, "there is no such recording"),
-        (["repair", "gone.h5"], 2, "gone.h5"),
-        (["calibrate", "bias", "gone.h5"], 2, "there is no such recording"),
-        (["calibrate", "loads", "gone.h5", "-o", "a.json"], 2, "write gone.h5=NEWTONS"),
-        (["calibrate", "loads", "gone.h5=0", "-o", "a.txt"], 2, "write a.json"),
-        (["simulate", "gone.stl"], 2, "a file that you can read"),
-        (["simulate", "cube"], 2, "write part.stl, or database#object/face"),
-        (["simulate", "gone.db#Cube/F1"], 4, "this database does not exist"),
-        (["simulate", "washer", "--x", "99", "-o", "a.h5"], 2, "move the sensor over the object"),
-        (["simulate", "washer", "--accuracy", "layer"], 2, "take auto, an error such as 0.01"),
-        (["simulate", "washer", "--accuracy", "1e-9"], 2, "ask for"),
-        (["simulate", "washer", "--theta", "inf"], 2, "give mm, degrees and N"),
-        (["simulate", "washer", "--truth", "a.txt"], 2, "write a.json"),
-    ],
-)  # fmt: skip
-def test_what_is_not_there_is_one_message_with_a_way_out_and_no_file(
-    asked, tmp_path, monkeypatch, words, code, said
-):
-    monkeypatch.chdir(tmp_path)
-    given, err = error_of(asked(*words))
-    assert given == code
-    assert said in err
-    assert "fix: " in err
-    again, out, err = asked(*words, *(() if words[0] == "replay" else ("--json",)))
-    assert again == code
-    if words[0] != "replay":
-        assert err == ""
-        assert json.loads(out)["error"]["exit_code"] == code
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_that_is_there_is_kept(asked, bench, tmp_path):
@@ -222,38 +125,12 @@ def test_a_file_that_is_there_is_kept(asked, bench, tmp_path):
     assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
 
 
-def test_list_names_what_works_without_a_probe(asked):
-    code, out, _ = asked("list", "--json")
-    assert code == 0
-    listed = json.loads(out)
-    assert all(port["url"].startswith("serial://") for port in listed["ports"])
-    assert "sim:" in {one["url"] for one in listed["always"]}
-
-
-def test_info_of_a_probe_a_recording_and_a_calibration(asked, bench):
+def test_info_of_a_probe(asked):
     code, out, _ = asked("info", "sim:?rate=200", "--seconds", "0.3", "--sensor", "3", "--json")
     probe = json.loads(out)
     assert (code, probe["sensor"], probe["client"]["lost"]) == (0, "sim/3", 0)
-    assert probe["client"]["frames"] >= 30
-    assert probe["device"]["frames"] >= 30
+    assert min(probe["client"]["frames"], probe["device"]["frames"]) >= 30
     assert probe["ident"]["bits"] == 10
-
-    values = json.loads(asked("info", bench / "load40.h5", "--json")[1])
-    assert (values["frames"], values["sensor"], values["lost"]) == (60, "bench/0", 0)
-    assert values["rate"] == pytest.approx(220, abs=0.01)
-    assert "60 in 0.27 s, 220.0 a second" in asked("info", bench / "load40.h5")[1]
-
-    values = json.loads(asked("info", bench / "bench.json", "--json")[1])
-    assert (values["sound"], values["sensor"]) == (256, "bench/0")
-    assert asked("info", bench / "bench.json")[1].count("\n") > 8
-
-
-@pytest.mark.parametrize("command", [("info",), ("calibrate", "bias")])
-def test_a_scheme_that_nobody_opens_is_no_missing_file(asked, command):
-    code, _, err = asked(*command, "udp://0.0.0.0:5005")
-    assert code == 3
-    assert "must begin with serial:, flexitac:, sim: or file:" in err
-    assert "recording" not in err.replace("file:recording.h5", "")
 
 
 def test_record_ends_by_frames_and_by_seconds(asked, tmp_path):
@@ -317,27 +194,6 @@ def test_replay_writes_every_frame_in_its_time(asked, bench):
     assert (np.array(frames[-1]["counts"]) == held[-1].counts).all()
 
 
-def test_export_and_import_give_the_same_images(asked, bench, tmp_path):
-    path, table, array = bench / "noise.h5", tmp_path / "a.csv", tmp_path / "a.npy"
-    code, out, _ = asked("export", path, "--csv", table, "--npy", array, "--json")
-    assert (code, json.loads(out)["frames"]) == (0, 30)
-    images = np.load(bench / "noise.npy")
-    assert (np.load(array) == images).all()
-    rows = list(csv.DictReader(table.read_text().splitlines()))
-    assert [int(row["r15c15"]) for row in rows] == images[:, 15, 15].tolist()
-
-    savemat(tmp_path / "b.mat", {"pressure": images / 1023})
-    for source, scale in ((array, 1), (tmp_path / "b.mat", 1 / 1023)):
-        made = tmp_path / f"{source.stem}.h5"
-        code, out, _ = asked("import", source, "-o", made, "--json")
-        told = json.loads(out)
-        assert (code, told["frames"]) == (0, 30)
-        counts = Recording(made).block().counts * told.get("scale", 1)
-        assert counts == pytest.approx(images * scale, abs=2e-5)
-    words = ["import", bench / "load0.h5", "-o", tmp_path / "c.h5", "--dataset", "nothing"]
-    assert error_of(asked(*words))[0] == 2
-
-
 def test_export_in_newtons(asked, bench, tmp_path):
     out = tmp_path / "a.npy"
     words = ["export", bench / "load100.h5", "--npy", out, "--calibration", bench / "bench.json"]
@@ -356,24 +212,6 @@ def test_export_in_newtons(asked, bench, tmp_path):
     )
     _, err = error_of(asked(*words[:2], "--csv", tmp_path / "a.csv", *words[4:]))
     assert "--csv and --mcap hold counts" in err
-
-
-def test_a_picture_of_a_frame_that_is_not_there(asked, bench, tmp_path):
-    words = ["export", bench / "noise.h5", "--png", tmp_path / "a.png", "--frame", "30"]
-    code, err = error_of(asked(*words))
-    assert (code, list(tmp_path.iterdir())) == (2, [])
-    assert "frame 30 was asked for, it holds 30" in err
-    assert "take 0 ... 29" in err
-
-
-def test_repair_tells_whether_there_was_anything_to_do(asked, bench, tmp_path):
-    path = tmp_path / "a.h5"
-    path.write_bytes((bench / "noise.h5").read_bytes())
-    assert asked("repair", path)[1] == f"{path} is whole; 30 frames\n"
-    told = json.loads(asked("repair", path, "--json")[1])
-    assert (told["changed"], told["frames"], told["lost"]) == (False, 30, 0)
-    with h5py.File(path, "r") as file:
-        assert file["frames"].shape == (30, 16, 16)
 
 
 def test_calibrate_from_recordings_and_from_their_table(asked, bench, tmp_path):
@@ -509,9 +347,3 @@ def test_the_median_filter_takes_single_tactels_away():
     image[:, 8:] = 100
     assert (median_filter(image)[:, 8:] == 100).all()
     assert (median_filter(image)[:, :8] == 0).all()
-
-
-def test_json_is_json_whatever_the_values(capsys):
-    write_json({"nan": float("nan"), "numpy": np.array([1.5, np.inf]), "path": QUIET})
-    told = json.loads(capsys.readouterr().out)
-    assert (told["nan"], told["numpy"]) == (None, [1.5, None])

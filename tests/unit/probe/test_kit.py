@@ -24,7 +24,7 @@ from probe.kit.board import connections, has_board, shore_a, wiring_svg
 from probe.kit.command import run
 from probe.kit.coupon import UNDATED, make_coupon
 from probe.kit.make import bed_for
-from probe.kit.model import mesh_of, step_text
+from probe.kit.model import mesh_of
 from probe.kit.sheet import PrintedPart
 from probe.kit.sizes import CLEARANCE_MM, HEAD_MM, PIN_MM, WALL_BETWEEN_MM, frustum_mm3, kit_sizes
 from probe.simulate.registered import registered_surface
@@ -58,7 +58,7 @@ def test_what_must_fit_fits(name):
     (x, y), *_ = k.posts_mm
     assert x - PIN_MM / 2 > k.film_mm[0] / 2
     assert y - PIN_MM / 2 > k.film_mm[1] / 2
-    screw, _ = model.screw_places(k)[0]
+    screw, _ = k.screws_mm[0]
     inside = k.skin_mm[0] / 2 + CLEARANCE_MM
     assert screw - HEAD_MM[0] / 2 > inside  # a screw's head beside the platform
     assert k.coupon_mm > 2 * max(sensor.half_mm)
@@ -96,15 +96,6 @@ def test_tabs_of_the_mould_stand_where_tactels_are():
         assert bool(near) == ((row, column) != (0, 0))
         for p in near:
             assert math.hypot(p[0] - x, p[1] - y) == pytest.approx(1.2, abs=1e-6)
-
-
-def test_files_of_a_part_are_the_same_on_every_run():
-    k = kit_sizes(SMALL, 7.0)
-    first, second = (model.housing_frame(k) for _ in range(2))
-    assert step_text(first, "housing-frame") == step_text(second, "housing-frame")
-    one, two = mesh_of(first), mesh_of(second)
-    assert (one.vertices == two.vertices).all()
-    assert (one.triangles == two.triangles).all()
 
 
 def test_wires_are_those_of_the_firmware():
@@ -167,12 +158,6 @@ def test_a_coupon_is_the_same_on_every_run(tmp_path):
     with closing(sqlite3.connect(tmp_path / "one" / "coupon.db")) as connection:
         ((utc,),) = connection.execute("SELECT utc FROM provenance").fetchall()
     assert utc == UNDATED
-
-
-def test_an_unknown_type_is_refused(tmp_path, capsys):
-    assert run(["fsr-99", "-o", str(tmp_path / "kit")]) == 2
-    assert "did you mean" in capsys.readouterr().err
-    assert not (tmp_path / "kit").exists()
 
 
 @pytest.mark.parametrize("kind", ["pad", "gel"])

@@ -10,8 +10,8 @@ from probe.calibration import calibration_from, even_load, expected_counts
 from probe.calibration.load import BIAS_FRAMES
 from probe.circuit import Electronics, fsr_of, read_sequence
 from probe.client import ClientStatistics
+from probe.command.live import KEYS, SHADES, heat_map, render_frame
 from probe.command.live_state import LiveState
-from probe.command.live_view import KEYS, SHADES, heat_map, line_of, render_frame
 from probe.frame import frame_from
 from probe.protocol import IdentPacket
 from probe.recording.files import next_free
@@ -77,14 +77,6 @@ def test_the_bias_is_the_mean_of_frames_and_comes_off_the_image(state):
     state.toggle_bias()
     assert (state.image() == 0).all()
     assert state.notice == "bias off"
-
-
-def test_the_median_takes_a_single_tactel_away(state):
-    image = flat(10)
-    image[4, 4] = 900
-    state.take(frames_of(image))
-    state.median = True
-    assert (state.image() == 10).all()
 
 
 def test_newtons_with_a_calibration(state):
@@ -176,13 +168,3 @@ def test_colours_rise_in_brightness():
         r, g, b = part.style.bgcolor.triplet
         light.append(0.2126 * r + 0.7152 * g + 0.0722 * b)
     assert (np.diff(light) > 0).all()
-
-
-def test_one_line_where_there_is_no_terminal(state):
-    assert line_of(state, COUNTS) == "waiting for frames"
-    image = flat(1)
-    image[3, 12] = 77
-    state.take(frames_of(image))
-    assert line_of(state, COUNTS) == (
-        "frame 0  99.9/s  lost 3  failed 1  reboots 0  peak 77 counts at (3, 12)"
-    )

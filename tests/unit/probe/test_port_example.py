@@ -27,7 +27,7 @@ def udp(tmp_path, monkeypatch):
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: udp-probe\nVersion: 1.0\n")
     entries = project["entry-points"][GROUP].items()
     text = "".join(f"{scheme} = {opener}\n" for scheme, opener in entries)
-    (info / "entry_points.txt").write_text(f"[{GROUP}]\n{text}")
+    (info / "entry_points.txt").write_text(f"[{GROUP}]\n{text}lost = no_such_module:Port\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.syspath_prepend(EXAMPLE)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
@@ -63,5 +63,9 @@ def test_images_of_another_package_are_frames(udp):
 def test_it_refuses_as_ports_do(udp):
     with pytest.raises(PortError, match=r"cannot listen.*write udp://"):
         open_port("udp://127.0.0.1:port")
+    with pytest.raises(PortError, match=r"no_such_module.*install it again"):
+        open_port("lost:")
+    with pytest.raises(PortError, match="sim:, file:, lost: or udp:"):
+        open_port("http://probe")
     with pytest.raises(PortError, match="udp: has no option rows"):
         open_port(f"udp://127.0.0.1:{udp}?rows=8")

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from probe.client.client import Client
-from probe.errors import PortError
 from probe.port.flexitac import MARKER, PAUSE_LEAST_S, MarkedImages
 from probe.port.url import open_port, typed_port
 
@@ -94,13 +93,6 @@ def test_lost_and_added_bytes_cost_the_images_that_they_are_in():
     assert marked.lost == 511 + 514 + 5
 
 
-def test_noise_gives_no_image_and_is_forgotten():
-    found, marked = found_in(RNG.integers(0, 256, 200_000, dtype=np.uint8).tobytes(), 50)
-    assert len(found) == 0
-    assert len(marked._rest) <= 5 * 514 + 1
-    assert marked.lost > 190_000
-
-
 @contextmanager
 def board(images, period_s=0.004, skip=50):
     """Yield the device of a board that sends images again and again, from within the first on."""
@@ -170,13 +162,6 @@ def test_the_type_of_the_line_is_that_of_the_scheme_or_the_one_asked_for():
     url, kind = typed_port("sim:?rate=50", "fsr-8x8")
     assert (url, kind.name) == ("sim:?rate=50&sensor_type=fsr-8x8", "fsr-8x8")
     assert typed_port("serial:///dev/ttyACM0") == ("serial:///dev/ttyACM0", None)
-
-
-def test_options_that_a_board_does_not_have_are_refused():
-    with pytest.raises(PortError, match="flexitac: has no option baud"):
-        open_port("flexitac:///dev/ttyUSB0?baud=9600")
-    with pytest.raises(PortError, match="there is no /dev/none"):
-        open_port("flexitac:///dev/none")
 
 
 def test_a_silent_board_says_so_in_time():

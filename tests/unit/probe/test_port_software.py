@@ -6,11 +6,10 @@ from itertools import islice
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.frame import Frame, frame_from
-from probe.port import open_port
-from probe.port.recorded import endless_frames
 from probe.port.simulated import moving_pattern
-from probe.port.software import SoftwareProbe
+from probe.port.software import SoftwareProbe, endless_frames
 from probe.protocol import FramePacket, IdentPacket, Splitter, StatisticsPacket, decode
 
 IDENT = IdentPacket(0, 0, name="test")
@@ -59,13 +58,6 @@ def test_ident_and_statistics_answer():
     assert (ident.sensor, ident.bits, ident.name, ident.seq) == (5, 8, "test", 1)
     assert isinstance(statistics, StatisticsPacket)
     assert (statistics.frames, statistics.receive_errors) == (1, 2)
-
-
-def test_eight_bits_are_the_upper_ones():
-    port = SoftwareProbe("sim:", iter([frame(1023, 0)]), IDENT, speed=0)
-    port.write(b"bg")
-    (packet,) = packets(port)
-    assert (packet.counts == 255).all()
 
 
 def test_a_recording_keeps_its_bits():
@@ -129,7 +121,7 @@ def test_a_recording_repeats_with_rising_numbers_and_times():
 
 
 def test_the_pattern_moves_and_tells_up_from_down():
-    shown = list(islice(moving_pattern(100.0), 400))
+    shown = list(islice(moving_pattern(100.0, SensorType()), 400))
     assert [f.seq for f in shown] == list(range(400))
     assert shown[250].t_ns == 2_500_000_000
     images = np.array([f.counts for f in shown])
@@ -139,14 +131,3 @@ def test_the_pattern_moves_and_tells_up_from_down():
     assert len({image.tobytes() for image in images}) > 300
     top_left = images[100, :8, :8].mean()
     assert shown[100].wrist[0] == int(top_left)
-
-
-def test_a_simulated_port_has_the_pattern():
-    port = open_port("sim:?rate=1000")
-    port.write(b"is")
-    (ident,) = packets(port)
-    assert ident.name == "sim"
-    time.sleep(0.05)
-    assert packets(port, 2)[0].seq == 0
-    port.close()
-    assert port.read(0.0) == b""

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -21,10 +19,10 @@ from encoded_objects.base.sensor_type import (
 from encoded_objects.base.sensor_type_file import (
     parse_sensor_type,
     sensor_type_named,
-    sensor_type_schema,
     shipped_names,
 )
 from probe.command import run
+from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
@@ -34,35 +32,16 @@ from probe.simulate.source import options_of
 LEAST = "name: mine\nrows: 4\ncolumns: 6\npitch: 2 mm\n"
 
 
-def test_the_usual_type_is_the_one_without_a_name():
+def test_a_type_comes_back_from_its_text():
     assert shipped_names()[0] == "fsr-16"
     assert sensor_type_named("fsr-16") == SensorType()
-
-
-@pytest.mark.parametrize("name", shipped_names())
-def test_a_type_comes_back_from_its_text(name):
-    sensor = sensor_type_named(name)
-    assert sensor.name == name
-    assert parse_sensor_type(sensor_type_text(sensor), "text") == sensor
-
-
-def test_what_is_shipped():
-    assert {name: sensor_type_named(name).shape for name in shipped_names()} == {
-        "fsr-16": (16, 16),
-        "flexitac-12x32": (12, 32),
-        "flexitac-16x32": (16, 32),
-        "fsr-8x8": (8, 8),
-        "gel-24x32": (24, 32),
-        "mat-32x32": (32, 32),
-    }
-    gel = sensor_type_named("gel-24x32")
-    assert (gel.value, gel.overlay.kind, gel.unit, gel.pitch_mm) == ("depth", "gel", 1e-3, 0.58)
-    mat = sensor_type_named("mat-32x32")
-    present = mat.present()
-    assert present.sum() == 32 * 32 - 4 * 25 - 2 * 4 == 32 * 32 - len(mat.missing)
-    assert not present[0, 0]
-    assert not present[31, 28]
-    assert present[5, 5]
+    for name in shipped_names():
+        sensor = sensor_type_named(name)
+        assert sensor.name == name
+        assert parse_sensor_type(sensor_type_text(sensor), "text") == sensor
+    present = sensor_type_named("mat-32x32").present()
+    assert present.sum() == 32 * 32 - 4 * 25 - 2 * 4
+    assert (present[0, 0], present[31, 28], present[5, 5]) == (False, False, True)
 
 
 def test_everything_that_a_file_says_is_kept():
@@ -80,23 +59,16 @@ def test_everything_that_a_file_says_is_kept():
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "the file is empty\n  fix: write name:"),
-        (LEAST + "pich: 1\n", "a.yaml:5:1: error: unknown setting 'pich'"),
         (LEAST.replace("4", "1"), "a.yaml:2:7: error: rows and columns must be 2 to 255, not 1"),
         (LEAST.replace("2 mm", "2 furlong"), "a.yaml:4:8: error: unknown unit 'furlong'"),
         (LEAST.replace("mine", "My sensor"), "a.yaml:1:7: error: 'My sensor' is no name"),
-        (LEAST.replace("rows: 4\n", ""), "error: 'rows' is missing\n"),
-        (LEAST + "overlay: {kind: gell}", "a.yaml:5:17: error: unknown kind 'gell'\n"),
         (LEAST + "overlay: {poisson: 0.6}", "poisson must be above 0 and at most 0.5, not 0.6"),
         (LEAST + "value: depth", "a.yaml:5:8: error: value depth with a tab overlay"),
         (LEAST + "overlay: {kind: gel}", "a.yaml:5:17: error: value counts with a gel overlay"),
         (LEAST + "missing:\n  - {rows: 4, columns: 0}", "a.yaml:6:5: error: a missing tactel in"),
         (LEAST + "missing: [{rows: 3-1, columns: 0}]", "the range 3-1 runs backwards"),
         (LEAST + "missing: [{rows: -1, columns: 0}]", "is no line or range of lines"),
-        (LEAST + "missing: [{rows: true, columns: 0}]", "is no line or range of lines"),
         (LEAST + "bits: 17", "bits must be 4 to 16, not 17"),
-        (LEAST + "noise: no", "noise must be a number"),
-        ("- 1", "a sensor type is made of settings, not a list"),
     ],
 )
 def test_what_is_wrong_stands_at_its_line_and_column(text, says):
@@ -148,79 +120,30 @@ def test_an_overlay_is_taken_as_usual():
     assert pad.with_overlay("tab").overlay.tab_diameter_mm == pytest.approx(1.2666 * 2 / 1.5875)
 
 
-@pytest.mark.parametrize("name", shipped_names())
-def test_a_recording_carries_its_type(tmp_path, name):
-    sensor = sensor_type_named(name)
-    counts = np.arange(sensor.rows * sensor.columns, dtype=np.uint16).reshape(sensor.shape) % 200
-    with Recorder(tmp_path / "a.h5", sensor_type=sensor) as recorder:
-        for seq in range(3):
-            recorder.append(frame_from(counts + seq, t_ns=seq, seq=seq))
-    held = Recording(tmp_path / "a.h5")
-    assert held.shape == sensor.shape
-    assert held.sensor_type() == sensor
-    assert np.array_equal(held.block().counts[2], counts + 2)
+def test_every_command_takes_a_type_and_a_recording_carries_it(tmp_path, capsys):
+    recording, table = tmp_path / "a.h5", tmp_path / "a.csv"
+    given = ["--sensor-type", "fsr-8x8"]
+    assert run(["record", "sim:", "-o", str(recording), "--frames", "30", *given]) == 0
+    held = Recording(recording)
+    assert (held.sensor_type().name, held.shape) == ("fsr-8x8", (8, 8))
+    words = ["--csv", str(table), "--png", str(tmp_path / "a.png")]
+    assert run(["export", str(recording), *words]) == 0
+    assert table.read_text().splitlines()[0].split(",")[-5] == "r7c7"
+    assert run(["import", str(table), "-o", str(tmp_path / "b.h5"), *given]) == 0
+    assert np.array_equal(Recording(tmp_path / "b.h5").block().counts, held.block().counts)
+    assert run(["live", "sim:", "--seconds", "0.3", "--json", *given]) == 0
+    capsys.readouterr()
+    assert run(["info", "sim:", "--seconds", "0.2", "--json", *given]) == 0
+    assert json.loads(capsys.readouterr().out)["ident"]["columns"] == 8
 
 
 def test_frames_of_another_shape_are_not_recorded(tmp_path):
     with Recorder(tmp_path / "a.h5") as recorder:
         recorder.append(frame_from(np.zeros((8, 8)), t_ns=0, seq=0))
-        with pytest.raises(Exception, match="a frame of 16 x 16 readings in a recording of 8 x 8"):
+        with pytest.raises(RecordingError, match="16 x 16 readings in a recording of 8 x 8"):
             recorder.append(frame_from(np.zeros((16, 16)), t_ns=1, seq=1))
-    assert Recording(tmp_path / "a.h5").shape == (8, 8)
     with pytest.raises(SensorTypeError, match="--sensor-type fsr-8x8"):
         Recording(tmp_path / "a.h5").sensor_type()
-
-
-def test_the_schema_names_every_setting():
-    schema = sensor_type_schema()
-    assert {"name", "rows", "columns", "pitch"} == set(schema["required"])
-    assert {"overlay", "missing", "wiring", "unit"} < set(schema["properties"])
-
-
-def test_the_command_lists_shows_and_checks(tmp_path, capsys):
-    assert run(["types", "--json"]) == 0
-    listed = json.loads(capsys.readouterr().out)["types"]
-    assert [entry["name"] for entry in listed] == list(shipped_names())
-    assert run(["types", "mat-32x32"]) == 0
-    text = capsys.readouterr().out
-    assert parse_sensor_type(text, "shown") == sensor_type_named("mat-32x32")
-    (tmp_path / "bad.yaml").write_text(LEAST + "rows: 5\n")
-    assert run(["types", str(tmp_path / "bad.yaml")]) == 2
-    assert "bad.yaml:5:1: error: 'rows' is given twice" in capsys.readouterr().err
-
-
-def test_every_command_takes_a_type(tmp_path, capsys):
-    recording, table = tmp_path / "a.h5", tmp_path / "a.csv"
-    given = ["--sensor-type", "fsr-8x8"]
-    assert run(["record", "sim:", "-o", str(recording), "--frames", "30", *given]) == 0
-    assert Recording(recording).sensor_type().name == "fsr-8x8"
-    assert (
-        run(["export", str(recording), "--csv", str(table), "--png", str(tmp_path / "a.png")]) == 0
-    )
-    assert table.read_text().splitlines()[0].split(",")[-5] == "r7c7"
-    assert run(["import", str(table), "-o", str(tmp_path / "b.h5"), *given]) == 0
-    assert np.array_equal(
-        Recording(tmp_path / "b.h5").block().counts, Recording(recording).block().counts
-    )
-    capsys.readouterr()
-    assert run(["info", str(recording), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["sensor_type"], told["shape"]) == ("fsr-8x8", [8, 8])
-    assert run(["info", "sim:", "--seconds", "0.2", "--json", *given]) == 0
-    assert json.loads(capsys.readouterr().out)["ident"]["columns"] == 8
-    assert run(["live", "sim:", "--seconds", "0.3", "--json", *given]) == 0
-    assert run(["record", "sim:", "-o", str(tmp_path / "c.h5"), "--sensor-type", "none"]) == 2
-
-
-def test_the_usual_type_loads_no_reader_of_yaml():
-    code = (
-        "import sys, probe.recording.read;"
-        "from encoded_objects.base.sensor_type import choose_sensor_type;"
-        "choose_sensor_type(None, '', (16, 16), 'a');"
-        "print({'pydantic', 'yaml'} & set(sys.modules))"
-    )
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ran.stdout == "set()\n"
 
 
 UNEQUAL = "name: cloth\nrows: 14\ncolumns: 20\npitch: 1.5 mm\nrow_pitch: 2.1 mm\n"
@@ -260,7 +183,7 @@ def test_a_type_is_pressed_as_hard_for_its_area_and_a_gel_as_deep():
 def test_a_simulated_probe_presses_as_hard_as_its_type_takes(name, newtons):
     one = next(SimulatedProbe("washer", sensor_type=name).touches())
     assert one.touch.force_n == pytest.approx(newtons, rel=1e-3)
-    assert options_of({"sensor_type": name}).numbers["force"] == one.touch.force_n
+    assert options_of({"sensor_type": name})[0]["force"] == one.touch.force_n
     told = TouchOptions(touches=20)
     drawn = [
         one.touch.force_n for one in SimulatedProbe("washer", told, sensor_type=name).touches()

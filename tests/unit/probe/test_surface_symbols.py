@@ -8,7 +8,6 @@ import shapely
 from shapely.geometry import MultiPoint
 
 from probe.errors import SurfaceError
-from probe.surface.body import symbol_triangles
 from probe.surface.face import (
     LatticeSurface,
     call_lookup,
@@ -56,18 +55,6 @@ def heights(glyph, relief, x, y):
     return found
 
 
-@pytest.mark.parametrize("glyph", GLYPHS)
-def test_outline_bounds_the_union_of_the_strokes(glyph):
-    rings = outline(np.array(glyph, float) * UNIT, 1.4)
-    loops = [shapely.Polygon(ring.moved(0.0)) for ring in rings]
-    loops.sort(key=lambda loop: -loop.area)
-    ours = loops[0]
-    for hole in loops[1:]:
-        ours = ours.difference(hole)
-    assert ours.symmetric_difference(region(glyph, 1.4)).area < 1e-9
-    assert len(rings) == 1 + len(region(glyph, 1.4).interiors)
-
-
 @pytest.mark.parametrize("relief", RELIEFS)
 @pytest.mark.parametrize("label", range(len(GLYPHS)))
 def test_heights_are_those_of_the_moved_outline(label, relief):
@@ -95,15 +82,6 @@ def test_table_gives_the_exact_heights(relief):
     x, y = (right - 0.5) * PITCH, (0.5 - down) * PITCH
     exact[on] = symbols.heights_mm(labels[on], x[on], y[on])
     assert np.abs(known.heights_mm(labels, right, down) - exact).max() < 1e-12
-
-
-def test_triangles_of_a_symbol_stand_under_its_heights():
-    symbols = emboss(GLYPHS, UNIT, Relief(chamfer_mm=0.1))
-    for label in range(len(GLYPHS)):
-        corners = symbol_triangles(symbols, label)
-        middle = corners.mean(axis=1)
-        z = symbols.heights_mm(np.full(len(middle), label), middle[:, 0], middle[:, 1])
-        assert np.abs(z - middle[:, 2]).max() < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -157,19 +135,6 @@ def test_lattice_puts_each_label_into_its_cell():
             assert np.abs(cell_heights(endless_, r + 4 * k, c + 5 * k, x, y) - want).max() < 1e-9
     beyond = np.array([[-1e4, 1e4], [1e4, -1e4], [0.0, 5 * PITCH]])
     assert (finite.heights_mm(beyond) == 0).all()
-
-
-def test_turned_lattice_is_the_turned_surface():
-    symbols = emboss(GLYPHS, UNIT, Relief())
-    grid = np.random.default_rng(0).integers(0, 3, (9, 9))
-    points = np.random.default_rng(1).uniform(-30, 30, (2000, 2))
-    turn, x, y = 0.7, 3.3, -1.2
-    turned = LatticeSurface(template(symbols, PITCH), tile_lookup(grid), turn, x, y)
-    c, s = math.cos(turn), math.sin(turn)
-    there = points @ np.array([[c, s], [-s, c]]) + (x, y)
-    straight = LatticeSurface(template(symbols, PITCH), tile_lookup(grid))
-    close = np.abs(turned.heights_mm(points) - straight.heights_mm(there))
-    assert np.sort(close)[-3] < 1e-9  # upright steps excepted: a point may fall on either side
 
 
 def test_array_as_a_function_is_asked_once_for_every_cell_in_view():

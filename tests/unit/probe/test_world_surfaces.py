@@ -26,17 +26,17 @@ SQUARE = polygon([np.array([(0, 0), (40, 0), (40, 30), (0, 30)])])
 TRIANGLE = polygon([np.array([(0, 0), (50, 0), (25, 45)])])
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize(("first", "second"), [(SQUARE, TRIANGLE), (TRIANGLE, SQUARE)])
 def test_faces_lie_beside_each_other_and_the_sensor_near_both(first, second, seed):
     place, at = place_adjacent(first, second, np.random.default_rng(seed))
     both = AdjacentParts(FaceSurface(None, first), FaceSurface(None, second), place)
-    x, y = np.meshgrid(np.arange(-99.8, 140, 0.5), np.arange(-99.8, 140, 0.5))
+    x, y = np.meshgrid(np.arange(-99.8, 140, 1.0), np.arange(-99.8, 140, 1.0))
     points = np.column_stack([x.ravel(), y.ravel()])
     on_first, on_second = first.contains(points), second.contains(place.into(points))
     assert not (on_first & on_second).any()
     area = {id(SQUARE): 1200.0, id(TRIANGLE): 1125.0}
-    assert on_second.sum() / 4 == pytest.approx(area[id(second)], rel=0.02)
+    assert on_second.sum() == pytest.approx(area[id(second)], rel=0.03)
     heights = both.heights_mm(points)
     assert (heights[on_first] == 0).all()
     assert (heights[on_second] == place.z_mm).all()

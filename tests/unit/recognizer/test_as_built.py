@@ -22,10 +22,11 @@ from recognizer.touch.as_built import (
     ASIDE_SD_MM,
     SCALE_SD,
     SKEW_SD_RAD,
-    FeltScale,
     PrintedFace,
+    TouchScale,
     print_matrix,
     print_of,
+    scales_and_skew,
     usual_print,
 )
 
@@ -50,7 +51,7 @@ def turned(angle):
 
 def felt_on(as_built, R_part_face, error=(0, 0, 0, 0), covariance=None):
     """What an exact touch of a face tells: the metric of its plane as it is printed."""
-    S, B = print_matrix(as_built), R_part_face[:, :2]
+    S, B = print_matrix(scales_and_skew(as_built)), R_part_face[:, :2]
     E = (B.T @ S.T @ S @ B - np.eye(2)) / 2
     return MeasuredPrint(
         0, "Cube", "F1", "Cube-F1", R_part_face[:2, :2],
@@ -151,7 +152,7 @@ def test_a_pose_that_is_read_becomes_the_pose_on_the_print(scale_x, scale_y, ske
     T_part_face = np.eye(4)
     T_part_face[:3, :3], T_part_face[:3, 3] = R, (-30, -20, 12)
     as_built = print_with(scale_x, scale_y, skew)
-    S = print_matrix(as_built)
+    S = print_matrix(scales_and_skew(as_built))
     Q, _ = np.linalg.qr(S @ R[:, :2])  # a frame of the printed face, the same way round
     Q *= np.sign((Q * R[:, :2]).sum(axis=0))
     T_part_probe = np.eye(4)
@@ -189,7 +190,7 @@ def at_rest(x=0.0, y=0.0, turn=0.0):
 
 
 def felt(excess, sigma=1e-3, expected=1e9, with_pose=(0.0, 0.0, 0.0)):
-    return FeltScale(excess, np.array([*with_pose, sigma**2]), expected)
+    return TouchScale(excess, np.array([*with_pose, sigma**2]), expected)
 
 
 def test_prints_that_nobody_measured_come_out_as_designed_more_or_less():

@@ -13,7 +13,7 @@ from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.frame import frame_from
 from probe.recording.read import Recording
-from recognizer.bench.broker import Broker
+from recognizer.bench.broker import Broker, Subscriber
 from recognizer.bench.frames import FrameHandler
 from recognizer.bench.reading import PendingFrame, RecognitionThread, ScanMode
 from recognizer.sensor.wiring import wiring_named
@@ -37,7 +37,8 @@ def thread():
 
 
 def told(board, topic):
-    return json.loads(board.newest(topic))
+    messages = [json.loads(text) for text in board.news(Subscriber())]
+    return next(one for one in messages if one["topic"] == topic)
 
 
 def test_touches_are_fused_only_while_that_is_wanted(database):

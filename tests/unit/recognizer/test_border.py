@@ -21,8 +21,6 @@ from recognizer.touch.chance import (
     surely_pressed,
     tip_share,
 )
-from recognizer.touch.evidence import VerifiedHypothesis
-from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import open_lab
 from recognizer.touch.pose import face_pose
 from recognizer.touch.reader import Reader
@@ -182,8 +180,5 @@ def test_tactels_on_the_lattice(small):
 
 
 def test_round_faces_have_no_border():
-    face = SimpleNamespace(round=object())
-    found = VerifiedHypothesis(
-        None, SimpleNamespace(face=lambda _: face), Hypothesis(0, 0, 0, 0, 0.0), None, 0.0
-    )
+    found = SimpleNamespace(face=SimpleNamespace(round=object()))
     assert share_of_borders(found, TIP_MM) == 1.0

@@ -138,7 +138,7 @@ def test_an_image_of_no_registered_place_shows_anything_with_the_same_probabilit
 
 def verified(small, fit, place, score=0.0, lab=None):
     lab = lab or small.two_faces()
-    return VerifiedHypothesis(None, lab.embossed, place, fit, score)
+    return VerifiedHypothesis(lab.embossed, place, fit, score, None)
 
 
 def test_what_speaks_for_a_place(small, monkeypatch):
@@ -184,8 +184,15 @@ def test_two_hypotheses_are_one_place_up_to_a_cell(small):
     here = Hypothesis(0, 5, 4, 0, 0.0)
     one = of(here)
     assert one.index == (5, 4)
-    assert one.same_place(of(replace(here, fit=3, row=6, column=3, score=-9.0)))
-    assert not one.same_place(of(replace(here, row=7)))
+    for a, b, near in (  # on 11 x 13 cells
+        ((5, 5), (5, 5), True), ((5, 5), (6, 6), True), ((5, 5), (4, 6), True),
+        ((5, 5), (7, 5), False), ((5, 5), (3, 5), False), ((5, 5), (5, 7), False),
+        ((5, 5), (5, 3), False), ((0, 0), (10, 12), True), ((10, 12), (0, 0), True),
+        ((2, 9), (3, 8), True), ((2, 9), (4, 9), False), ((2, 9), (2, 7), False),
+        ((0, 0), (9, 0), False), ((0, 0), (0, 11), False), ((5, 5), (7, 7), False),
+    ):  # fmt: skip
+        first, other = (of(replace(here, row=row, column=column)) for row, column in (a, b))
+        assert first.same_place(other) is near
     assert not one.same_place(of(replace(here, face=1)))
     assert not one.same_place(of(here, lab=small.two_faces()))
     assert one.same_place(of(replace(here, row=7), y_mm=8.0))  # (5, 4) is still under the centre

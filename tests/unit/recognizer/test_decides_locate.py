@@ -15,7 +15,6 @@ from recognizer.touch.hypothesis import (
     labels_at,
     labels_of,
     log_likelihood,
-    neighbours,
     under_centre,
 )
 
@@ -421,18 +420,6 @@ def test_the_cell_under_the_centre(small):
     ):
         fit = small.fit_of([(0, 0)], [[0.0] * 5], x_mm=x, y_mm=y)
         assert under_centre(lab.embossed, fit, at(9, 12, 1)) == cell
-
-
-def test_neighbours_are_cells_at_most_one_apart_round_the_array(small):
-    embossed = small.two_faces().embossed  # 11 x 13
-    for a, b, near in (
-        ((5, 5), (5, 5), True), ((5, 5), (6, 6), True), ((5, 5), (4, 6), True),
-        ((5, 5), (7, 5), False), ((5, 5), (3, 5), False), ((5, 5), (5, 7), False),
-        ((5, 5), (5, 3), False), ((0, 0), (10, 12), True), ((10, 12), (0, 0), True),
-        ((2, 9), (3, 8), True), ((2, 9), (4, 9), False), ((2, 9), (2, 7), False),
-        ((0, 0), (9, 0), False), ((0, 0), (0, 11), False), ((5, 5), (7, 7), False),
-    ):  # fmt: skip
-        assert neighbours(embossed, a, b) is near
 
 
 def test_one_place_is_within_half_a_pitch_and_an_eighth_turn_round_the_array(small):

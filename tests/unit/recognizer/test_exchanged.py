@@ -15,82 +15,52 @@ from recognizer.touch.recognition import refusal
 from recognizer.touch.signal import Signal, swap_halves
 from recognizer.touch.verdict import Evidence
 
-PLAIN = Evidence(
-    log_likelihood_ratio=40.0,
-    explained=0.95,
-    inliers=16,
-    contradictions=0,
-    strong_contradictions=0,
-    stroke_excess=0.0,
-    worn=0,
-)
-SQUARE = (np.array([(0, 0), (40, 0), (40, 40), (0, 40)], float),)
+PLAIN = Evidence(log_likelihood_ratio=40.0, explained=0.95, inliers=16, contradictions=0)
+SQUARE = polygon([np.array([(0, 0), (40, 0), (40, 40), (0, 40)], float)])
 
 
-class Face:
-    region = polygon(list(SQUARE))
-
-    def __init__(self, round_):
-        self.round = round_
+def first(count, value, other=1.0):
+    """One value of the first tactels of 120, and another one of the rest."""
+    return np.where(np.arange(120) < count, value, other)
 
 
-@pytest.fixture
-def leaves(small, monkeypatch):
-    """Ask of a touch with so many of 100 pressed tactels so far beyond the face."""
-
-    def ask(*, beyond=0, mm=3.0, forces=1.0, round_=None, noise=0.0, trust=1.0, **speaks):
-        points = np.full((120, 2), 20.0)
-        points[:beyond, 0] = 40.0 + mm
-        points[100:] = 60.0  # not pressed: never counted
-        monkeypatch.setattr("recognizer.touch.recognise.points_on_face", lambda *_: points)
-        felt = np.where(np.arange(120) < 100, forces, 0.1)
-        image = SimpleNamespace(forces=felt, trust=np.full(120, trust), noise=noise)
-        face = Face(round_)
-        found = SimpleNamespace(
-            image=image, embossed=SimpleNamespace(face=lambda _: face),
-            hypothesis=SimpleNamespace(face=0), evidence=replace(PLAIN, **speaks),
-        )  # fmt: skip
-        return has_residual(found)
-
-    return ask
-
-
-def test_what_lies_on_the_face_leaves_nothing(leaves):
-    assert not leaves()
-
-
-def test_pressed_tactels_beyond_the_face_are_left_over(leaves):
-    assert leaves(beyond=15)
-    assert not leaves(beyond=14)
-    assert leaves(beyond=15, mm=1.51)
-    assert not leaves(beyond=15, mm=1.5)
-    assert not leaves(beyond=15, round_="a cylinder")
-
-
-def test_what_reads_little_is_not_pressed(leaves):
-    forces = np.where(np.arange(120) < 15, 0.19, 1.0)
-    assert not leaves(beyond=15, forces=forces)
-    assert not leaves(beyond=15, forces=np.where(np.arange(120) < 15, 0.2, 1.0))
-    assert leaves(beyond=15, forces=np.where(np.arange(120) < 15, 0.21, 1.0))
-
-
-def test_what_is_half_trusted_is_pressed_half(leaves):
-    assert not leaves(beyond=15, trust=np.where(np.arange(120) < 15, 0.19, 1.0))
-    assert leaves(beyond=15, trust=np.where(np.arange(120) < 15, 0.21, 1.0))
-    weak = np.where(np.arange(120) < 12, 0.25, 0.3)
-    assert leaves(beyond=15, forces=np.where(np.arange(120) < 12, 2.0, 1.0), trust=weak)
-
-
-def test_symbols_that_explain_little_leave_much(leaves):
-    assert leaves(log_likelihood_ratio=24.9, explained=0.859)
-    assert not leaves(log_likelihood_ratio=25.0, explained=0.859)
-    assert not leaves(log_likelihood_ratio=24.9, explained=0.86)
-
-
-def test_soft_symbols_explain_little_for_noise(leaves):
-    assert leaves(log_likelihood_ratio=24.9, explained=0.85, forces=30.0, noise=1.0)
-    assert not leaves(log_likelihood_ratio=24.9, explained=0.85, forces=29.9, noise=1.0)
-    assert leaves(beyond=15, noise=0.0334)
+@pytest.mark.parametrize(
+    ("changed", "leaves"),
+    [
+        ({}, False),
+        # of 100 pressed tactels so many so far beyond the face
+        ({"beyond": 15}, True), ({"beyond": 14}, False), ({"beyond": 15, "mm": 1.51}, True),
+        ({"beyond": 15, "mm": 1.5}, False), ({"beyond": 15, "round_": "a cylinder"}, False),
+        ({"beyond": 15, "noise": 0.0334}, True),
+        # what reads little is not pressed; what is half trusted is pressed half
+        ({"beyond": 15, "forces": first(15, 0.2)}, False),
+        ({"beyond": 15, "forces": first(15, 0.21)}, True),
+        ({"beyond": 15, "trust": first(15, 0.19)}, False),
+        ({"beyond": 15, "trust": first(15, 0.21)}, True),
+        ({"beyond": 15, "forces": first(12, 2.0), "trust": first(12, 0.25, 0.3)}, True),
+        # symbols that explain little leave much, but soft ones explain little for noise
+        ({"log_likelihood_ratio": 24.9, "explained": 0.859}, True),
+        ({"log_likelihood_ratio": 25.0, "explained": 0.859}, False),
+        ({"log_likelihood_ratio": 24.9, "explained": 0.86}, False),
+        ({"log_likelihood_ratio": 24.9, "explained": 0.85, "forces": 30.0, "noise": 1.0}, True),
+        ({"log_likelihood_ratio": 24.9, "explained": 0.85, "forces": 29.9, "noise": 1.0}, False),
+    ],
+)  # fmt: skip
+def test_which_answers_leave_much_of_a_touch(changed, leaves, monkeypatch):
+    given = {"beyond": 0, "mm": 3.0, "forces": 1.0, "round_": None, "noise": 0.0, "trust": 1.0}
+    speaks = {name: value for name, value in changed.items() if name not in given}
+    at = SimpleNamespace(**(given | changed))
+    points = np.full((120, 2), 20.0)
+    points[: at.beyond, 0] = 40.0 + at.mm
+    points[100:] = 60.0  # not pressed: never counted
+    monkeypatch.setattr("recognizer.touch.recognise.points_on_face", lambda *_: points)
+    image = SimpleNamespace(
+        forces=np.where(np.arange(120) < 100, at.forces, 0.1), trust=np.full(120, at.trust),
+        noise=at.noise,
+    )  # fmt: skip
+    face = SimpleNamespace(round=at.round_, region=SQUARE)
+    evidence = replace(PLAIN, **speaks)
+    assert has_residual(SimpleNamespace(image=image, face=face, evidence=evidence)) is leaves
 
 
 @pytest.mark.parametrize("axis", [0, 1])

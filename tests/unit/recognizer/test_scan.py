@@ -1,6 +1,7 @@
 """Scans of simulated faces: the right face, or a reason."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,13 +17,15 @@ from probe.simulate.scene import Scene
 from probe.simulate.world.levels import MISMATCH, TYPICAL
 from probe.simulate.world.sensor import LevelSensor
 from probe.surface.polygon import polygon
-from recognizer.scan.belief import begin_scan, extend_scan, read_scan
-from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
-from recognizer.scan.session import Scan, TouchPlaces
-from recognizer.scan.views import ScanSettings
+from recognizer.scan.answer import ScanHypothesis
+from recognizer.scan.belief import begin_scan, extend_scan
+from recognizer.scan.mosaic.planar import BY_HAND_SD, PlacedTouch, planar_belief
+from recognizer.scan.session import Scan, TouchPlaces, _Face, _hypotheses_of, contradict, join_faces
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import open_lab
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
+from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW, refusal
 from recognizer.touch.signal import signal_of
 from recognizer.validation.draw import FOREIGN
 
@@ -95,20 +98,6 @@ def test_a_scan_identifies_what_one_touch_cannot(lab, reader, level):
             turn = math.atan2(T[1, 0], T[0, 0]) - theta
             assert abs(math.degrees(math.remainder(turn, math.tau))) < 2
     assert [answer.seq for answer in answers] == list(range(len(touches)))
-    assert read_scan(reader, touches).as_json() == answers[-1].as_json()
-
-
-def test_a_touch_in_the_air_says_so_and_changes_nothing(lab, reader):
-    surface = registered_surface(lab.url, "Cube", "F3").surface
-    touches, _ = scanned(surface, PLACES[:3], 0.0, TYPICAL, 2)
-    scan = begin_scan(reader)
-    for touch in touches:
-        scan = extend_scan(scan, touch)
-    air = PlacedTouch(signal_of(np.full((16, 16), 8.0)), touches[0].believed, seq=9)
-    lifted = extend_scan(scan, air)
-    assert lifted.recognition.reason == NO_CONTACT
-    assert len(lifted.touches) == 3
-    assert lifted.best is scan.best
 
 
 def test_touches_of_another_thing_do_not_make_an_answer(lab, reader):
@@ -172,9 +161,9 @@ def felt(lab):
     return scanned(surface, PLACES, 0.8, TYPICAL, 5)
 
 
-@pytest.fixture(scope="module", params=[2, 6, 7, 8, 9])
+@pytest.fixture(scope="module", params=[2, 7])
 def felt_near(lab, request):
-    """As close to each other as a hand steps that feels its way."""
+    """As close to each other as the steps of a hand."""
     surface = registered_surface(lab.url, "Cube", "F3").surface
     places = [(x, y) for n, y in enumerate((30, 37, 44)) for x in range(20, 56, 7)[:: (-1) ** n]]
     return scanned(surface, places[:8], 0.8, TYPICAL, request.param)
@@ -224,9 +213,9 @@ def test_a_session_keeps_its_answer_in_the_air(lab, reader, felt):
 
 
 def test_places_follow_from_poses_steps_or_a_hand(felt):
-    signal, settings = felt[0][0].signal, ScanSettings()
+    signal = felt[0][0].signal
     poses = [true_pose(10, 20, 0.1), true_pose(16, 20, 0.1), true_pose(16, 27, 0.2)]
-    known = TouchPlaces(settings)
+    known = TouchPlaces()
     for pose in poses:
         touch = known.place(signal, pose, 0)
         known.keep(pose)
@@ -235,8 +224,8 @@ def test_places_follow_from_poses_steps_or_a_hand(felt):
     assert touch.stepped is None
     loose = known.place(signal, None, 0)
     assert loose.believed is None
-    assert np.sqrt(np.diag(loose.stepped.covariance)) == pytest.approx(settings.by_hand)
-    late = TouchPlaces(settings)  # the first touch had no pose
+    assert np.sqrt(np.diag(loose.stepped.covariance)) == pytest.approx(BY_HAND_SD)
+    late = TouchPlaces()  # the first touch had no pose
     late.keep(None)
     assert late.place(signal, poses[0], 0).stepped.pose == pytest.approx([0, 0, 0])
     late.keep(poses[0])
@@ -298,3 +287,87 @@ def test_a_slip_on_a_face_is_found_and_the_new_place_is_the_answer(one_touch):
     answer = scan.add(counts, pose)
     assert math.hypot(answer.x_mm - 24, answer.y_mm - 31) < 0.3
     assert (scan.touches, scan.changes) == (1, 1)
+
+
+@pytest.fixture
+def embossed(small):
+    """Faces A/F1 and B/F1 of 42 x 42 mm; each stands 30 mm above its object's origin."""
+    made = small.two_faces().embossed
+    for number, name in enumerate(("A", "B")):
+        T = np.eye(4)
+        T[2, 3] = 30.0
+        made.known[number] = SimpleNamespace(
+            object=name, face="F1", round=None, T_object_face=T, printed=None,
+            polygon_mm=(np.array([(0, 0), (42, 0), (42, 42), (0, 42)], float),),
+            rows=np.array([6]), columns=np.array([2]), rotation_rad=0.0,
+            centres_mm=np.array([[3.5, 3.5]]),
+        )  # fmt: skip
+    return made
+
+
+@pytest.fixture
+def touched(small, embossed):
+    """Return a face whose touches leave places (number of the face, nats, x)."""
+
+    def one(*places, reason=AMBIGUOUS, at=None):
+        found = []
+        for face, score, x in places:
+            fit = small.fit_of([(0, 0)], [[0.0] * 5], x_mm=x, y_mm=20.0)
+            place = Hypothesis(0, 6, 2, face, score)
+            found.append(ScanHypothesis(embossed, place, fit, score, None))
+        belief = SimpleNamespace(
+            reader=SimpleNamespace(options=ReaderOptions()),
+            places=tuple(found), recognition=refusal(4, reason),
+        )  # fmt: skip
+        pose = None
+        if at is not None:
+            pose = np.eye(4)
+            pose[:3, 3] = at
+        return _Face(belief, TouchPlaces(before=pose))
+
+    return one
+
+
+def test_one_face_decides_what_another_leaves_open(touched):
+    last = touched((0, -40.0, 20.0), (1, -42.0, 20.0))
+    assert join_faces(last, []).reason == AMBIGUOUS
+    for face, name in ((0, "A"), (1, "B")):
+        other = touched((face, -10.0, 9.0), (1 - face, -30.0, 9.0))
+        answer = join_faces(last, [other])
+        assert (answer.object, answer.face, answer.seq) == (name, "F1", 4)
+        assert answer.margin == pytest.approx(20.0 + (2.0 if face == 0 else -2.0))
+    weak = touched((0, -10.0, 9.0), (1, -17.0, 9.0))  # 2 and 7 nats are no margin
+    assert join_faces(last, [weak]).reason == AMBIGUOUS
+    assert join_faces(last, [weak, weak]).object == "A"
+
+
+def test_the_evidence_of_another_face_is_bounded(touched):
+    last = touched((0, -40.0, 20.0), (1, -65.0, 20.0))
+    other = touched((1, -10.0, 9.0))  # of B alone; 20 nats at most, and 25 speak for A
+    assert join_faces(last, [other]).reason == AMBIGUOUS
+
+
+def test_other_reasons_stand(touched):
+    last = touched((0, -40.0, 20.0), (1, -42.0, 20.0), reason=NOT_ENCODED)
+    assert join_faces(last, [touched((0, -10.0, 9.0))]).reason == NOT_ENCODED
+    open_ = touched((0, -40.0, 20.0), (1, -42.0, 20.0))
+    assert join_faces(open_, [touched((0, -10.0, 9.0), reason=NOT_ENCODED)]).reason == AMBIGUOUS
+
+
+def test_where_the_motion_is_known_the_object_must_lie_in_one_place(touched):
+    last = touched((0, -40.0, 20.0), (0, -41.0, 27.0), at=(100.0, 0.0, 0.0))
+    for x, answered in ((20.0, 20.0), (27.0, 27.0)):
+        other = touched((0, -10.0, x - 10.0), at=(90.0, 0.0, 0.0))
+        assert join_faces(last, [other]).x_mm == pytest.approx(answered)
+    far = touched((0, -10.0, 10.0), at=(50.0, 0.0, 0.0))  # neither: the object was moved
+    assert join_faces(last, [far]).reason == AMBIGUOUS
+    unknown = touched((0, -10.0, 10.0))  # of A, wherever: both places are
+    assert join_faces(last, [unknown]).reason == AMBIGUOUS
+
+
+def test_object_hypotheses_of_a_face(touched):
+    found = _hypotheses_of(touched((0, -40.0, 20.0), (1, -42.0, 20.0), at=(100.0, 0.0, 0.0)))
+    assert [(one.object, one.score) for one in found] == [("A", 0.0), ("B", -2.0)]
+    height = 30.0 + 1.2  # the sensor stands on the tops of the symbols
+    assert found[0].T_base_object[:3, 3] == pytest.approx([80.0, -20.0, -height])
+    assert not contradict(touched((0, -1.0, 20.0)), touched((1, -1.0, 20.0)))

@@ -8,7 +8,7 @@ import pytest
 from generator.pipeline import encode
 from generator.spec import read_specs
 from recognizer.scan.lattice import CELL_NATS
-from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
+from recognizer.scan.mosaic.planar import BY_HAND_SD, PlacedTouch, planar_belief
 from recognizer.scan.path import (
     PLACED_SD,
     SHIFTS,
@@ -17,14 +17,13 @@ from recognizer.scan.path import (
     path_ambiguity,
     step_between,
 )
-from recognizer.scan.views import LatticeView, ScanSettings
+from recognizer.scan.views import LatticeView
 from recognizer.touch.lab import open_lab
 from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.fit import Fit
 
 SURE = 12.0  # nats
-LIMITS = ScanSettings()
-UNKNOWN = planar_belief(np.zeros(3), LIMITS.by_hand)
+UNKNOWN = planar_belief(np.zeros(3), BY_HAND_SD)
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +107,7 @@ def test_a_touch_that_fits_nowhere_is_left_out(encoding):
     assert (path.poses[3] - path.poses[1])[:2] == pytest.approx([24.0, 0.0])
     assert path.poses[2] == pytest.approx(path.poses[1])
     wide = path.touch_poses(UNKNOWN.covariance).covariances[2]
-    assert np.sqrt(wide[0, 0]) == pytest.approx(LIMITS.by_hand[0])
+    assert np.sqrt(wide[0, 0]) == pytest.approx(BY_HAND_SD[0])
     assert not followed(encoding, [[], []]).placed.any()
 
 
@@ -131,11 +130,11 @@ def test_steps_follow_from_measurements():
         PlacedTouch(signal, stepped=planar_belief([5.0, 0.0, 0.0], (0.1, 0.1, 0.01))),
         PlacedTouch(signal, believed=planar_belief([9.0, 2.0, 0.1], (0.4, 0.4, 0.01))),
     ]
-    steps = known_steps(touches, LIMITS)
+    steps = known_steps(touches)
     assert steps[1].pose == pytest.approx([3.0, 0.0, 0.1])
     assert steps[1].covariance[0, 0] == pytest.approx(0.25)
     assert steps[2].pose == pytest.approx([5.0, 0.0, 0.0])
-    assert np.sqrt(np.diag(steps[3].covariance)) == pytest.approx(LIMITS.by_hand)
+    assert np.sqrt(np.diag(steps[3].covariance)) == pytest.approx(BY_HAND_SD)
     both = step_between(steps, 0, 2)
     assert both.pose == pytest.approx([3 + 5 * math.cos(0.1), 5 * math.sin(0.1), 0.1])
     assert both.covariance[0, 0] == pytest.approx(0.26, rel=1e-3)
@@ -157,7 +156,7 @@ def test_the_ambiguity_of_a_path_counts_the_others_that_touches_allow():
     for i in range(-SHIFTS, SHIFTS + 1):
         for j in range(-SHIFTS, SHIFTS + 1):
             away = np.array([12.0 + 12 * i, 12.0 * j])
-            weight = math.exp(-0.5 * (away @ away) / LIMITS.by_hand[0] ** 2)
+            weight = math.exp(-0.5 * (away @ away) / BY_HAND_SD[0] ** 2)
             for x in (0, 1):
                 for y in (0, 1):
                     u, v = x + 1 + i, y + j  # on the first one's cells

@@ -13,7 +13,6 @@ from recognizer.touch.search_gate import (
     GAPS,
     gap_share,
     may_find_more,
-    pressed_tactels,
     shows_strokes,
 )
 from recognizer.touch.signal import signal_of
@@ -61,10 +60,9 @@ def test_an_edge_of_a_plate_is_no_stroke(small):
 
 
 def touch_of(tactels):
-    """A touch in which so many tactels are pressed."""
     counts = np.full(256, 8.0)
     counts[np.linspace(0, 255, tactels).round().astype(int)] = 200.0
-    return signal_of(counts.reshape(16, 16))
+    return signal_of(counts.reshape(16, 16))  # as many tactels are pressed
 
 
 @pytest.fixture
@@ -85,55 +83,39 @@ def asked(small):
     return ask
 
 
-LABS = ({}, {"radii": (20.0,)}, {"kind": "pad"})
+PAD, ROUND = {"kind": "pad"}, {"radii": (20.0,)}
 
 
-def test_few_pressed_tactels_can_name_no_place(asked):
-    # 0.44 of the 19.4 tactels of a cell, three times: 25.7
-    assert pressed_tactels(touch_of(25)) == 25
-    assert not asked(tactels=25)
-    assert asked(tactels=26)
-    assert asked(tactels=25, lab={"radii": (20.0,)})  # a strip of a round face
-
-
-def test_symbols_of_no_registered_place_are_not_sought_further(asked):
-    assert asked(log_likelihood_ratio=3.0)
-    assert not asked(log_likelihood_ratio=2.9)
-
-
-def test_where_no_stroke_shows_none_are_sought_further(asked):
-    assert asked(tactels=160)
-    assert not asked(tactels=256)
-    assert asked(tactels=256, lab={"kind": "pad"})
-
-
-def test_where_hardly_a_symbol_agrees_no_place_is_found(asked):
-    assert asked(inliers=3)
-    assert not asked(inliers=2)
-    assert asked(inliers=0, lab={"kind": "pad"})
-
-
-def test_plain_symbols_that_explain_little_stand_beside_something_else(asked):
-    assert asked(log_likelihood_ratio=19.9, explained=0.1)
-    assert not asked(log_likelihood_ratio=20.0, explained=0.59)
-    assert asked(log_likelihood_ratio=20.0, explained=0.6)
-
-
-def test_an_image_that_is_explained_shows_no_more(asked):
-    assert not asked(reason=AMBIGUOUS, inliers=2)
-    assert asked(reason=AMBIGUOUS, inliers=3)
-    assert not asked(reason=TOO_FEW, inliers=3)
-
-
-@pytest.mark.parametrize("lab", LABS)
-def test_what_many_symbols_say_is_sure_anywhere(asked, lab):
-    assert not asked(reason="", inliers=11, lab=lab)
-    assert not asked(reason="", inliers=11, judged=refusal(0, BY_CHANCE, doubt=1e-4), lab=lab)
-
-
-@pytest.mark.parametrize(("lab", "confirmed"), list(zip(LABS, (False, True, True), strict=True)))
-def test_what_few_symbols_say_is_confirmed_where_that_was_not_measured(asked, lab, confirmed):
-    assert asked(reason="", inliers=10, lab=lab) == confirmed
+@pytest.mark.parametrize(
+    ("given", "wide"),
+    [
+        # 0.44 of the 19.4 tactels of a cell, three times: 25.7; a round face presses a strip
+        ({"tactels": 25}, False), ({"tactels": 26}, True), ({"tactels": 25, "lab": ROUND}, True),
+        # symbols of no registered place
+        ({"log_likelihood_ratio": 3.0}, True), ({"log_likelihood_ratio": 2.9}, False),
+        # no stroke shows
+        ({"tactels": 160}, True), ({"tactels": 256}, False), ({"tactels": 256, "lab": PAD}, True),
+        # hardly a symbol agrees
+        ({"inliers": 3}, True), ({"inliers": 2}, False), ({"inliers": 0, "lab": PAD}, True),
+        # plain symbols that explain little stand next to something else
+        ({"log_likelihood_ratio": 19.9, "explained": 0.1}, True),
+        ({"log_likelihood_ratio": 20.0, "explained": 0.59}, False),
+        ({"log_likelihood_ratio": 20.0, "explained": 0.6}, True),
+        # an image that is explained shows no more
+        ({"reason": AMBIGUOUS, "inliers": 2}, False), ({"reason": AMBIGUOUS, "inliers": 3}, True),
+        ({"reason": TOO_FEW, "inliers": 3}, False),
+        # many symbols are sure anywhere; few are confirmed where that was not measured
+        *(({"reason": "", "inliers": 11, "lab": lab}, False) for lab in ({}, ROUND, PAD)),
+        *(
+            ({"reason": "", "inliers": 11, "lab": lab,
+              "judged": refusal(0, BY_CHANCE, doubt=1e-4)}, False)
+            for lab in ({}, ROUND, PAD)
+        ),
+        *(({"reason": "", "inliers": 10, "lab": lab}, bool(lab)) for lab in ({}, ROUND, PAD)),
+    ],
+)  # fmt: skip
+def test_which_touches_are_searched_widely(asked, given, wide):
+    assert asked(**given) == wide
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from generator.errors import PrintError
 from generator.pipeline import encode
 from generator.printed import prints, slicer
 from generator.printed.prints import surface_keys, surface_path
-from generator.printed.surface import Coverage, PrintedSurface, write_surface
+from generator.printed.surface import PrintedSurface, write_surface
 from generator.spec import read_specs
 from probe.errors import SurfaceError
 from probe.simulate import printed
@@ -35,7 +35,7 @@ from recognizer.touch.reader import Reader
 from recognizer.validation.draw import draw_touch
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.printing import find_parts
-from recognizer.validation.touch_plan import TouchPlan, level_of, sensor_of
+from recognizer.validation.touch_plan import TouchPlan
 from recognizer.validation.trial import RIGHT, trial
 
 OPTIONS = PrintOptions(faults="usual", seed=5)
@@ -78,10 +78,8 @@ def print_as_designed(part: PartToPrint, database: str, folder: Path, faces: int
         heights = scene.surface.heights_mm(points - np.array((0.1, 0.0)))
         heights[heights < -2.5] = -np.inf
         side = (len(line), len(line))
-        surface = PrintedSurface(
-            heights.reshape(side).astype(np.float32), (-1.0, -1.0), 0.1, np.eye(4),
-            face.embossing.T_part_facet, Coverage(0, 0, 0),
-        )  # fmt: skip
+        laid = heights.reshape(side).astype(np.float32)
+        surface = PrintedSurface(laid, (-1.0, -1.0), 0.1, np.eye(4))
         write_surface(surface, surface_path(folder, keys[face.name]), moved_mm=(0.1, 0.0))
 
 
@@ -173,7 +171,7 @@ def test_a_part_is_left_until_all_its_faces_are_there(whole: str, tmp_path: Path
 
 
 def test_touches_of_prints_are_of_printed_faces_and_right(panels: str, listing: str) -> None:
-    reader = Reader(open_lab(panels), sensor_of("", "tab"))
+    reader = Reader(open_lab(panels))
     plan = TouchPlan(panels, 3, "typical", files=True, prints=listing)
     found = [trial(plan, number, reader) for number in range(4)]
     assert [(t.object, t.face, t.verdict) for t in found] == [("Cube", "F3", RIGHT)] * 4
@@ -186,10 +184,10 @@ def test_touches_of_prints_are_of_printed_faces_and_right(panels: str, listing: 
 
 def test_a_print_brings_its_own_faults(panels: str, listing: str) -> None:
     plan = TouchPlan(panels, level="mismatch")
-    assert level_of(plan).scale != 0
-    level = level_of(replace(plan, prints=listing))
+    assert plan.noise.scale != 0
+    level = replace(plan, prints=listing).noise
     assert (level.scale, level.wider_mm) == (0.0, 0.0)
-    assert level.shift_mm == level_of(plan).shift_mm > 0
+    assert level.shift_mm == plan.noise.shift_mm > 0
 
 
 def test_other_faces_than_those_of_the_lab_are_refused(
@@ -197,7 +195,7 @@ def test_other_faces_than_those_of_the_lab_are_refused(
 ) -> None:
     values = json.loads(Path(listing).read_text())
     (tmp_path / "other.json").write_text(json.dumps(values | {"faces": {"Ball": {"F1": "a"}}}))
-    reader = Reader(open_lab(panels), sensor_of("", "tab"))
+    reader = Reader(open_lab(panels))
     with pytest.raises(ValidationError, match="no face for touches of kind face was printed"):
         draw_touch(TouchPlan(panels, prints=str(tmp_path / "other.json")), 0, reader)
 

@@ -10,24 +10,14 @@ from recognizer.validation.campaign import (
     KIND_NAMES,
     KINDS,
     PRINTED,
-    REGISTERED,
     Campaign,
-    batches_of,
-    kinds_of,
-    levels_of,
-    plan_of,
+    Work,
+    campaign_of,
     series_of,
-    shards_of,
-    touchable,
+    shares_of,
 )
-from recognizer.validation.compare import BETTER, SAME, WORSE, _share, _size
-from recognizer.validation.encoded_set import (
-    EXTRA,
-    OTHER_LABS,
-    is_extra,
-    labs_of,
-    refuse_without_specs,
-)
+from recognizer.validation.compare import BETTER, SAME, WORSE, compare_shares, compare_sizes
+from recognizer.validation.encoded_set import EXTRA, is_extra, refuse_without_specs
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.statistics import (
     calibration,
@@ -36,6 +26,7 @@ from recognizer.validation.statistics import (
     rms_interval,
     round_digits,
     share_of,
+    state_of,
 )
 
 
@@ -65,11 +56,6 @@ def test_interval_of_a_root_mean_square_holds_the_true_one_as_often_as_it_says()
     assert 0.92 < np.mean(held) < 0.97
 
 
-def test_nothing_counted_says_nothing():
-    assert clopper_pearson(0, 0) == (0.0, 1.0)
-    assert share_of(0, 0)["share"] is None
-
-
 @pytest.mark.parametrize("p", [0.01, 0.5, 0.95, 0.999])
 def test_chi2_quantile(p):
     assert chi2_quantile(p) == pytest.approx(chi2.ppf(p, 3), rel=1e-9)
@@ -82,22 +68,48 @@ def test_an_honest_covariance_is_calibrated_and_a_proud_one_is_not():
     assert calibration(4 * errors)[2]["share"] < 0.7
 
 
-def test_rounded_keeps_what_it_must():
+def test_numbers_are_rounded_to_six_digits_and_nothing_counted_says_nothing():
     assert round_digits(1234567.0) == 1234570.0
-    assert round_digits(-0.0) == 0.0
     assert math.copysign(1, round_digits(-0.0)) == 1
     assert math.isnan(round_digits(math.nan))
-
-
-def test_shares_are_read_from_options():
-    assert kinds_of("face=3, edge") == (("face", 0.75), ("edge", 0.25))
-    assert levels_of("mismatch") == (("mismatch", 1.0),)
-    assert kinds_of("face=1,edge=0") == (("face", 1.0),)
+    none = share_of(0, 0)
+    assert (none["share"], none["low"], none["high"]) == (None, 0.0, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("low", "high", "sign", "bounds", "state"),
     [
+        (0.91, 0.97, "within", (0.90, 0.98), "holds"),
+        (0.89, 0.97, "within", (0.90, 0.98), "too few touches to tell"),
+        (0.91, 0.99, "within", (0.90, 0.98), "too few touches to tell"),
+        (0.981, 0.999, "within", (0.90, 0.98), "fails"),
+        (0.60, 0.899, "within", (0.90, 0.98), "fails"),
+        (0.0, None, "<=", (0.1,), "too few touches to tell"),
+        (0.11, None, "<=", (0.1,), "fails"),
+        (0.02, 0.1, "<=", (0.1,), "holds"),
+        (0.2, 0.4, ">=", (0.95,), "fails"),
+        (0.95, 1.0, ">=", (0.95,), "holds"),
+    ],
+)
+def test_bounds_are_judged_by_the_whole_interval(low, high, sign, bounds, state):
+    assert state_of({"of": 9, "low": low, "high": high}, sign, *bounds) == state
+
+
+def test_comparison_calls_chance_chance():
+    for a, b, least, word in ((990, 993, False, SAME), (900, 990, False, BETTER),
+                              (0, 30, True, WORSE)):  # fmt: skip
+        found = compare_shares("", share_of(a, 1000), share_of(b, 1000), least=least)
+        assert found["word"] == word
+    assert compare_sizes("", 0.050, 0.051, (100, 100))["word"] == SAME
+    assert compare_sizes("", 0.050, 0.100, (100, 100))["word"] == WORSE
+    assert compare_sizes("", None, 0.1, (0, 10))["word"] == SAME
+
+
+@pytest.mark.parametrize(
+    ("text", "shares"),
+    [
+        ("face=3, edge", (("face", 0.75), ("edge", 0.25))),
+        ("face=1,edge=0", (("face", 1.0),)),
         ("faces", "'faces' is not known"),
         ("face,face", "stands twice"),
         ("face=-1", "'-1'"),
@@ -107,90 +119,71 @@ def test_shares_are_read_from_options():
         ("", "nothing is left"),
     ],
 )
-def test_shares_that_are_none_are_refused(text, said):
-    with pytest.raises(ValidationError, match=said):
-        kinds_of(text)
+def test_shares_are_read_from_options(text, shares):
+    if isinstance(shares, tuple):
+        assert shares_of(text, KIND_NAMES, "--kinds") == shares
+    else:
+        with pytest.raises(ValidationError, match=shares):
+            shares_of(text, KIND_NAMES, "--kinds")
 
 
 def test_kinds_come_in_their_shares_and_from_the_number_alone():
-    campaign = Campaign(2000, seed=3)
-    (series,) = series_of(campaign)
-    drawn = [plan_of(campaign, series, "lab.db", number) for number in range(2000)]
-    counts = {kind: sum(k == kind for k, _ in drawn) for kind, _ in KINDS}
+    work = Work(Campaign(2000, seed=3), "lab.db")
+    (series,) = series_of(work.campaign)
+    drawn = [work.plan(series, number) for number in range(2000)]
     for kind, share in KINDS:
-        assert counts[kind] / 2000 == pytest.approx(share, abs=0.04)
-    strange = {plan.kind for kind, plan in drawn if kind == "foreign"}
+        count = sum(plan.counted_as == kind for plan in drawn)
+        assert count / 2000 == pytest.approx(share, abs=0.04)
+    strange = {plan.kind for plan in drawn if plan.counted_as == "foreign"}
     assert len(strange) >= 5
     assert "blank" not in strange
-    assert plan_of(campaign, series, "lab.db", 77) == drawn[77]
-    other = Campaign(80, seed=3)
-    assert plan_of(other, series_of(other)[0], "lab.db", 77) == drawn[77]
+    other = Work(Campaign(80, seed=3), "lab.db")
+    assert other.plan(series_of(other.campaign)[0], 77) == drawn[77]
 
 
 @pytest.mark.parametrize("engine", ["own", "mujoco"])
 def test_prints_are_parts_of_the_set(engine):
-    campaign = Campaign(surfaces=PRINTED, engine=engine)
-    kept = dict(touchable(campaign, named=False).kinds)
+    printed = {"surfaces": PRINTED, "engine": engine}
+    kept = dict(campaign_of(printed, None).kinds)
     assert sum(kept.values()) == pytest.approx(1.0)
     assert kept["face"] / kept["edge"] == pytest.approx(5.5)
     assert not {"blank", "foreign"} & set(kept)
     with pytest.raises(ValidationError, match="not blank, foreign"):
-        touchable(campaign, named=True)
-    named = Campaign(surfaces=PRINTED, engine=engine, kinds=(("edge", 1.0),))
-    assert touchable(named, named=True) == named
+        campaign_of(printed | {"kinds": "face,blank,foreign"}, None)
+    assert campaign_of(printed | {"kinds": "edge"}, None).kinds == (("edge", 1.0),)
 
 
-def test_an_engine_touches_everything_by_the_overlays_it_knows():
-    for surfaces in ("files", REGISTERED):
-        asked = Campaign(surfaces=surfaces, engine="mujoco")
-        assert touchable(asked, named=False) == asked
+def test_an_engine_touches_by_the_overlays_it_knows():
+    assert campaign_of({"engine": "mujoco", "surfaces": "database"}, None).kinds == KINDS
+    assert campaign_of({"overlay": "pad"}, None).sensor.overlay.kind == "pad"
     with pytest.raises(ValidationError, match="mujoco does not know the overlay pad"):
-        touchable(Campaign(overlay="pad", engine="mujoco"), named=False)
-    assert touchable(Campaign(overlay="pad"), named=True).overlay == "pad"
+        campaign_of({"engine": "mujoco", "overlay": "pad"}, None)
+
+
+def test_a_study_has_two_hundred_touches_or_none():
+    chosen = [campaign_of({"touches": touches}, None) for touches in (4, 199, 200, 100_000)]
+    assert [one.study for one in chosen] == [0, 0, 200, 200]
 
 
 @pytest.mark.parametrize("touches", [1, 24, 25, 999, 1000, 1001, 2530])
-def test_pieces_cover_every_touch_once(touches):
+def test_batches_cover_every_touch_once(touches):
     for series in series_of(Campaign(touches, study=30, shard=70)):
         numbers = [
             n
-            for shard in range(shards_of(series))
-            for piece in batches_of(series, shard)
-            for n in range(piece.first, piece.last)
+            for shard in range(series.shards)
+            for batch in series.batches(shard)
+            for n in range(batch.first, batch.last)
         ]
         assert numbers == list(range(series.touches))
 
 
-def test_comparison_calls_chance_chance():
-    assert _share("", share_of(990, 1000), share_of(993, 1000))["word"] == SAME
-    assert _share("", share_of(900, 1000), share_of(990, 1000))["word"] == BETTER
-    assert _share("", share_of(0, 1000), share_of(30, 1000), least=True)["word"] == WORSE
-    assert _size("", 0.050, 0.051, (100, 100))["word"] == SAME
-    assert _size("", 0.050, 0.100, (100, 100))["word"] == WORSE
-    assert _size("", None, 0.1, (0, 10))["word"] == SAME
-
-
-def test_every_kind_can_be_named():
-    assert [name for name, _ in kinds_of(",".join(KIND_NAMES))] == list(KIND_NAMES)
-
-
-def test_members_of_a_kind_are_not_touched_as_members_of_the_set():
-    for kind, name in EXTRA.items():
-        assert is_extra(f"{name}-3", kind)
-        assert not is_extra(f"{name}-3", "face")
-        assert not is_extra("Cube-1", kind)
-        assert not any(is_extra(f"{name}-3", other) for other in EXTRA if other != kind)
-    assert is_extra("Cube-1", "face")
+def test_members_of_a_kind_are_touched_by_their_kind_alone():
+    names = {"Cube-1": "face"} | {f"{name}-3": kind for kind, name in EXTRA.items()}
+    for name, own in names.items():
+        assert [kind for kind in ("face", *EXTRA) if is_extra(name, kind)] == [own]
 
 
 def test_nothing_is_registered_in_a_database_that_is_only_named():
     refuse_without_specs(["face", "side", "same_profile"])
     with pytest.raises(ValidationError, match="copy, small need objects of their own"):
         refuse_without_specs(["face", "copy", "small"])
-
-
-def test_other_labs_are_touched_by_their_kind_alone(tmp_path):
-    assert labs_of(tmp_path, ["face", "copy"]) == ()
-    labs = labs_of(tmp_path, ["same_profile"])
-    assert len(set(labs)) == OTHER_LABS
-    assert all(lab.startswith(str(tmp_path)) for lab in labs)

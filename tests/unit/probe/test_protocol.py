@@ -10,10 +10,10 @@ from cobs import cobs
 from probe.errors import FrameError, PortError
 from probe.protocol import (
     LONGEST,
-    Command,
     Damage,
     FramePacket,
     IdentPacket,
+    Splitter,
     StatisticsPacket,
     bits_command,
     decode,
@@ -61,6 +61,7 @@ def test_frames_tell_their_rows_and_columns(shape, byte_wide):
     assert back.byte_wide == byte_wide
     assert np.array_equal(back.counts, counts)
     assert np.array_equal(back.wrist, WRIST)
+    assert not any(array.flags.writeable for array in (back.counts, back.wrist))
 
 
 def test_frames_of_version_1_are_read():
@@ -85,28 +86,6 @@ def test_frames_whose_length_does_not_fit_their_shape_are_refused():
     assert decode(wire(head + bytes([0, 32]) + WRIST.tobytes())) is Damage.VALUE
     assert decode(wire(head)) is Damage.LENGTH
     assert decode(wire(struct.pack("<BBHI", ord("F"), 1, 0, 0) + body)) is Damage.LENGTH
-
-
-def test_frames_come_back_read_only():
-    back = decode(encode(FRAME)[:-1])
-    assert isinstance(back, FramePacket)
-    assert (back.seq, back.t_us, back.byte_wide) == (0x1234, 0x89ABCDEF, False)
-    assert np.array_equal(back.counts, COUNTS)
-    assert np.array_equal(back.wrist, WRIST)
-    assert not back.counts.flags.writeable
-    assert not back.wrist.flags.writeable
-
-
-def test_byte_frames_are_half_as_long():
-    packet = FramePacket(7, 9, COUNTS // 4, WRIST, byte_wide=True)
-    block = encode(packet)[:-1]
-    assert len(cobs.decode(block)) == 276
-    back = decode(block)
-    assert isinstance(back, FramePacket)
-    assert back.byte_wide
-    assert back.counts.dtype == np.uint16
-    assert np.array_equal(back.counts, COUNTS // 4)
-    assert not back.counts.flags.writeable
 
 
 def test_ident_bytes_are_those_of_the_format():
@@ -170,12 +149,26 @@ def test_values_that_do_not_fit_are_not_sent():
         encode(IdentPacket(0, 0, name="Fühler"))
 
 
-def test_commands_are_one_byte():
-    assert [sensor_command(s) for s in (0, 7)] == [b"0", b"7"]
-    assert (bits_command(10), bits_command(8)) == (b"a", b"b")
-    assert Command.START + Command.STOP + Command.ONE == b"sxg"
-    assert Command.IDENT + Command.STATISTICS == b"it"
+def test_commands_for_a_sensor_or_bits_that_a_probe_does_not_have():
     with pytest.raises(PortError, match="no sensor 8"):
         sensor_command(8)
     with pytest.raises(PortError, match="12 bits"):
         bits_command(12)
+
+
+def test_blocks_end_at_zeros():
+    splitter = Splitter()
+    assert splitter.feed(b"ab") == []
+    assert splitter.feed(b"c\0\0de\0f") == [b"abc", b"de"]
+    assert splitter.feed(b"\0") == [b"f"]
+    assert splitter.feed(b"") == []
+
+
+def test_a_block_without_end_is_cut_and_stays_too_long():
+    splitter = Splitter()
+    for _ in range(LONGEST // 50_000 + 2):
+        assert splitter.feed(b"x" * 50_000) == []
+        assert len(splitter._rest) <= LONGEST + 1
+    (block,) = splitter.feed(b"\0")
+    assert len(block) == LONGEST + 1
+    assert splitter.feed(b"good\0") == [b"good"]

@@ -1,0 +1,639 @@
+"""Touches on a mosaic: poses, correlation, registration, the pose graph, the canvas, all of it."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from encoded_objects.base.sensor_type import SensorType
+from probe.contact.contract import Touch
+from probe.contact.tabs import tabs
+from probe.scan.places import surface_to_sensor
+from probe.surface.face import endless_face
+from recognizer.errors import MosaicError
+from recognizer.scan.mosaic.canvas import (
+    CanvasEntry,
+    add_to_canvas,
+    empty_canvas,
+    image_of,
+    reference,
+)
+from recognizer.scan.mosaic.mosaic import ALONE, AMBIGUOUS, add_touch, no_touches
+from recognizer.scan.mosaic.patch import (
+    interpolate_patch,
+    patch_of,
+    restrict_information,
+    seen_motions,
+)
+from recognizer.scan.mosaic.planar import (
+    PlacedTouch,
+    compose_poses,
+    composed_covariance,
+    decoded_place,
+    inverse,
+    planar_belief,
+    planar_covariance,
+    planar_pose,
+    relative_covariance,
+    relative_pose,
+    transform_points,
+    wrap_angle,
+)
+from recognizer.scan.mosaic.pose_graph import (
+    ARM,
+    OUTLIER_WEIGHT,
+    PLANE,
+    Constraint,
+    covariances,
+    solve_pose_graph,
+)
+from recognizer.scan.mosaic.register import APART, CONSTANT, NOISE, register_patches
+from recognizer.scan.mosaic.search import (
+    KnownRaster,
+    cross_correlate,
+    magnify_patch,
+    peaks,
+    points_mm,
+    resample,
+)
+from recognizer.thesis.merge import product_shift
+from recognizer.touch.recognition import Recognition, refusal
+from recognizer.touch.signal import Signal, signal_of
+
+SENSOR = SensorType()
+P = SENSOR.pitch_mm
+DEG = math.pi / 180
+GLYPHS = (
+    (((-1, 1), (-1, -1)), ((-1, -1), (1, -1))),
+    (((1, -1), (-1, -1)), ((-1, -1), (-1, 0)), ((-1, 0), (0, 1)), ((0, -1), (0, 0))),
+    (((-1, -1), (0, -1)), ((0, -1), (0, 0)), ((0, 0), (1, 1)), ((0, 0), (-1, 0))),
+    (((-1, 1), (-1, -1)), ((-1, -1), (1, -1)), ((1, -1), (1, 1))),
+)
+TACTELS = SENSOR.centres_mm().reshape(-1, 2)
+SURE = np.diag([1e-4, 1e-4, 1e-7])
+
+
+def newtons(forces, trust=None):
+    return Signal(forces, np.ones((16, 16)) if trust is None else trust, True, newtons=True)
+
+
+def symbols(seed=0):
+    labels = np.random.default_rng(seed).integers(0, 4, (23, 25))
+    return endless_face(labels, GLYPHS, pitch_mm=7.0, unit_mm=0.26 * 7)
+
+
+def felt(surface, pose, rng, force=80.0):
+    """Forces of one sensor, whose gains spread by a tenth."""
+    gains = np.exp(np.random.default_rng(9).normal(0, 0.1, (16, 16)))
+    forces = tabs(surface, SENSOR, Touch(*pose, force)).forces_n * gains
+    return np.maximum(forces + rng.normal(0, 0.02, (16, 16)), 0)
+
+
+def patch(readings, trust=None):
+    return patch_of(SENSOR, newtons(np.asarray(readings, float), trust))
+
+
+def waves(points, shift=(0.0, 0.0)):
+    x, y = np.moveaxis(points - np.asarray(shift), -1, 0)
+    return 4 + np.sin(x / 3.1) + np.cos(y / 3.6 + 0.4) + 0.5 * np.sin((x + y) / 4.3)
+
+
+def sampled(shift=(0.0, 0.0)):
+    return waves(TACTELS, shift).reshape(16, 16)
+
+
+# --- poses in the plane ---------------------------------------------------------------------
+
+
+def test_a_quarter_turn_by_hand():
+    T_a_b = np.array([10.0, 5.0, math.pi / 2])
+    assert transform_points(T_a_b, np.array([1.0, 0.0])) == pytest.approx([10, 6])
+    assert compose_poses(T_a_b, np.array([1.0, 2.0, 0.0])) == pytest.approx([8, 6, math.pi / 2])
+    assert inverse(T_a_b) == pytest.approx([-5, 10, -math.pi / 2])
+
+
+@pytest.mark.parametrize(
+    ("stated", "function"),
+    [(relative_covariance, relative_pose), (composed_covariance, compose_poses)],
+)
+def test_covariances_are_those_of_a_sample(stated, function):
+    rng = np.random.default_rng(3)
+    a, b = np.array([20.0, -7.0, 0.8]), np.array([31.0, 4.0, -0.3])
+    of_a, of_b = np.diag([0.04, 0.01, 1e-5]), np.diag([0.02, 0.03, 4e-5])
+    spread = stated(a, b, of_a, of_b)
+    some_a = a + rng.multivariate_normal(np.zeros(3), of_a, 40_000)
+    some_b = b + rng.multivariate_normal(np.zeros(3), of_b, 40_000)
+    scale = np.sqrt(np.diag(spread))
+    seen = np.cov(function(some_a, some_b).T)
+    assert np.abs((seen - spread) / np.outer(scale, scale)).max() < 0.03
+
+
+def test_spatial_poses_and_covariances_in_the_plane():
+    assert planar_pose(surface_to_sensor(3, -2, 0.7, 9)) == pytest.approx([3, -2, 0.7])
+    turned = surface_to_sensor(0, 0, math.pi / 2)[:3, :3]
+    spread = planar_covariance(np.diag([1.0, 4, 9, 16, 25, 36]), turned)
+    assert spread == pytest.approx(np.diag([4.0, 1, 36]))
+    for bad in (np.eye(3), np.diag([1.0, -1, -1, 1]), np.full((4, 4), math.nan)):
+        with pytest.raises(MosaicError):
+            planar_pose(bad)
+    with pytest.raises(MosaicError, match=r"\(6, 6\)"):
+        planar_covariance(np.eye(5))
+
+
+def test_places_are_checked():
+    T = surface_to_sensor(12.0, 30.0, -0.4)
+    assert planar_belief(T, (1, 1, 0.1)).pose == pytest.approx([12, 30, -0.4])
+    level = (0.0, 0.0, 0.0)
+    for pose, spread in (
+        ((1, 2), (1, 1, 1)),
+        ((1, 2, math.nan), (1, 1, 1)),
+        (level, (1, 1, 0)),
+        (level, np.ones((3, 3))),
+        (level, [[1, 2, 0], [0, 1, 0], [0, 0, 1]]),
+    ):
+        with pytest.raises(MosaicError):
+            planar_belief(pose, spread)
+    with pytest.raises(MosaicError, match="touch 7 has no place"):
+        PlacedTouch(newtons(np.zeros((16, 16))), seq=7)
+    spread = np.diag([1e-3, 1e-3, 1e-6])
+    place = decoded_place(Recognition(1, "Cube", "A", (0, 0), T, T, spread, 20.0, None, ""))
+    assert place.pose == pytest.approx([12, 30, -0.4])
+    assert (place.covariance == spread).all()
+    assert decoded_place(refusal(1, "ambiguous")) is None
+
+
+# --- correlation ----------------------------------------------------------------------------
+
+
+def test_correlation_in_parts_is_that_of_every_overlap():
+    rng = np.random.default_rng(4)
+    wide = KnownRaster(rng.normal(5, 1, (20, 23)), rng.random((20, 23)) > 0.2, 0, 0, 1)
+    image = KnownRaster(rng.normal(9, 3, (12, 11)), rng.random((12, 11)) > 0.2, 0, 0, 1)
+    rho, overlap = cross_correlate(wide, image)
+    assert rho.shape == (9, 13)
+    for i, j in np.ndindex(9, 13):
+        window = np.s_[i : i + 12, j : j + 11]
+        both = wide.known[window] & image.known
+        a, b = wide.values[window][both], image.values[both]
+        assert overlap[i, j] == both.sum()
+        assert rho[i, j] == pytest.approx(np.corrcoef(a, b)[0, 1], abs=1e-9)
+
+
+def test_where_nothing_varies_there_is_no_correlation():
+    known = np.ones((12, 12), bool)
+    varied = KnownRaster(np.random.default_rng(1).normal(size=(8, 8)), known[:8, :8], 0, 0, 1)
+    rho, _ = cross_correlate(KnownRaster(np.full((12, 12), 3.0), known, 0, 0, 1), varied)
+    assert np.isnan(rho).all()
+    rho, overlap = cross_correlate(KnownRaster(np.zeros((12, 12)), ~known, 0, 0, 1), varied)
+    assert np.isnan(rho).all()
+    assert (overlap == 0).all()
+    assert peaks(rho, 4) == []
+
+
+def test_peaks_lie_between_cells():
+    y, x = np.mgrid[:9, :11]
+    hill = -((y - 3.3) ** 2) - 2 * (x - 6.2) ** 2
+    hill[0, 0] = math.nan
+    ((row, column, _),) = peaks(hill, 3)
+    assert (row, column) == pytest.approx((3.3, 6.2))
+    assert peaks(-hill, 3) == []  # highest on the rim
+
+
+def test_the_thesis_s_product_finds_whole_tactels():
+    image = np.zeros((24, 24))
+    rows, columns = np.random.default_rng(0).integers(0, 24, (2, 40))
+    image[rows, columns] = 5.0
+    shift = product_shift(image[4:20, 2:18], image[7:23, 4:20], (1.5, -2.5), 1.0)
+    assert shift.tolist() == [2.0, -3.0]  # right, and down the rows
+
+
+# --- one touch as an image ------------------------------------------------------------------
+
+
+def test_a_patch_between_the_tactels():
+    points = np.random.default_rng(2).uniform(-9, 9, (200, 2))
+    found = patch(sampled())
+    value, by_x, by_y = interpolate_patch(found, points)
+    assert np.abs(value * found.scale - waves(points)).max() < 0.12
+    for slope, step in ((by_x, (1e-4, 0)), (by_y, (0, 1e-4))):
+        ahead, behind = (
+            interpolate_patch(found, points + sign * np.array(step))[0] for sign in (1, -1)
+        )
+        assert slope == pytest.approx((ahead - behind) / 2e-4, abs=1e-6)
+
+
+def test_bad_tactels_are_filled_from_around():
+    readings, trust = sampled(), np.ones((16, 16))
+    trust[7, :] = trust[3, 12] = 0
+    broken = np.where(trust > 0, readings, 1e6)
+    assert np.abs(patch(broken, trust).values - patch(readings).values).max() < 0.35
+    assert patch(broken, np.zeros((16, 16))).scale == 0
+
+
+def test_a_raster_is_resampled_on_another():
+    found = magnify_patch(patch(sampled()))
+    assert found.values.shape == (64, 64)
+    pose = np.array([2.0, -1.0, 0.3])
+    under = resample(found, found, pose)
+    at = transform_points(pose, points_mm(found)[under.known])
+    inside = (np.abs(at) < 10).all(axis=1)
+    scale = patch(sampled()).scale
+    assert np.abs(under.values[under.known] * scale - waves(at))[inside].max() < 0.15
+    assert 0.7 < under.known.mean() < 0.95
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, 1.2])
+def test_a_ridge_moved_along_itself_is_invisible(angle):
+    across = TACTELS @ [math.cos(angle), math.sin(angle)]
+    ridge = patch(np.exp(-((across - 1.0) ** 2) / 4).reshape(16, 16))
+    motions = seen_motions(ridge, np.ones(256, bool), np.zeros(3))
+    assert motions.shape == (3, 2)
+    along = np.array([-math.sin(angle), math.cos(angle), 0.0])
+    assert np.abs(along @ motions).max() < 0.05
+    belief = np.diag([2.0, 2.0, 1e-4])
+    information = restrict_information(np.diag([300.0, 200.0, 4e4]), motions, SENSOR, belief)
+    assert along @ information @ along < 0.1
+    assert np.linalg.eigvalsh(information).min() > -1e-6
+
+
+def test_a_dome_turned_about_its_middle_is_invisible():
+    dome = patch(np.exp(-((TACTELS - [2, 1]) ** 2).sum(axis=1) / 18).reshape(16, 16))
+    everywhere = np.ones(256, bool)
+    assert seen_motions(dome, everywhere, np.array([2.0, 1.0, 0.0])).shape == (3, 2)
+    assert seen_motions(patch(sampled()), everywhere, np.zeros(3)).shape == (3, 3)
+    assert seen_motions(patch(np.ones((16, 16))), everywhere, np.zeros(3)).shape == (3, 0)
+    assert (restrict_information(np.eye(3), np.zeros((3, 0)), SENSOR, np.eye(3)) == 0).all()
+
+
+# --- one touch against another --------------------------------------------------------------
+
+A = np.array([41.3, 52.9, 0.35])
+BELIEF = np.diag([P**2, P**2, (0.5 * DEG) ** 2])
+
+
+class Ridges:
+    """Ridges across one direction, unevenly spaced."""
+
+    top_mm = 0.0
+
+    def __init__(self, angle):
+        self.across = np.array([math.cos(angle), math.sin(angle)])
+        self.shifts = np.random.default_rng(5).uniform(-0.3, 0.3, 99)
+
+    def heights_mm(self, points):
+        u = points @ self.across / 7
+        k = np.floor(u).astype(int)
+        return np.where(np.abs(u - k - 0.5 - self.shifts[k % 99]) < 0.16, 0.0, -1.0)
+
+
+def two(surface, true, trust=1.0, forces=(80.0, 80.0)):
+    known = np.ones((16, 16)) * trust
+    return [
+        patch(felt(surface, pose, np.random.default_rng(n), force) * known, known)
+        for n, (pose, force) in enumerate(zip((A, compose_poses(A, true)), forces, strict=True))
+    ]
+
+
+@pytest.mark.parametrize("dead", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_symbols_lock_to_a_tenth_of_a_tactel(seed, dead):
+    rng = np.random.default_rng(seed)
+    true = np.array([4.25 * P, 0.3 * P, 0.5 * DEG]) + rng.normal(0, [1, 1, 0.003])
+    trust = np.ones((16, 16))
+    if dead:
+        trust[5, :] = trust[2, 3] = trust[11, 9] = 0
+    start = true + np.array([0.5, -0.6, 0.01])
+    a, b = two(symbols(seed), true, trust, (30.0, 60.0))
+    found = register_patches(a, b, start, BELIEF, start)
+    assert found
+    away = found.pose - true
+    assert math.hypot(*away[:2]) < 0.2 * P
+    assert abs(away[2]) < 0.6 * DEG
+    assert away @ found.information @ away < 16
+    assert found.gain == pytest.approx(0.5, rel=0.25)
+    back = register_patches(b, a, inverse(start), BELIEF, inverse(start))
+    assert inverse(back.pose)[:2] == pytest.approx(found.pose[:2], abs=0.1)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.6, 1.9])
+def test_ridges_define_the_motion_across_them(angle):
+    true = np.array([3.0, 2.0, 0.01])
+    off = np.array([0.8, -0.6, 0.003])
+    found = register_patches(*two(Ridges(angle), true), true + off, BELIEF, true + off)
+    assert found
+    covariance = np.linalg.inv(found.information + np.linalg.inv(BELIEF))
+    local = angle - A[2]
+    across = np.array([math.cos(local), math.sin(local), 0.0])
+    along = np.array([-math.sin(local), math.cos(local), 0.0])
+    assert abs(across @ (found.pose - true)) < 0.2 * P
+    assert along @ (found.pose - true - off) == pytest.approx(0, abs=0.15)  # as believed
+    assert 0.5 * P**2 < along @ covariance @ along < 1.01 * P**2
+    assert across @ covariance @ across < (0.2 * P) ** 2
+
+
+def test_reasons_for_no_answer():
+    rng = np.random.default_rng(0)
+    here, far = np.zeros(3), np.array([30.0, 0.0, 0.0])
+    flat = [patch(70 + rng.normal(0, 2, (16, 16))) for _ in "ab"]
+    rough = [patch(rng.exponential(9, (16, 16))) for _ in "ab"]
+    nothing = patch(np.zeros((16, 16)))
+    for pair, at, reason in (
+        (flat, here, CONSTANT),
+        ((nothing, flat[0]), here, CONSTANT),
+        (two(symbols(1), np.array([3.0, 0.0, 0.0])), far, APART),
+        (rough, here, NOISE),
+    ):
+        refused = register_patches(*pair, at, BELIEF, at)
+        assert refused.reason == reason
+        assert not refused
+        assert (refused.pose == at).all()
+        assert (refused.information == 0).all()
+        assert math.isnan(refused.gain)
+
+
+# --- the pose graph -------------------------------------------------------------------------
+
+BELIEVED, PAIR = np.diag([0.4, 0.4, 4e3]), np.diag([90.0, 60.0, 6e4])
+DECODED_INFORMATION = np.diag([1e3, 1e3, 3e5])
+
+
+def scene(rng, n=12):
+    poses = np.column_stack([rng.uniform(0, 60, (n, 2)), rng.normal(0, 0.02, n)])
+    near = [(a, b) for b in range(n) for a in range(b) if np.hypot(*(poses[b] - poses[a])[:2]) < 30]
+    return poses, near
+
+
+def noisy(rng, pose, information):
+    return pose + rng.multivariate_normal(np.zeros(3), np.linalg.inv(information))
+
+
+def test_constraints_without_errors_give_the_truth_from_afar():
+    rng = np.random.default_rng(1)
+    true, near = scene(rng)
+    arm = np.array([5.0, -8.0, 0.6])
+    constraints = [
+        Constraint(ARM, n, relative_pose(arm, pose), BELIEVED, "believed")
+        for n, pose in enumerate(true)
+    ]
+    constraints += [
+        Constraint(a, b, relative_pose(true[a], true[b]), PAIR, "pair") for a, b in near
+    ]
+    constraints += [Constraint(PLANE, n, true[n], DECODED_INFORMATION, "decoded") for n in (0, 7)]
+    start = true + rng.normal(0, [2, 2, 0.02], true.shape)
+    found = solve_pose_graph(
+        constraints, start, arm + 0.05 * np.array([40, -40, 1]), arm_fixed=False
+    )
+    assert found.poses == pytest.approx(true, abs=1e-5)
+    assert found.arm == pytest.approx(arm, abs=1e-4)
+    assert found.cost < 1e-6
+
+
+def test_wrong_pairs_are_switched_off():
+    rng = np.random.default_rng(2)
+    true, near = scene(rng, 16)
+    constraints = [
+        Constraint(ARM, n, noisy(rng, p, BELIEVED), BELIEVED, "believed")
+        for n, p in enumerate(true)
+    ]
+    wrong = set(range(3, len(near), 7))
+    for k, (a, b) in enumerate(near):
+        pose = noisy(rng, relative_pose(true[a], true[b]), PAIR)
+        pose[0] += 7.0 * (k in wrong)
+        constraints.append(Constraint(a, b, pose, PAIR, "pair"))
+    found = solve_pose_graph(
+        constraints, np.array([t.pose for t in constraints[:16]]), np.zeros(3), arm_fixed=True
+    )
+    assert set((np.flatnonzero(found.weights < OUTLIER_WEIGHT) - 16).tolist()) == wrong
+    shape = (found.poses - true)[:, :2]
+    assert np.hypot(*(shape - shape.mean(axis=0)).T).max() < 1.0
+
+
+def test_covariances_are_true():
+    rng = np.random.default_rng(3)
+    true, near = scene(rng)
+    inside = []
+    for _ in range(60):
+        constraints = [
+            Constraint(ARM, n, noisy(rng, p, BELIEVED), BELIEVED, "believed")
+            for n, p in enumerate(true)
+        ]
+        for a, b in near:
+            pose = noisy(rng, relative_pose(true[a], true[b]), PAIR)
+            constraints.append(Constraint(a, b, pose, PAIR, "pair"))
+        found = solve_pose_graph(constraints, true, np.zeros(3), arm_fixed=True)
+        spread = covariances(found.normal, range(len(true)))
+        dense = np.linalg.inv(found.normal.toarray())
+        assert spread[5] == pytest.approx(dense[15:18, 15:18], rel=1e-6, abs=1e-12)
+        away = found.poses - true
+        away[:, 2] = wrap_angle(away[:, 2])
+        inside.append(np.einsum("ni,nij,nj->n", away, np.linalg.inv(spread), away) < 7.815)
+    assert 0.9 < np.mean(inside) < 0.99
+
+
+def test_a_constraint_along_a_ridge_leaves_the_rest_to_belief():
+    across_only = np.diag([500.0, 0.0, 1e5])
+    constraints = [
+        Constraint(ARM, 0, np.zeros(3), DECODED_INFORMATION, "believed"),
+        Constraint(ARM, 1, np.array([5.0, 1.0, 0.0]), BELIEVED, "believed"),
+        Constraint(0, 1, np.array([4.0, 9.0, 0.01]), across_only, "pair"),
+    ]
+    found = solve_pose_graph(constraints, np.zeros((2, 3)), np.zeros(3), arm_fixed=True)
+    assert found.poses[1] == pytest.approx([4.0, 1.0, 0.01], abs=0.01)
+    spread = covariances(found.normal, [1])[0]
+    assert spread[1, 1] == pytest.approx(2.5, rel=0.01)
+    assert spread[0, 0] < 0.01
+
+
+# --- the canvas -----------------------------------------------------------------------------
+
+
+def test_a_removed_touch_leaves_nothing():
+    canvas = empty_canvas(P)
+    first = CanvasEntry(np.array([5.0, 40.0, 0.2]), SURE, 1.0)
+    second = CanvasEntry(np.array([-9.0, 33.0, -0.7]), SURE, 1.3)
+    one = add_to_canvas(canvas, patch(sampled()), first)
+    both = add_to_canvas(one, patch(sampled((1, 0))), second)
+    back = add_to_canvas(both, patch(sampled((1, 0))), second, -1)
+    assert not canvas.tiles
+    assert back.tiles.keys() == one.tiles.keys()
+    for key, tile in one.tiles.items():
+        assert back.tiles[key] == pytest.approx(tile, rel=1e-9, abs=1e-6)
+    assert not add_to_canvas(back, patch(sampled()), first, -1).tiles
+    assert image_of(canvas).values.shape == (0, 0)
+
+
+def test_the_image_is_the_weighted_mean():
+    canvas = empty_canvas(P)
+    for k, level in enumerate((1.0, 1.0, 1.3)):
+        how = CanvasEntry(np.zeros(3), SURE, 1.0)
+        canvas = add_to_canvas(canvas, patch(np.full((16, 16), level)), how)
+        image = image_of(canvas)
+        assert image.values.shape == (64, 64)
+        assert (image.count == k + 1).all()
+        assert image.corner_mm == pytest.approx((-31.5 * P / 4, 31.5 * P / 4))
+    # variances go with the level: weights 1, 1, 1 / 1.69
+    assert image.values == pytest.approx((1 + 1 + 1.3 / 1.69) / (2 + 1 / 1.69), abs=1e-6)
+
+
+def test_the_canvas_shows_a_touch_where_it_lies():
+    how = CanvasEntry(np.array([30.0, -20.0, 0.4]), SURE, 1.0)
+    canvas = add_to_canvas(empty_canvas(P), patch(sampled()), how)
+    shown = reference(canvas, 30.0, -20.0, 12.0)
+    at = transform_points(inverse(how.pose), points_mm(shown)[shown.known])
+    inside = (np.abs(at) < 9).all(axis=1)
+    assert inside.sum() > 1000
+    assert np.abs(shown.values[shown.known] - waves(at))[inside].max() < 0.15
+
+
+def test_a_doubtful_place_counts_little_at_edges_only():
+    step = patch(1 + (TACTELS[:, 0] > 0).reshape(16, 16).astype(float))
+    other = patch(np.full((16, 16), 5.0))
+    canvas = empty_canvas(P)
+    canvas = add_to_canvas(canvas, step, CanvasEntry(np.zeros(3), np.diag([1.0, 1.0, 1e-4]), 1.0))
+    values = image_of(add_to_canvas(canvas, other, CanvasEntry(np.zeros(3), SURE, 1.0))).values
+    assert values[32, 4] < 2.0  # as sure as the brighter touch is uncertain
+    assert values[32, 32] > 4.5
+
+
+# --- scans: without and with decoded places, blank, wrong, by steps ---------------------------
+
+SPREAD = (1.0 * P, 1.0 * P, 0.3 * DEG)
+DECODED = (0.03, 0.03, 0.1 * DEG)
+T_FACE_ARM = np.array([60.0, 35.0, 0.4])
+
+
+@lru_cache
+def scanned(n=4):
+    """Places on the face, and the signals there."""
+    rng, face = np.random.default_rng(8), symbols(8)
+    poses, signals = [], []
+    for k in range(n * n):
+        row, column = divmod(k, n)
+        pose = compose_poses(T_FACE_ARM, np.array([column, -row, 0.0]) * 4.25 * P)
+        poses.append(pose + rng.normal(0, SPREAD))
+        signals.append(newtons(felt(face, poses[-1], rng)))
+    return np.array(poses), tuple(signals)
+
+
+def touches(decoded=(), wrong=(), n=4):
+    """The arm believes the raster; some touches were decoded, some of them wrongly."""
+    true, signals = scanned(n)
+    rng = np.random.default_rng(5)
+    found = []
+    for k, signal in enumerate(signals):
+        row, column = divmod(k, n)
+        believed = planar_belief(np.array([column, -row, 0.0]) * 4.25 * P, SPREAD)
+        place = true[k] + rng.normal(0, DECODED) + np.array([21.0, 7.0, 0.0]) * (k in wrong)
+        read = planar_belief(place, DECODED) if k in decoded else None
+        found.append(PlacedTouch(signal, believed, read, seq=k))
+    return found
+
+
+def mosaic_of(some):
+    mosaic = no_touches(SENSOR)
+    for touch in some:
+        mosaic = add_touch(mosaic, touch)
+    return mosaic
+
+
+def errors(mosaic):
+    """Tactels."""
+    return np.hypot(*(mosaic.poses - scanned()[0])[:, :2].T) / P
+
+
+def test_by_images_alone_the_shape_is_right():
+    mosaic = mosaic_of(touches())
+    assert not mosaic.on_face
+    assert set(mosaic.reasons) == {""}
+    a, b = mosaic.poses[:, :2], scanned()[0][:, :2]
+    z, w = (p[:, 0] + 1j * p[:, 1] - complex(*p.mean(axis=0)) for p in (a, b))
+    turn = np.vdot(z, w)
+    assert np.sqrt(np.mean(np.abs(w - z * turn / abs(turn)) ** 2)) / P < 0.07
+    assert (np.linalg.eigvalsh(mosaic.covariances) > 0).all()
+    assert mosaic.image.count.max() >= 9
+
+
+def test_a_few_decoded_touches_place_all_on_the_face():
+    before = []
+    mosaic = no_touches(SENSOR)
+    for touch in touches(decoded=(6, 9)):
+        before.append((mosaic, mosaic.poses.copy(), len(mosaic.canvas.tiles)))
+        mosaic = add_touch(mosaic, touch)
+    for old, poses, tiles in before:  # a mosaic is a value
+        assert (old.poses == poses).all()
+        assert len(old.canvas.tiles) == tiles
+    assert mosaic.on_face
+    assert errors(mosaic).max() < 0.25
+    assert np.sqrt(np.mean(errors(mosaic) ** 2)) < 0.12
+    assert mosaic.arm[:2] == pytest.approx(T_FACE_ARM[:2], abs=2.0)
+    away = mosaic.poses - scanned()[0]
+    chi2 = np.einsum("ni,nij,nj->n", away, np.linalg.inv(mosaic.covariances), away)
+    assert (chi2 < 16.3).mean() > 0.9
+
+
+def test_where_all_are_decoded_they_stay():
+    assert np.sqrt(np.mean(errors(mosaic_of(touches(decoded=range(16)))) ** 2)) < 0.04
+
+
+@pytest.mark.parametrize("wrong", [0, 10])
+def test_a_wrongly_decoded_touch_is_overruled(wrong):
+    mosaic = mosaic_of(touches(decoded=(0, 3, 6, 9, 10, 13), wrong=(wrong,)))
+    assert errors(mosaic).max() < 0.3
+
+
+def test_steps_do_not_drift():
+    true, signals = scanned()
+    rng = np.random.default_rng(3)
+    spread = np.array([0.5 * P, 0.5 * P, 0.5 * DEG])
+    some = [PlacedTouch(signals[0], planar_belief(true[0], DECODED))]
+    counted = [true[0]]
+    for k in range(1, 16):
+        step = relative_pose(true[k - 1], true[k]) + rng.normal(0, spread)
+        counted.append(compose_poses(counted[-1], step))
+        some.append(PlacedTouch(signals[k], stepped=planar_belief(step, spread), seq=k))
+    mosaic = mosaic_of(some)
+    assert errors(mosaic).max() < 0.4
+    assert errors(mosaic).max() < np.hypot(*(np.array(counted) - true)[:, :2].T).max() / P / 3
+
+
+def test_blank_touches_stay_where_they_are_believed():
+    rng = np.random.default_rng(1)
+    flat = [newtons(0.3 + rng.normal(0, 0.01, (16, 16))) for _ in range(3)]
+    places = [planar_belief((k * 4.25 * P, 0.0, 0.0), SPREAD) for k in range(3)]
+    mosaic = mosaic_of(PlacedTouch(f, p) for f, p in zip(flat, places, strict=True))
+    assert mosaic.reasons == (CONSTANT,) * 3
+    assert mosaic.poses == pytest.approx(np.array([p.pose for p in places]), abs=1e-6)
+    assert mosaic.covariances[1] == pytest.approx(np.diag(np.square(SPREAD)), rel=1e-6)
+    assert mosaic.image.count.max() == 3
+
+
+def test_a_surface_that_repeats_is_ambiguous():
+    face = endless_face(np.zeros((9, 9), int), GLYPHS, pitch_mm=7.0, unit_mm=0.26 * 7)
+    wide = (2.5 * P, 2.5 * P, 0.3 * DEG)
+    some = []
+    for k in range(2):
+        forces = tabs(face, SENSOR, Touch(30 + 6.0 * k, 40, 0.2, 80.0)).forces_n
+        pose = planar_belief((6.0 * k * math.cos(0.2), -6.0 * k * math.sin(0.2), 0.0), wide)
+        some.append(PlacedTouch(newtons(forces), pose, seq=k))
+    mosaic = mosaic_of(some)
+    assert mosaic.reasons == (ALONE, AMBIGUOUS)
+    assert mosaic.poses[1] == pytest.approx(some[1].believed.pose, abs=1e-6)
+
+
+def test_touches_that_cannot_be_placed():
+    nothing = no_touches(SENSOR)
+    assert nothing.image.values.shape == (0, 0)
+    with pytest.raises(MosaicError, match="8 x 8"):
+        add_touch(
+            nothing, PlacedTouch(signal_of(np.ones((8, 8))), planar_belief(np.zeros(3), SPREAD))
+        )
+    first, second = touches(decoded=(1,))[:2]
+    decoded_only = PlacedTouch(second.signal, decoded=second.decoded)
+    on_face, by_arm = add_touch(nothing, decoded_only), add_touch(nothing, first)
+    with pytest.raises(MosaicError, match="without a frame"):
+        add_touch(on_face, first)
+    with pytest.raises(MosaicError, match="no pose by the arm"):
+        add_touch(by_arm, decoded_only)
