@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Ring, Tiers
-from generator.plane.polygon import points_inside
-from generator.plane.rings import distance
+from generator.plane.polygon import distance, points_inside
 from generator.printed.surface import PrintedSurface
 from generator.solid.part import Embossing, turn
 

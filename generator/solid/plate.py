@@ -20,8 +20,7 @@ from manifold3d import CrossSection, FillRule
 from numpy.typing import NDArray
 
 from generator.errors import SolidError
-from generator.plane.polygon import points_inside, signed_area
-from generator.plane.rings import distance, edges_cross, keeps_edges
+from generator.plane.polygon import distance, edges_cross, keeps_edges, points_inside, signed_area
 from generator.polyhedron.frame import dihedral, face_frame, face_polygon
 from generator.polyhedron.winged import Polyhedron
 from generator.printers import Printer

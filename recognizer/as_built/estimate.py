@@ -20,7 +20,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection
 
 from generator.database.as_built import AsBuilt, read_as_built, write_as_built
 from generator.database.open import existing_database, open_database
@@ -67,14 +66,7 @@ def estimate_print(
     printer: str = "",
     material: str = "",
 ) -> AsBuilt:
-    """Return how a part was printed.
-
-    Parameters
-    ----------
-    measured
-        Touches of it.
-    object_id, printer, material
-        Keys of the result in the database.
+    """Return how a part was printed, under these keys of the database.
 
     Raises
     ------
@@ -132,13 +124,9 @@ def estimate_print(
 
 
 def estimate_printer(parts: Sequence[AsBuilt]) -> AsBuilt:
-    """Return the expected print of an untouched part, by parts of its printer.
+    """Return the expected print of an untouched part, by one or more parts of its printer.
 
-    Parameters
-    ----------
-    parts
-        One or more of one printer and material. Their spread is measured, and no
-        less than `BETWEEN`.
+    Their spread is measured, and no less than `BETWEEN`.
     """
     values = np.array([[one.scale_x, one.scale_y, one.skew_rad, one.stroke_mm] for one in parts])
     mean, count = values.mean(axis=0), len(parts)
@@ -163,14 +151,7 @@ def estimate_printer(parts: Sequence[AsBuilt]) -> AsBuilt:
 def estimate_parts(
     measured: Sequence[MeasuredPrint], database: str, material: str
 ) -> tuple[list[tuple[AsBuilt, PrintVerdict]], list[str]]:
-    """Return every part with enough touches and its verdict, and messages on the others.
-
-    Parameters
-    ----------
-    measured
-        Touches of one object.
-    database, material
-        Where it is registered, and its material.
+    """Return every part of an object with enough touches and its verdict, messages on the others.
 
     Raises
     ------
@@ -205,22 +186,19 @@ def keep_prints(database: str | Path, prints: Sequence[AsBuilt]) -> AsBuilt:
     DatabaseError
         The database cannot be written.
     """
+    of = prints[0].printer, prints[0].material
     with write_transaction(existing_database(str(database))) as connection:
         for one in prints:
             write_as_built(connection, one)
-        printer = estimate_printer(_parts_like(connection, prints[0]))
+        stored = [
+            one
+            for entry in list_objects(connection)
+            for one in read_as_built(connection, entry.object_id)
+            if one.part is not None and (one.printer, one.material) == of
+        ]
+        printer = estimate_printer(stored)
         write_as_built(connection, printer)
     return printer
-
-
-def _parts_like(connection: Connection, one: AsBuilt) -> list[AsBuilt]:
-    """Return all stored parts of the printer and material of one of them."""
-    return [
-        other
-        for entry in list_objects(connection)
-        for other in read_as_built(connection, entry.object_id)
-        if other.part is not None and (other.printer, other.material) == (one.printer, one.material)
-    ]
 
 
 def _design(axes: Array) -> Array:
@@ -238,12 +216,9 @@ def _refuse_unseen(design: Array, part: str) -> None:
     values, axes = np.linalg.eigh((design.swapaxes(1, 2) @ design).sum(axis=0)[:3, :3])
     if values[0] > UNSEEN * values[-1]:
         return
-    names = ("x", "y", "skew")
-    unseen = [
-        name
-        for name, row in zip(names, axes, strict=True)
-        if np.abs(row[values <= UNSEEN * values[-1]]).max() > 0.5
-    ]
+    names = "x", "y", "skew"
+    hidden = values <= UNSEEN * values[-1]
+    unseen = [name for name, row in zip(names, axes, strict=True) if abs(row[hidden]).max() > 0.5]
     raise AsBuiltError(
         f"the faces that were touched do not tell {' and '.join(unseen)}",
         fix="touch also its top, or a wall that runs the other way",

@@ -21,8 +21,6 @@ from recognizer.touch.source import TouchImage
 from recognizer.touch.symbols.stretch import fit_stretch
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 
 #: Options of a reader that accepts prints farther off than usual.
 WIDE_SCALE = ReaderOptions(scale_sd=0.04, scale_most=0.12)
@@ -35,14 +33,9 @@ def measure_prints(
     calibration: Calibration | None = None,
     place: str = "",
 ) -> tuple[MeasuredPrint, ...]:
-    """Return the print under every touch that is recognised.
+    """Return the print under every touch that is recognised by a reader with `WIDE_SCALE`.
 
-    Parameters
-    ----------
-    reader
-        With the options `WIDE_SCALE`, which read prints far off, too.
-    place
-        Of the touches, for messages.
+    `place` is that of the touches, for messages.
 
     Raises
     ------

@@ -31,10 +31,7 @@ class PrintVerdict:
 def judge_print(found: AsBuilt, stroke_mm: float) -> PrintVerdict:
     """Return the verdict on a print; deviations within one standard deviation do not count.
 
-    Parameters
-    ----------
-    stroke_mm
-        As designed.
+    `stroke_mm` is as designed.
 
     Examples
     --------
@@ -48,7 +45,7 @@ def judge_print(found: AsBuilt, stroke_mm: float) -> PrintVerdict:
     """
     x, y = found.scale_x - 1, found.scale_y - 1
     unsure = np.sqrt(np.diag(found.covariance))
-    findings, causes = [], []
+    findings, causes, strokes = [], [], ""
     if max(abs(x) - unsure[0], abs(y) - unsure[1]) > ALIKE:
         if abs(x - y) <= TOGETHER:
             both = (x + y) / 2
@@ -63,24 +60,21 @@ def judge_print(found: AsBuilt, stroke_mm: float) -> PrintVerdict:
         findings.append(f"{abs(math.degrees(found.skew_rad)):.1f} degrees askew")
         causes.append("a frame out of square?")
     wider = found.stroke_mm - stroke_mm
-    strokes = ""
     if abs(wider) - unsure[3] > STROKE_MM:
         which = "wide" if wider > 0 else "narrow"
         strokes = f"strokes {abs(wider):.1f} mm too {which}: flow, first layer?"
-    far = max(abs(x), abs(y)) > MOST_SCALE or abs(found.skew_rad) > MOST_SKEW_RAD
-    if not findings:
-        return PrintVerdict(AS_DESIGNED, "; ".join(filter(None, ("as designed", strokes))))
-    deviations = ", ".join(findings)
-    if far:
-        words = f"print again, {deviations}: {' '.join(causes)}"
-        return PrintVerdict(PRINT_AGAIN, "; ".join(filter(None, (words, strokes))))
-    words = f"{deviations}, within what the reader corrects"
-    return PrintVerdict(CORRECTED, "; ".join(filter(None, (words, strokes))))
+    kind, words = AS_DESIGNED, "as designed"
+    if findings:
+        kind, words = CORRECTED, f"{', '.join(findings)}, within what the reader corrects"
+        if max(abs(x), abs(y)) > MOST_SCALE or abs(found.skew_rad) > MOST_SKEW_RAD:
+            kind, words = PRINT_AGAIN, f"print again, {', '.join(findings)}: {' '.join(causes)}"
+    return PrintVerdict(kind, "; ".join(filter(None, (words, strokes))))
 
 
 def as_built_numbers(found: AsBuilt) -> dict[str, Any]:
     """Return the numbers of a print for JSON."""
-    spread = [math.sqrt(float(found.covariance[k, k])) for k in range(4)]
+    names = ("scale_x", "scale_y", "skew_deg", "stroke_mm")
+    spread = np.sqrt(np.diag(found.covariance)).tolist()
     return {
         "printer": found.printer,
         "material": found.material,
@@ -89,12 +83,11 @@ def as_built_numbers(found: AsBuilt) -> dict[str, Any]:
         "scale_y": found.scale_y,
         "skew_deg": math.degrees(found.skew_rad),
         "stroke_mm": found.stroke_mm,
-        "deviation": {
-            "scale_x": spread[0], "scale_y": spread[1], "skew_deg": math.degrees(spread[2]),
-            "stroke_mm": spread[3],
-        },
+        "deviation": dict(
+            zip(names, (*spread[:2], math.degrees(spread[2]), spread[3]), strict=True)
+        ),
         "covariance": found.covariance,
-    }  # fmt: skip
+    }
 
 
 def as_built_entry(found: AsBuilt, verdict: PrintVerdict) -> dict[str, Any]:

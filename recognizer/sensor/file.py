@@ -55,12 +55,7 @@ def write_state(state: SensorState, path: str | os.PathLike[str]) -> None:
 
 
 def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -> SensorState:
-    """Read a state.
-
-    Parameters
-    ----------
-    sensors
-        Names of the sensor that it shall serve, its own and its type's; not compared if none.
+    """Read a state; `sensors` are names that it may have: the sensor's and its type's; none: any.
 
     Raises
     ------

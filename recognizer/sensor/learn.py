@@ -34,7 +34,6 @@ from recognizer.touch.symbols.linearize import linearize_image
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Ints = NDArray[np.int64]
 
 # Chosen on the levels `dead-20`, `places-08` and `typical` of the own engine, seed 41
 LEAST_TOUCHES = 16  #: with which tactels can be compared
@@ -59,12 +58,9 @@ class Answering:
     offset: Array  #: reading without pressure, over the background; 0 where it is usual
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TactelEvidence:
-    """Normal equations of the unknowns (n, 3) of n tactels: log gain, x and y (mm)."""
-
-    normal: Array  #: (3 n, 3 n) inverse covariance
-    right: Array  #: (3 n,) slope of the log-likelihood by them
+#: Normal equations of the unknowns (n, 3) of n tactels, log gain, x and y (mm): inverse covariance
+#: (3 n, 3 n), and slope of the log-likelihood by them (3 n,).
+TactelEvidence = tuple[Array, Array]
 
 
 def learn_sensor(
@@ -73,23 +69,18 @@ def learn_sensor(
     *,
     calibration: Calibration | None = None,
     name: str = "",
-    rounds: int = ROUNDS,
     done: Callable[[float], None] | None = None,
 ) -> SensorState:
     """Return the state of a sensor by its touches and the reader's earlier state.
 
     Parameters
     ----------
-    reader
-        Its state is the earlier one.
     images
         (rows, columns) readings of each touch: 25 to 100 of different places of registered faces.
-    calibration
-        Of the sensor, if it has one.
     name
         Of the sensor; the type's if it is not known.
     done
-        Is evidence the share of the work that is done, 0 ... 1.
+        Gets the share of the work that is done, 0 ... 1.
     """
     newtons = calibration is not None
     known = reader.state or unknown_state(reader.sensor, newtons=newtons, name=name)
@@ -97,7 +88,7 @@ def learn_sensor(
     floating = not newtons and (known.floating or _floats(reader, readings))
     inverted = [invert_floating(one) for one in readings] if floating else readings
     before = state = replace(known, floating=False)
-    for turn in range(rounds):
+    for turn in range(ROUNDS):
         if len(inverted) >= LEAST_TOUCHES:
             found = answering_of(_forces(reader, state, inverted, calibration))
             state = replace(state, dead=found.dead, hot=found.hot, offset=found.offset)
@@ -110,7 +101,7 @@ def learn_sensor(
             if answer and verified is not None and (answer.margin or 0.0) > MARGIN:
                 evidence.append(evidence_of(verified))
             if done is not None:
-                done((turn + (number + 1) / len(inverted)) / rounds)
+                done((turn + (number + 1) / len(inverted)) / ROUNDS)
         state = refine_tactels(state, evidence, before)
     return replace(
         state, floating=floating, touches=known.touches + len(images), drift=_drift(readings)
@@ -120,10 +111,7 @@ def learn_sensor(
 def answering_of(forces: Array) -> Answering:
     """Return which tactels answer; all of them, if the touches are few.
 
-    Parameters
-    ----------
-    forces
-        (n, rows, columns) readings over the background, of n touches of different places.
+    Forces (n, rows, columns) are readings over the background, of n touches of different places.
     """
     shape = forces.shape[1:]
     none = np.zeros(shape)
@@ -162,7 +150,7 @@ def evidence_of(verified: VerifiedHypothesis) -> TactelEvidence:
     solved = np.linalg.solve(inner, cross.T)
     right = (by_tactel * (sure * left)[:, None]).ravel()
     right -= solved.T @ (weighed.T @ left - at.known[0] * at.precision)
-    return TactelEvidence(normal.reshape(3 * count, -1) - cross @ solved, right)
+    return normal.reshape(3 * count, -1) - cross @ solved, right
 
 
 def refine_tactels(
@@ -170,22 +158,15 @@ def refine_tactels(
 ) -> SensorState:
     """Return a state with gains and tip places by the evidence of touches.
 
-    Parameters
-    ----------
-    state
-        That the touches were read with.
-    found
-        Of each of them.
-    before
-        The state before these touches.
+    They were read with `state`; `before` is the state before these touches.
     """
     if not found:
         return state
     unknowns = _unknowns(state)
     known, deviation = _unknowns(before), _deviations(before)
     precision = 1.0 / deviation**2
-    normal = sum(one.normal for one in found) + np.diag(precision)
-    right = sum(one.right for one in found) + precision * (known - unknowns)
+    normal = sum(one for one, _ in found) + np.diag(precision)
+    right = sum(one for _, one in found) + precision * (known - unknowns)
     covariance = np.linalg.inv(normal)
     values = (unknowns + covariance @ right).reshape(-1, 3)
     left = np.sqrt(np.diagonal(covariance)).reshape(-1, 3)

@@ -51,13 +51,9 @@ HINTS = {
     "floating": "rows seem to float while another is read: `--learn FILE` inverts the network",
 }
 
-#: The eight ways in which a square image can lie, each undone; a matrix that is none has four.
-WAYS = (
-    (), ("quarter", "quarter"), ("columns",), ("rows",),
-    ("quarter",), ("quarter", "quarter", "quarter"), ("transpose",),
-    ("transpose", "quarter", "quarter"),
-)  # fmt: skip
-WORDS = {
+#: The eight ways in which a square image can lie, each undone, and their words; a matrix that is
+#: not square has the first four.
+WORDS: dict[tuple[str, ...], str] = {
     (): "as drawn",
     ("quarter", "quarter"): "half a turn off",
     ("columns",): "with its columns reversed",
@@ -67,6 +63,7 @@ WORDS = {
     ("transpose",): "transposed",
     ("transpose", "quarter", "quarter"): "transposed across the other diagonal",
 }
+WAYS = tuple(WORDS)
 
 TRIED = 6  #: refused touches that are read under each change
 FACING_DEG = 40.0  #: largest error of a direction that a person places by hand
@@ -104,13 +101,7 @@ class Wiring:
         return np.ascontiguousarray(found)
 
     def check(self, shape: tuple[int, int]) -> None:
-        """Refuse changes under which an image (rows, columns) would have another shape.
-
-        Raises
-        ------
-        WiringError
-            They would.
-        """
+        """Raise `WiringError` if an image (rows, columns) would have another shape."""
         self.apply(np.zeros(shape), 0)
 
     def frame(self, frame: Frame, full: int) -> Frame:
@@ -139,13 +130,7 @@ class FoundMounting:
 
 
 def wiring_named(text: str) -> Wiring:
-    """Return the wiring of an option such as `columns,values`.
-
-    Raises
-    ------
-    WiringError
-        An unknown name.
-    """
+    """Return the wiring of an option such as `columns,values`; `WiringError` for unknown names."""
     names = tuple(filter(None, (part.strip() for part in text.split(","))))
     for name in names:
         if name not in CHANGES:
@@ -161,13 +146,7 @@ def wiring_hint(
     *,
     calibration: Calibration | None = None,
 ) -> str:
-    """Return a message on the likely wiring; empty where refused touches do not show it.
-
-    Parameters
-    ----------
-    refused
-        Touches that were not recognised; a few are tried.
-    """
+    """Return a message on the likely wiring; empty where refused touches do not show it."""
     images = [
         np.asarray(one.counts if isinstance(one, TouchImage) else one, np.float64)
         for one in refused[:TRIED]
@@ -200,10 +179,15 @@ def simplify_turns(wiring: Wiring, shape: tuple[int, int]) -> Wiring:
     """
     image = np.arange(shape[0] * shape[1]).reshape(shape)
     wanted = wiring.apply(image, 0)
-    for way in WAYS if shape[0] == shape[1] else WAYS[:4]:
+    for way in _ways(shape):
         if np.array_equal(Wiring(way).apply(image, 0), wanted):
             return Wiring(way)
     return wiring
+
+
+def _ways(shape: tuple[int, ...]) -> tuple[tuple[str, ...], ...]:
+    """Return the ways in which an image of so many rows and columns can lie."""
+    return WAYS if shape[0] == shape[1] else WAYS[:4]
 
 
 def find_mounting(
@@ -211,32 +195,24 @@ def find_mounting(
     image: ArrayLike,
     face: tuple[str, str],
     *,
-    theta_deg: float = 0.0,
     calibration: Calibration | None = None,
 ) -> FoundMounting | Recognition:
     """Return the mounting of a sensor; the plain answer, where none of the ways fits.
 
-    Parameters
-    ----------
-    image
-        (rows, columns) readings of a touch placed by hand, within 40 degrees.
-    face
-        Object and face that was touched.
-    theta_deg
-        Direction of the sensor's x axis on the face that was asked for.
+    The image (rows, columns) is a touch of `face` (object and face), placed by hand with the
+    sensor's x axis along that of the face, within `FACING_DEG`.
     """
     readings = np.asarray(image, np.float64)
-    square = readings.shape[0] == readings.shape[1]
     plain = reader.read(readings, calibration=calibration)
     found: list[FoundMounting] = []
-    for changes in WAYS if square else WAYS[:4]:
+    for changes in _ways(readings.shape):
         wiring = Wiring(changes)
         answer = plain
         if changes:
             turned = wiring.apply(readings, reader.sensor.full)
             answer = reader.read(turned, calibration=calibration)
         if (answer.object, answer.face) == face:
-            turn = math.remainder(answer.theta_deg - theta_deg, 360.0)
+            turn = math.remainder(answer.theta_deg, 360.0)
             found.append(FoundMounting(wiring, answer, turn))
     near = [one for one in found if abs(one.turn_deg) < FACING_DEG]
     return min(near, key=lambda one: abs(one.turn_deg)) if near else plain

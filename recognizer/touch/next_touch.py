@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# Which steps are weighed, and what they are worth (`tests/campaigns/next_touch.py`). Lengths,
+# Which steps are weighed, and what they are worth. Lengths,
 # forces and counts are those of `fsr-16`; `next_limits` makes those of another type.
 LENGTHS_MM = (4.0, 7.0, 10.0, 14.0)  #: of steps
 DIRECTIONS = 16  #: of steps

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -51,9 +51,6 @@ RIGHT, WRONG, REJECTED = "right", "wrong", "rejected"
 ONE, NEXT = POLICY_NAMES = ("one", "next")
 
 Row = dict[str, Any]
-
-#: Says where to touch after an answer that is none; `rng` is the trial's.
-Proposal = Callable[[Recognition, np.random.Generator], NextTouch | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,11 +123,7 @@ class PolicyTouch:
 
 
 def touch_until_answered(
-    plan: TouchPlan,
-    number: int,
-    reader: Reader,
-    most: int,
-    proposal: Proposal = lambda answer, _: answer.next,
+    plan: TouchPlan, number: int, reader: Reader, most: int
 ) -> Iterator[PolicyTouch]:
     """Yield the touches of a trial, the last one answered unless `most` were made."""
     rng = np.random.default_rng([plan.seed, number, STREAM])
@@ -141,8 +134,8 @@ def touch_until_answered(
         answer = scan.add(found.counts.astype(np.float64), pose, seq=number)
         made += 1
         yield PolicyTouch(found, answer, time.process_time() - start)
-        step = None if answer else proposal(answer, rng)
-        if step is None or made == most:
+        step = answer.next
+        if answer or step is None or made == most:
             return
         pose = pose @ surface_to_sensor(step.dx_mm, step.dy_mm, math.radians(step.turn_deg))
         found = _touch_at(plan, found, step, reader, rng)

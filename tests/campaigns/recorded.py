@@ -10,15 +10,15 @@ HDF5.
 
 from __future__ import annotations
 
-import argparse
+import os
 import shutil
-import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import runner
 from rosbags.highlevel import AnyReader
 
 from encoded_objects.base.sensor_type_file import shipped_names
@@ -28,11 +28,6 @@ from probe.recording.record import Recorder
 
 SPEC = "name: Cube\nshape: {cube: 60 mm}\noutput: {lab_key: 0123-4567-89AB-CDER}\n"
 TOUCHES, FRAMES = 8, 250
-
-
-def run(*words: str, folder: Path) -> None:
-    """Run a command quietly."""
-    subprocess.run(words, cwd=folder, check=True, capture_output=True)
 
 
 def timed(what: Callable[[], Any]) -> tuple[Any, float]:
@@ -70,55 +65,41 @@ def rewrite(recording: Recording, path: Path) -> None:
             recorder.append(frame)
 
 
-def row(name: str, path: Path) -> str:
+def line_of(name: str) -> tuple[object, ...]:
     """Export and import one recording; return its line of the table."""
-    recording, mcap = Recording(path), path.with_suffix(".mcap")
+    path = Path(f"{name}.h5")
+    recording, mcap, again = Recording(path), Path(f"{name}.mcap"), Path(f"{name}-again.mcap")
     frames, out_s = timed(lambda: export_mcap(recording, mcap))
-    back, in_s = timed(lambda: import_mcap(mcap, path.with_name(f"{name}-back.h5")))
-    _, hdf_s = timed(lambda: rewrite(recording, path.with_name(f"{name}-again.h5")))
-    again = path.with_name(f"{name}-again.mcap")
+    back, in_s = timed(lambda: import_mcap(mcap, Path(f"{name}-back.h5")))
+    _, hdf_s = timed(lambda: rewrite(recording, Path(f"{name}-again.h5")))
     export_mcap(back, again)
     with AnyReader([mcap]) as reader:
         seen = sum(c.topic == "/touch/image" for c, _, _ in reader.messages())
     identical = same(recording, back) and mcap.read_bytes() == again.read_bytes()
-    sizes = [one.stat().st_size / 1e3 for one in (path, mcap)]
-    per = 1e3 / frames
-    return (
-        f"| {name} | {frames} | {'yes' if identical and seen == frames else 'NO'} | "
-        f"{sizes[0]:.0f} | {sizes[1]:.0f} | {hdf_s * per:.3f} | {out_s * per:.3f} | "
-        f"{in_s * per:.3f} |"
-    )
+    sizes = (f"{one.stat().st_size / 1e3:.0f}" for one in (path, mcap))
+    times = (1e3 * seconds / frames for seconds in (hdf_s, out_s, in_s))
+    return (name, frames, "yes" if identical and seen == frames else "NO", *sizes, *times)
 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    folder = parser.parse_args().output
+    folder = runner.parse(runner.arguments(__doc__, output=True)).output
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    (folder / "cube.yaml").write_text(SPEC)
-    run("encode-object", "cube.yaml", "--database", "lab.db", "--format", "stl", folder=folder)
-    print("| recording | frames | the same | HDF5 kB | MCAP kB | write HDF5 s / 1,000 | export "
-          "| import |\n| --- | --- | --- | --- | --- | --- | --- | --- |")  # fmt: skip
-    words = ("probe-sensor", "simulate", "lab.db#Cube/F1", "--seed", "1", "-o")
-    many = ("--touches", str(TOUCHES), "--frames", str(FRAMES), "--sensor-type")
-    for name in shipped_names():
-        gel = ("--force", "15", "--x", "30", "--y", "30") if "gel" in name else ()
-        run(*words, f"{name}.h5", *many, name, *gel, folder=folder)
-        print(row(name, folder / f"{name}.h5"), flush=True)
-    run(
-        *words,
-        "scan.h5",
-        "--scan",
-        "kinesthetic",
-        "--touches",
-        "12",
-        "--frames",
-        "40",
-        folder=folder,
-    )
-    print(row("scan", folder / "scan.h5"))
+    os.chdir(folder)
+    Path("cube.yaml").write_text(SPEC)
+    runner.run("generator", "cube.yaml", "--database", "lab.db", "--format", "stl")
+    runner.table(("recording", "frames", "the same", "HDF5 kB", "MCAP kB", "write HDF5 s / 1,000",
+                  "export", "import"))  # fmt: skip
+    shots: dict[str, tuple[object, ...]] = {
+        name: ("--touches", TOUCHES, "--frames", FRAMES, "--sensor-type", name,
+               *(("--force", 15, "--x", 30, "--y", 30) if "gel" in name else ()))
+        for name in shipped_names()
+    }  # fmt: skip
+    shots["scan"] = ("--scan", "kinesthetic", "--touches", 12, "--frames", 40)
+    for name, words in shots.items():
+        runner.run("probe", "simulate", "lab.db#Cube/F1", "--seed", 1, "-o", f"{name}.h5", *words)
+        runner.row(*line_of(name))
 
 
 if __name__ == "__main__":

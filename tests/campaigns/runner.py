@@ -35,18 +35,10 @@ def arguments(
     doc: str | None, *names: str, output: bool = False, seed: int | None = None,
     touches: int | None = None, jobs: int | None = None,
 ) -> argparse.ArgumentParser:  # fmt: skip
-    """Return a parser that knows the usual options.
+    """Return a parser that knows positional `names` and the usual options.
 
-    Parameters
-    ----------
-    doc
-        Of the script; its first line is the help.
-    names
-        Positional arguments, such as "database".
-    output
-        Whether the script needs a folder or file, `-o`.
-    seed, touches, jobs
-        Defaults of `--seed`, `--touches`, `-j`; None: no such option.
+    `doc` is that of the script; `output`: it needs a folder or file, `-o`. Of `--seed`, `--touches`
+    and `-j` the defaults are given; None: no such option.
     """
     parser = argparse.ArgumentParser(description=(doc or "").splitlines()[0])
     for name in names:
@@ -120,13 +112,7 @@ def command(package: str, *words: object) -> list[str]:
 
 
 def run(package: str, *words: object) -> None:
-    """Run a command of a package; its results are not shown.
-
-    Raises
-    ------
-    SystemExit
-        With its exit code, if it fails. An interrupt reaches it, too, and is passed on.
-    """
+    """Run a command of a package, results not shown; ends the script with its code if it fails."""
     with subprocess.Popen(command(package, *words), stdout=subprocess.DEVNULL) as process:
         try:
             code = process.wait()
@@ -146,15 +132,8 @@ def rows_of(folder: Path, what: str = "shards") -> list[Row]:
 
 
 def outcome(trials: Iterable[Any]) -> Row:
-    """Return what became of touches.
+    """Return what became of touches: rows of `trials.parquet`, or `recognizer.validation` trials.
 
-    Parameters
-    ----------
-    trials
-        Rows of `trials.parquet`, or values of `recognizer.validation.trial.Trial`.
-
-    Returns
-    -------
     `touches`, `right`, `wrong`, `rejected`; of the right ones root mean squares `rms_mm` and
     `rms_deg`, `worst_mm`, and the share `inside` the 95 % ellipsoid of the covariance (nan of
     none); `reasons` of the rejected ones.

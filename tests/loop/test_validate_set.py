@@ -112,6 +112,17 @@ def test_what_it_prints_and_leaves(reference):
     assert not re.search(r"url\((?!#)|@import", page)
 
 
+def test_the_page_fits_asks_for_nothing_and_prints(reference, browser):
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    asked = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto((reference[0] / "report.html").as_uri())
+    assert page.evaluate("document.documentElement.scrollWidth") <= 1280
+    assert [url.rpartition("/")[2] for url in asked] == ["report.html"]
+    assert page.pdf().count(b"/Type /Page\n") >= 2
+    page.close()
+
+
 def test_two_processes_interrupted_killed_and_resumed(spec, reference, tmp_path):
     folder = tmp_path / "run"
     work = asked(spec, folder)

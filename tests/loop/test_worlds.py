@@ -1,6 +1,6 @@
 """A small campaign over kinds that need objects of their own, by faulty sensors."""
 
-from recognizer.validation import validate
+from recognizer.validation import encoded_set, validate
 from recognizer.validation.campaign import Campaign, series_of
 from recognizer.validation.encoded_set import is_extra
 from recognizer.validation.files import columns_of, read_series
@@ -12,7 +12,9 @@ SET = """objects:
 """
 
 
-def test_a_campaign_over_worlds(tmp_path):
+def test_a_campaign_over_worlds(tmp_path, monkeypatch):
+    for name, few in (("COPIES", 2), ("SMALL_PITCHES", (3.3,)), ("LAB_OBJECTS", 2)):
+        monkeypatch.setattr(encoded_set, name, few)  # each takes time to make
     (tmp_path / "set.yaml").write_text(SET)
     folder = tmp_path / "run"
     result = validate(

@@ -18,8 +18,7 @@ from generator.alphabet import (
 )
 from generator.errors import AlphabetError, SolidError
 from generator.layout.placement import FaceLayout, Layout, Placement
-from generator.plane.polygon import points_inside, signed_area
-from generator.plane.rings import boxes_inside, distance, edges_cross
+from generator.plane.polygon import boxes_inside, distance, edges_cross, points_inside, signed_area
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.shapes import prism, pyramid
 from generator.printers import PRINTERS

@@ -15,7 +15,7 @@ from generator.layout.placement import Layout
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
-from generator.plane.rings import distance
+from generator.plane.polygon import distance
 from generator.polyhedron.shapes import dodecahedron
 from generator.polyhedron.winged import polyhedron
 from generator.printers import PRINTERS

@@ -7,8 +7,7 @@ import pytest
 
 from generator.errors import SolidError
 from generator.layout.placement import Layout
-from generator.plane.polygon import points_inside, signed_area, triangle_areas
-from generator.plane.rings import edges_cross
+from generator.plane.polygon import edges_cross, points_inside, signed_area, triangle_areas
 from generator.polyhedron.shapes import box as solid_box
 from generator.polyhedron.shapes import cube, pyramid
 from generator.polyhedron.winged import polyhedron

@@ -10,7 +10,7 @@ from reference.expanded_solid import assert_expanded
 from generator.alphabet import SymbolStyle, alphabet_named, footprint_half_mm, outlines
 from generator.errors import SolidError
 from generator.layout.placement import FaceLayout, Layout, Placement
-from generator.plane.rings import boxes_inside
+from generator.plane.polygon import boxes_inside
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.frame import volume as body_volume
 from generator.polyhedron.shapes import cube, tetrahedron

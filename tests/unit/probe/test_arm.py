@@ -58,14 +58,6 @@ def test_the_link_table_gives_the_corrected_matrix():
         assert forward(ARM, q) == pytest.approx(np.array(matrix_of_the_thesis(q)), abs=1e-11)
 
 
-def test_the_stretched_arm():
-    frames = joint_frames(ARM, np.zeros(5))
-    assert frames[1, :3, 3].tolist() == [0, 0, 260.4]
-    assert frames[3, :3, 3] == pytest.approx([457.2, 0, 260.4])
-    assert frames[5, :3, 3] == pytest.approx([466.7, 0, 185.4])
-    assert frames[5, :3, 2] == pytest.approx([0, 0, -1])  # it points down
-
-
 def test_four_branches_reach_one_pose():
     q = np.array([0.4, -0.9, 1.3, 0.2, -0.5])
     pose = forward(ARM, q)
@@ -77,14 +69,6 @@ def test_four_branches_reach_one_pose():
     elbows = [branch[2] for branch in branches[:2]]
     assert elbows == [-elbows[1], -elbows[0]]
     assert elbows[0] > 0
-
-
-def test_all_four_branches_where_the_arm_may_reach_backwards():
-    branches = inverse(ARM, at(100, 50, 250))
-    assert len(branches) == 4
-    assert len({tuple(branch.round(6)) for branch in branches}) == 4
-    for branch in branches:
-        assert forward(ARM, branch) == pytest.approx(at(100, 50, 250), abs=1e-10)
 
 
 def test_joint_ranges_choose_among_the_branches():

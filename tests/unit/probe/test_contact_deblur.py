@@ -38,11 +38,6 @@ def test_the_blur_is_that_of_the_layer(height):
     assert blurred(sensor, force).sum() == pytest.approx(1, rel=1e-9)
 
 
-@pytest.mark.parametrize(("height", "passed"), [(1.0, 0.61), (2.0, 0.185), (4.0, 0.0065)])
-def test_what_arrives_of_the_shortest_wave(height, passed):
-    assert transmitted_share(pad(height)) == pytest.approx(passed, rel=5e-3)
-
-
 @pytest.mark.parametrize("height", [4.0, 20.0])
 def test_pads_of_4_mm_and_more_are_refused(height):
     with pytest.raises(ContactError, match="passes") as caught:

@@ -103,26 +103,6 @@ def test_moments_balance_the_wrist(press):
     assert abs(found.tilt_x_rad * 3000 - (found.forces_n * y).sum()) < 0.05 * 40 * 6
 
 
-def test_longer_tabs_bear_more(press):
-    plate = mesh(block((-30, -30, -5), (30, 30, 0)))
-    lengths = np.zeros((16, 16))
-    lengths[2, 5] = 0.05
-    found = press(plate, SENSOR, Touch(0, 0, 0, 60.0, wrist=RIGID), Tips(7, lengths_mm=lengths))
-    usual = np.median(found.forces_n)
-    assert compression_mm(found.forces_n[2, 5]) - compression_mm(usual) == pytest.approx(
-        0.05, abs=0.004
-    )
-    assert (np.delete(found.forces_n.ravel(), 2 * 16 + 5) < 1.02 * usual).all()
-
-
-def test_both_engines_feel_the_same_symbol():
-    surface = mesh(plate_with_bars())
-    touch = Touch(0.4, -0.3, 0.5, 10.0, 0.01, -0.01)
-    own, other = (engine_named(name).press(surface, SENSOR, touch, TIPS) for name in ENGINES)
-    assert np.corrcoef(own.forces_n.ravel(), other.forces_n.ravel())[0, 1] > 0.9
-    assert other.forces_n.sum() == pytest.approx(own.forces_n.sum(), rel=1e-3)
-
-
 def heights_alone(surface):
     """Return a surface of which nothing but its heights is known."""
     return Formula(lambda x, y: surface.heights_mm(np.stack([x, y], axis=1)), surface.top_mm)

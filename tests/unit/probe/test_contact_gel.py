@@ -34,15 +34,6 @@ def test_a_plane_is_pressed_alike_all_over():
     assert contact.z_mm == pytest.approx(-depth)
 
 
-def test_forces_without_a_membrane_balance_the_touch():
-    washer = Washer(outer_mm=10.0)
-    contact = gel(washer, PLAIN, TOUCH)
-    assert contact.forces_n.sum() == pytest.approx(2.0)
-    assert contact.forces_n[0, 0] == 0.0
-    deeper = gel(washer, PLAIN, replace(TOUCH, force_n=4.0))
-    assert depths_mm(PLAIN, deeper.forces_n).max() > 1.5 * depths_mm(PLAIN, contact.forces_n).max()
-
-
 def test_the_membrane_follows_and_bridges():
     depth = np.zeros((41, 41))
     depth[18:23, 18:23] = 1.0

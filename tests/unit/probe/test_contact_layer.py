@@ -248,34 +248,3 @@ def test_what_is_refused():
         layer(Washer(), sensor, Touch(80.0, 0, 0, 10.0))
     with pytest.raises(ContactError, match="no numbers"):
         layer(Formula(lambda x, _y: np.where(x > 0, math.nan, 0.0)), sensor, touch)
-
-
-class Counted:
-    """A surface that counts what it is asked."""
-
-    def __init__(self, surface):
-        self.surface, self.top_mm, self.asked = surface, surface.top_mm, 0
-
-    def heights_mm(self, points_mm):
-        self.asked += len(points_mm)
-        return self.surface.heights_mm(points_mm)
-
-
-def test_cells_that_cannot_touch_are_never_sampled_in_full():
-    sensor, surface = pad(), Counted(Washer(6.0, 2.0))
-    layer(surface, sensor, Touch(0, 0, 0, 5.0))
-    assert surface.asked < 4096 * 4 + 800 * 16
-
-
-def test_symmetry_and_repetition():
-    sensor = pad()
-    touch = Touch(0.37, -0.21, 0.0, 25.0, 0.01, 0.02)
-    one = layer(sphere(25.0), sensor, touch)
-    assert (layer(sphere(25.0), sensor, touch).forces_n == one.forces_n).all()
-    half = layer(sphere(25.0), sensor, Touch(-0.37, 0.21, 0.0, 25.0, -0.01, -0.02))
-    assert half.forces_n == pytest.approx(one.forces_n[::-1, ::-1], abs=5e-3 * one.forces_n.max())
-    moved = layer(sphere(25.0), sensor, Touch(0.37 - sensor.pitch_mm, -0.21, 0.0, 25.0, wrist=HELD))
-    still = layer(sphere(25.0), sensor, Touch(0.37, -0.21, 0.0, 25.0, wrist=HELD))
-    assert moved.forces_n[:, 1:] == pytest.approx(
-        still.forces_n[:, :-1], abs=2e-2 * still.forces_n.max()
-    )

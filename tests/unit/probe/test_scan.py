@@ -84,12 +84,6 @@ def test_a_force_that_jumps_over_the_wanted_one_is_told():
     assert end.travel_mm == pytest.approx(3.123, abs=1e-4)
 
 
-def test_already_in_contact():
-    assert guarded_approach(lambda travel: 80.5).travel_mm == 0
-    assert guarded_approach(lambda travel: 300.0).reason == "force limit"
-    assert guarded_approach(lambda travel: 90.0).reason == "too stiff"
-
-
 def test_forces_and_limits_that_make_no_sense():
     with pytest.raises(ContactError, match=r"the force at 0 mm is nan"):
         guarded_approach(lambda travel: math.nan)
@@ -128,13 +122,6 @@ def test_a_square_face():
     inside = plan.cover > 1 - 1e-9
     assert inside.sum() == 25
     assert plan.cover[0] == pytest.approx((1 - (3 * step + 12.7 - 30) / 25.4) ** 2)
-
-
-def test_a_step_of_four_and_a_quarter_sees_edges_at_four_places_between_tactels():
-    xs = np.unique(raster([SQUARE]).places_mm[:, 0].round(9)) / 1.5875
-    assert len({round(float(x % 1), 6) for x in xs}) == 4
-    xs = np.unique(raster([SQUARE], step_tactels=4).places_mm[:, 0].round(9)) / 1.5875
-    assert len({round(float(x % 1), 6) for x in xs}) == 1
 
 
 def test_a_face_smaller_than_the_sensor_is_one_touch():

@@ -7,8 +7,6 @@ from reference.mesh_heights import heights_by_numpy, heights_over
 
 from probe.errors import SurfaceError
 from probe.surface.body import triangulate
-from probe.surface.face import FaceSurface
-from probe.surface.indenters import FlatPlate, TiltedPlane
 from probe.surface.mesh import mesh, sort_numbers
 from probe.surface.polygon import polygon
 
@@ -125,17 +123,6 @@ def test_filled_loops_cover_their_area_once():
     assert areas.sum() / 2 == pytest.approx(96.0)
     with pytest.raises(SurfaceError, match="cover"):
         triangulate([SQUARE[::-1]])
-
-
-def test_face_sees_its_surroundings_beyond_its_edges_and_above_itself():
-    low = FaceSurface(None, polygon([SQUARE, HOLE]), TiltedPlane(-0.1, 0.0))
-    at = np.array([[5.0, 1], [5, 5], [20, 0], [-20, 0]])
-    assert low.heights_mm(at).tolist() == [0.0, -0.5, -2.0, 2.0]
-    assert low.top_mm == pytest.approx(10.0)
-    alone = FaceSurface(None, polygon([SQUARE]))
-    assert alone.heights_mm(at).tolist() == [0.0, 0.0, -np.inf, -np.inf]
-    over = FaceSurface(None, polygon([SQUARE]), FlatPlate(3.0))
-    assert (over.heights_mm(at) == 3.0).all()
 
 
 def test_level_ground_is_answered_by_its_bins_as_by_its_triangles():

@@ -13,11 +13,11 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import CircuitError
-from probe.simulate.scene import Scene, bare_scene
+from probe.simulate.scene import bare_scene
 from probe.simulate.world.levels import LEVELS, SOUND, TYPICAL
 from probe.simulate.world.sensor import COUNTS_PER_N, MOUNTINGS, LevelSensor, mount, sample_sensor
+from probe.simulate.world.surfaces import DistortedSurface
 from probe.surface.indenters import FlatPlate, RaisedStrip
-from probe.surface.polygon import polygon
 
 SENSOR = SensorType()
 HERE = Touch(x_mm=0.3, y_mm=0.2, theta_rad=0.4, force_n=60.0)
@@ -210,18 +210,11 @@ def test_mounting_that_would_change_the_shape_is_refused():
         mount(np.zeros((12, 32), np.uint16), "quarter turn")
 
 
-def test_scale_costs_nothing_at_the_datum_and_its_share_away_from_it():
-    level = replace(SOUND, scale=0.01)
-    far = replace(HERE, x_mm=0.0, y_mm=0.0, theta_rad=0.0)
-    square = np.array([(-9, -9), (9, -9), (9, 9), (-9, 9)])
-    drawn, same, moved = (
-        LevelSensor(SENSOR, lv)
-        .read(Scene(STRIP, polygon([square + datum]), ""), replace(far, x_mm=x),
-              np.random.default_rng(1)).counts
-        for lv, datum, x in ((SOUND, (0, 0), 0.0), (level, (0, 0), 0.0), (level, (-30, 0), 0.3))
-    )  # fmt: skip
-    assert np.abs(same.astype(int) - drawn).max() < 0.05 * drawn.max()
-    np.testing.assert_allclose(moved.astype(int), same, atol=0.05 * drawn.max())
+def test_print_is_scaled_from_its_datum():
+    print_ = DistortedSurface(RaisedStrip(2.0), 0.0, 0.01, (-30.0, 0.0))
+    edge = -30 + 1.01 * (30 + 1.0)  # of the strip of 2 mm about 0, 31 mm from the datum
+    within, beyond = print_.heights_mm(np.array([[edge - 1e-3, 0.0], [edge + 1e-3, 0.0]]))
+    assert within > beyond
 
 
 def test_instance_of_a_sensor_is_the_same_at_every_touch():

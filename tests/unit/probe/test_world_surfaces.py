@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from probe.contact.contract import Touch
 from probe.errors import SurfaceError
 from probe.simulate.scene import bare_scene
 from probe.simulate.world.surfaces import (
@@ -46,16 +45,6 @@ def test_faces_lie_beside_each_other_and_the_sensor_near_both(first, second, see
     beside = second.distance_mm(place.into(at[None]))[0]
     assert beside <= REACH_MM + GAP_MM
     assert abs(place.z_mm) <= STEP_MM
-
-
-def test_a_touch_is_the_same_in_both_frames():
-    place = FramePlace(30.0, -4.0, 0.2, 2.1)
-    touch = Touch(12.0, 7.0, 0.4, 50.0)
-    inside = place.touch_inside(touch)
-    corner = np.array([[5.0, -3.0]])
-    outer = touch.on_surface(corner)
-    np.testing.assert_allclose(inside.on_surface(corner), place.into(outer), atol=1e-12)
-    assert inside.theta_rad == pytest.approx(0.4 - 2.1)
 
 
 def test_two_bodies_are_one():

@@ -33,15 +33,9 @@ def test_help_loads_no_server_no_array_and_no_database():
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (["--overlay", "sponge"], 2, "give tab or pad"),
-        (["--web-port", "99999"], 2, "--help"),
-        (["--nonsense"], 2, "--help"),
         (["--token", "short"], 2, "12 or more"),
         (["--token", "a;b=c, with spaces in it"], 2, "12 or more"),
-        (["--database", "none/lab.db"], 4, "fix:"),
-        (["--database", "none.db"], 4, "encode-object"),
         (["--port", "touch:?rate=0"], 2, "give 1 to 500"),
-        (["--port", "usb:1"], 3, "serial:"),
         (["--port", "file:none.h5"], 2, "none.h5"),
     ],
 )
@@ -49,7 +43,7 @@ def test_what_cannot_be_met_is_refused_with_the_way_out(
     words, code, said, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
-    got, message = ended(capsys, *words, *([] if "--web-port" in words else ["--web-port", 0]))
+    got, message = ended(capsys, *words, "--web-port", 0)
     assert (got, "Traceback" in message) == (code, False)
     assert said in message
 

@@ -23,15 +23,6 @@ def test_frame_has_x_along_columns_and_y_against_rows():
     assert fine.xy_mm(60, 60) == pytest.approx(image.xy_mm(15, 15))
 
 
-def test_values_are_copied_and_read_only():
-    given = noise()
-    image = tactile_image(given, step_mm=1.0)
-    given[0, 0] = 7
-    assert image.values[0, 0] != 7
-    with pytest.raises(ValueError, match="read-only"):
-        image.values[0, 0] = 1
-
-
 @pytest.mark.parametrize(
     ("values", "kwargs", "match"),
     [

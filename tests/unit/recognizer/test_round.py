@@ -87,10 +87,6 @@ def test_forces_tell_along_which_line_a_cylinder_lies(radius, degrees):
     assert np.isfinite(found[0].gain).all()
 
 
-def test_no_forces_no_bend():
-    assert guess_bends(image(np.zeros((16, 16))), SENSOR, (40.0,), 3) == []
-
-
 def test_radii_are_near_to_those_of_the_faces():
     tube = Developable("cylinder", (1, 2), 47.0, 0.0, True, False, 0.02)
     (radius,) = radii_of([tube])

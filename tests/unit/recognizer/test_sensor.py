@@ -18,6 +18,7 @@ from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
 from recognizer.command import run
 from recognizer.errors import SensorStateError, WiringError
+from recognizer.sensor import learn
 from recognizer.sensor.file import read_state, state_entry, state_words, write_state
 from recognizer.sensor.learn import LEAST_TOUCHES, answering_of, learn_sensor
 from recognizer.sensor.wiring import find_mounting, wiring_hint, wiring_named
@@ -212,12 +213,12 @@ def felt(lab):
     return images, tips, gain
 
 
-def test_touches_tell_gains_and_where_tips_stand(lab, felt):
+def test_touches_tell_gains_and_where_tips_stand(lab, felt, monkeypatch):
     images, tips, gain = felt
     reader = Reader(open_lab(lab / "lab.db"))
     shares = []
-    state = learn_sensor(reader, images, rounds=1, name="left",
-                         done=shares.append)  # fmt: skip
+    monkeypatch.setattr(learn, "ROUNDS", 1)
+    state = learn_sensor(reader, images, name="left", done=shares.append)
     assert sorted(map(tuple, np.argwhere(state.masked).tolist())) == DEAD
     live = ~state.dead
     true = tips.shifts_mm[live] - tips.shifts_mm[live].mean(axis=0)

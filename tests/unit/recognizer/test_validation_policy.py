@@ -8,9 +8,10 @@ import pytest
 
 from generator.pipeline import encode
 from generator.spec import read_specs
+from recognizer.scan.session import Scan
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognition import NextTouch
+from recognizer.touch.recognition import AMBIGUOUS, NextTouch, refusal
 from recognizer.validation.draw import draw_again, draw_touch
 from recognizer.validation.touch_plan import TouchPlan
 from recognizer.validation.trial import NEXT, touch_until_answered, trial
@@ -43,10 +44,12 @@ def test_corners_are_answered_within_three_touches_and_never_wrong(url, reader):
         assert (one.touches == 1) == (other.verdict == "right")
 
 
-def test_steps_are_made_from_the_sensor_s_frame_by_the_same_sensor(url, reader):
+def test_steps_are_made_from_the_sensor_s_frame_by_the_same_sensor(url, reader, monkeypatch):
     plan = replace(PLAN, database=url, kind="face", level="dead-40")
     step = NextTouch(4.0, 2.0, 30.0, 60.0, "told")
-    made = list(touch_until_answered(plan, 3, reader, 2, lambda answer, rng: step))
+    refused = replace(refusal(3, AMBIGUOUS), next=step)
+    monkeypatch.setattr(Scan, "add", lambda *_arguments, **_named: refused)
+    made = list(touch_until_answered(plan, 3, reader, 2))
     first, second = (one.found.touch for one in made)
     c, s = math.cos(first.theta_rad), math.sin(first.theta_rad)
     at = first.x_mm + 4 * c - 2 * s, first.y_mm + 4 * s + 2 * c
@@ -55,7 +58,7 @@ def test_steps_are_made_from_the_sensor_s_frame_by_the_same_sensor(url, reader):
     assert second.force_n == pytest.approx(60, rel=0.4)
     dead = [one.found.counts < 40 for one in made]
     assert np.logical_and(*dead).sum() >= 90  # a third of them would be by chance
-    assert [one.answer.seq for one in made] == [3, 3]
+    assert len(made) == 2
 
 
 def test_a_worn_face_has_lost_the_same_symbols_elsewhere(url, reader):
