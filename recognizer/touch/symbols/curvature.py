@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend
 from recognizer.touch.symbols.image import Image, bounded_gain
-from recognizer.touch.symbols.linearize import ascend, damped_step
+from recognizer.touch.symbols.kernels import DAMPING, EASIER
 
 Array = NDArray[np.float64]
 Smooth = Callable[[Array], Array]  #: values (b, n) -> means (b, n)
@@ -27,6 +28,7 @@ Smooth = Callable[[Array], Array]  #: values (b, n) -> means (b, n)
 DIRECTIONS = 18  #: of lines, over half a turn
 STEPS = 6  #: of damped least squares
 HARDER = 6.0  #: multiplies the damping after a step that does not help
+MOST_DAMPING = 1e6
 AROUND = 5  #: tactels, side of the square over which forces are averaged
 APART_RAD = 0.35  #: by which two curvatures of one radius differ
 FIRST, LEAST, MOST = 0.45, 0.08, 0.8  #: depth, heights of the overlay: to begin with, bounds
@@ -92,8 +94,7 @@ def _average(image: Image) -> Smooth:
     return lambda values: summed(values * image.trust) / known
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Strips:
+class _Strips(NamedTuple):
     """Planes under b bends, and how well they explain an image."""
 
     plane: Array  # (b, 3) depths
@@ -119,20 +120,26 @@ def _fit_gains(image: Image, falls: Array, smooth: Smooth, seen: Array) -> _Stri
         half = 0.5 * scale[:, None] / np.maximum(root, FAINT)
         columns = [half * smooth(slope * one) for one in basis.T]
         jacobian = np.stack([*columns, root], axis=-1)
-        return _Strips(
-            plane=plane,
-            scale=scale,
-            value=-(away * away).sum(axis=1),
-            normal=jacobian.swapaxes(1, 2) @ jacobian,
-            right=(jacobian * away[..., None]).sum(axis=1),
-        )
-
-    def moved(at: _Strips, damping: Array) -> _Strips:
-        step = damped_step(at, damping, 1e-9)[:, :3]
-        plane = at.plane + np.clip(step, -LARGEST_STEP, LARGEST_STEP)
-        plane[:, 0] = np.clip(plane[:, 0], LEAST, MOST)
-        return pressed(plane)
+        normal = jacobian.swapaxes(1, 2) @ jacobian
+        right = (jacobian * away[..., None]).sum(axis=1)
+        return _Strips(plane, scale, -(away * away).sum(axis=1), normal, right)
 
     start = np.zeros((len(falls), 3))
     start[:, 0] = FIRST
-    return ascend(pressed(start), moved, STEPS, harder=HARDER)
+    best, damping = pressed(start), np.full(len(falls), DAMPING)
+    for _ in range(STEPS):
+        diagonal = np.einsum("bii->bi", best.normal) * damping[:, None] + 1e-9
+        system = best.normal + diagonal[:, :, None] * np.eye(4)
+        step = np.linalg.solve(system, best.right[..., None])[:, :3, 0]
+        plane = best.plane + np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+        plane[:, 0] = np.clip(plane[:, 0], LEAST, MOST)
+        tried = pressed(plane)
+        better = tried.value > best.value
+        best = _Strips(
+            *(
+                np.where(better.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+                for new, old in zip(tried, best, strict=True)
+            )
+        )
+        damping = np.where(better, damping / EASIER, np.minimum(damping * HARDER, MOST_DAMPING))
+    return best
