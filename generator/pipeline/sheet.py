@@ -13,7 +13,7 @@ from generator.export.bed import Plate
 from generator.export.drawing import draw_back, draw_front, draw_plate, draw_step, is_panel
 from generator.export.sheet import Figure, Section, sheet_html
 from generator.layout.placement import FaceLayout, Layout, object_code
-from generator.pipeline.made import overhang_of
+from generator.pipeline.made import overhang_text
 from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon
 from generator.polyhedron.assembly import AssemblyStep, assembly_order, distinct_faces
@@ -92,7 +92,7 @@ def lies_text(plan: ObjectPlan, layout: Layout) -> str:
     """Return how the parts of an object lie on the bed, and what supports they need."""
     if plan.spec.parts == "panels":
         return "every panel on its back, symbols up; no supports"
-    return str(overhang_of(plan, layout))
+    return overhang_text(plan, layout)
 
 
 def material_text(volume_mm3: float, *, resin: bool) -> str:
