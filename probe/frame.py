@@ -44,23 +44,10 @@ def frame_from(
     wrist: ArrayLike | None = None,
     pose: ArrayLike | None = None,
 ) -> Frame:
-    """Return a checked frame.
+    """Return a checked frame of counts (rows, columns), whole numbers 0 ... 65535.
 
-    Parameters
-    ----------
-    counts
-        (rows, columns) whole numbers 0 ... 65535.
-    t_ns, seq
-        Time (ns) and number, both unwrapped.
-    wrist
-        (4,) whole numbers; zeros if not given.
-    pose
-        (4, 4) rigid transform T_base_sensor, mm.
-
-    Raises
-    ------
-    FrameError
-        When a shape is wrong, or a value is no count.
+    Time (ns) and number are unwrapped; the wrist (4,) is zeros if not given; `pose` is a (4, 4)
+    rigid transform T_base_sensor, mm. Raises FrameError: a shape is wrong, or a value is no count.
     """
     image = _counts(counts, None, "image")
     given = _counts(np.zeros(WRIST, np.uint16) if wrist is None else wrist, (WRIST,), "wrist")

@@ -221,7 +221,7 @@ def _decode_ident(seq: int, t_us: int, payload: bytes) -> IdentPacket | Damage:
         return Damage.VALUE
     return IdentPacket(
         seq, t_us, bits, sensor, sensors, (major, minor), settling / 4, kbaud * 1000, boot,
-        name.decode("ascii").rstrip(), rows, columns,
+        name.decode("ascii").rstrip(), rows, columns
     )  # fmt: skip
 
 

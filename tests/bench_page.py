@@ -7,6 +7,8 @@ is waited for is asked again and again.
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import time
 from contextlib import contextmanager
 
@@ -21,6 +23,19 @@ FLAGS = (
 PATIENCE_S = 60.0  #: for anything, on a busy machine
 PATIENCE_MS = 1e3 * PATIENCE_S
 expect.set_options(timeout=PATIENCE_MS)
+
+
+@contextmanager
+def running(*options, folder=None, errors=None):
+    """Run `open-bench` at any free port of its own; yields its address and its process."""
+    command = [sys.executable, "-m", "recognizer.bench.command", "--web-port", 0, *options]
+    with subprocess.Popen(
+        list(map(str, command)), stdout=subprocess.PIPE, stderr=errors, text=True, cwd=folder
+    ) as process:
+        try:
+            yield process.stdout.readline().split()[-1], process
+        finally:
+            process.kill()
 
 
 @contextmanager

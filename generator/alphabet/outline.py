@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from generator.alphabet.known import Alphabet
 from generator.alphabet.strokes import Glyph
 from generator.errors import AlphabetError
-from generator.plane.polygon import signed_area
-from generator.plane.rings import edges_cross, keeps_edges
+from generator.plane.polygon import edges_cross, keeps_edges, signed_area
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,7 @@ from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
 from generator.array.contract import touches_needed
 from generator.layout.footprint import Points
 from generator.layout.placement import FaceLayout
-from generator.plane.polygon import points_inside, signed_area
+from generator.plane.polygon import points_inside, segments, signed_area
 
 LOW = 0.5  #: share of touches under which a face is named: `validate-set` calls it no use
 NOT_READABLE = 0.15  #: under which it is not readable: of seven touches one is answered
@@ -211,7 +211,7 @@ def views_at(
     turn_rad: Points,
 ) -> FaceViews:
     """Return what a sensor meets at poses (P, 2) mm and (P,) rad of one face, face frame."""
-    start, end = _edges(loops)
+    start, end, *_ = segments(loops)
     c, s = np.cos(turn_rad)[:, None], np.sin(turn_rad)[:, None]
     ax, ay = _in_sensor(start, centre_mm, c, s)
     bx, by = _in_sensor(end, centre_mm, c, s)
@@ -313,12 +313,6 @@ def _around(face: FaceLayout, centre: Points, reach_mm: float) -> NDArray[np.int
         away = np.hypot(x[at] - centre[some, :1], y[at] - centre[some, 1:])
         found[some] = (within & (away <= reach_mm)).sum(axis=1)
     return found
-
-
-def _edges(loops: Loops) -> tuple[Points, Points]:
-    return np.concatenate(list(loops)), np.concatenate(
-        [np.roll(loop, -1, axis=0) for loop in loops]
-    )
 
 
 def _poses_on(loops: Loops, number: int) -> tuple[Points, Points]:

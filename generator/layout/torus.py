@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.layout.occupancy import TILE, Mask, Occupancy, on_torus
+from generator.layout.occupancy import TILE, Mask, Occupancy
 
 WHOLE_CELLS = 1 << 17  #: an array with no more cells is looked at as a whole
 CORNER = 192  #: first extent of the corner of a larger array, rows and columns, cells
@@ -68,14 +68,6 @@ def place_pieces(
         at = (row + first[0]) % occupancy.rows, (column + first[1]) % occupancy.columns
         found_at[k] = TorusPosition(*at, quarter)
     return found_at
-
-
-def cells_at(
-    mask: Mask, at: TorusPosition, rows: int, columns: int
-) -> tuple[NDArray[np.int64], ...]:
-    """Return the array rows and columns of a mask (not yet turned) at a position, on the torus."""
-    r, c = np.nonzero(np.rot90(mask, at.quarter))
-    return on_torus(r + at.row, rows), on_torus(c + at.column, columns)
 
 
 def _forms(mask: Mask, turns: Iterable[int]) -> dict[int, Mask]:

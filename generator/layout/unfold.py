@@ -61,12 +61,12 @@ class _Surface:
 Priority = Callable[[int, int], float]  # (edge, faces between this one and the first) -> order
 
 
-def unfold(polyhedron: Polyhedron, *, seed: int = 0) -> Net:
+def unfold(polyhedron: Polyhedron) -> Net:
     """Return the net with the fewest pieces among the trees that are tried."""
     surface = _surface(polyhedron)
     best: Net | None = None
     work = 0
-    for root, priority in _trees(polyhedron, surface, seed):
+    for root, priority in _trees(polyhedron, surface):
         net = _lay_flat(surface, root, priority)
         if best is None or len(net.pieces) < len(best.pieces):
             best = net
@@ -111,7 +111,7 @@ def _surface(polyhedron: Polyhedron) -> _Surface:
     return _Surface(points, triangles, hinges, TOLERANCE * size)
 
 
-def _trees(polyhedron: Polyhedron, surface: _Surface, seed: int) -> Iterator[tuple[int, Priority]]:
+def _trees(polyhedron: Polyhedron, surface: _Surface) -> Iterator[tuple[int, Priority]]:
     """Yield the face to begin with and the order of folds, likely ones first."""
     areas = [float(np.sum(triangle_areas(triangles))) for triangles in surface.triangles]
     roots = sorted(range(len(areas)), key=lambda face: (-round(areas[face], 6), face))
@@ -119,7 +119,7 @@ def _trees(polyhedron: Polyhedron, surface: _Surface, seed: int) -> Iterator[tup
         yield root, lambda _edge, depth: float(depth)
     for direction in _directions():
         yield roots[0], _uncut_first(_steepest_edges(polyhedron, direction))
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     for _ in range(RANDOM_TREES):
         yield roots[0], _edge_order(random.permutation(len(polyhedron.edges)))
 

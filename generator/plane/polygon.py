@@ -1,4 +1,4 @@
-"""Plane geometry that cannot be wrong by rounding: orientation, side of a polygon, area.
+"""Plane geometry, the same for every stage: sides, areas, crossings, distances.
 
 Points are (n, 2) or (n, 3) arrays, mm. A polygon is a tuple of loops: the outer one
 counter-clockwise, then holes clockwise; non-convex polygons are welcome.
@@ -15,7 +15,7 @@ predicates, 1997: the error bound of the filter.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -28,14 +28,22 @@ _FILTER = (3.0 + 16.0 * _EPSILON) * _EPSILON  # Shewchuk's ccwerrboundA
 _UNDERFLOW = 1e-300  # products below this have lost bits that the filter does not count
 
 
-def orientation(a: ArrayLike, b: ArrayLike, c: ArrayLike) -> int:
-    """Return +1 if a, b, c turn left, -1 if they turn right, 0 if they lie on one line; exact."""
-    (ax, ay), (bx, by), (cx, cy) = ((float(p[0]), float(p[1])) for p in map(np.asarray, (a, b, c)))
-    left, right = (ax - cx) * (by - cy), (ay - cy) * (bx - cx)
-    determinant = left - right
-    if abs(determinant) > _FILTER * (abs(left) + abs(right)) + _UNDERFLOW:
-        return 1 if determinant > 0 else -1
-    return _exact_orientation(ax, ay, bx, by, cx, cy)
+def orientations(a: ArrayLike, b: ArrayLike, c: ArrayLike) -> NDArray[np.int8]:
+    """Return +1 where a, b, c (..., 2), broadcast together, turn left, -1 right, 0 on one line.
+
+    Exact: in rational arithmetic where rounding could change the sign.
+    """
+    a, b, c = (np.asarray(p, dtype=np.float64) for p in (a, b, c))
+    left = (a[..., 0] - c[..., 0]) * (b[..., 1] - c[..., 1])
+    right = (a[..., 1] - c[..., 1]) * (b[..., 0] - c[..., 0])
+    sign = np.asarray(np.sign(left - right)).astype(np.int8)
+    doubtful = np.abs(left - right) <= _FILTER * (np.abs(left) + np.abs(right)) + _UNDERFLOW
+    for k in map(tuple, np.argwhere(doubtful)):
+        corners = (np.broadcast_to(p, (*sign.shape, 2))[k].tolist() for p in (a, b, c))
+        (ax, ay), (bx, by), (cx, cy) = (map(Fraction, corner) for corner in corners)
+        exact = (ax - cx) * (by - cy) - (ay - cy) * (bx - cx)
+        sign[k] = (exact > 0) - (exact < 0)
+    return sign
 
 
 def side_of_polygon(loops: Sequence[Points], points: ArrayLike) -> NDArray[np.int8]:
@@ -54,7 +62,7 @@ def side_of_polygon(loops: Sequence[Points], points: ArrayLike) -> NDArray[np.in
             near = np.flatnonzero((py >= low[1]) & (py <= high[1]))
             if len(near) == 0:
                 continue
-            turn = _orientations(low, high, p[near])
+            turn = orientations(low, high, p[near])
             x, y = px[near], py[near]
             on_line = (turn == 0) & (x >= min(a[0], b[0])) & (x <= max(a[0], b[0]))
             boundary[near[on_line]] = True
@@ -139,77 +147,130 @@ def closest_pair(loops: Sequence[Points]) -> tuple[float, int, int]:
     Edges are counted through all loops in order; edge k of a loop starts at its vertex k.
     Crossing edges have the distance 0. With no such pair the distance is infinite.
     """
-    start = np.concatenate(loops)
-    end = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
-    following = np.concatenate([np.roll(np.arange(len(loop)), -1) for loop in loops])
-    following += np.repeat(np.cumsum([0, *map(len, loops[:-1])]), [len(loop) for loop in loops])
-    count = len(start)
+    start, end, number, after = segments(loops)
     best = (np.inf, 0, 0)
-    for i in range(count - 1):  # one row of pairs at a time keeps the memory small
-        others = np.arange(i + 1, count)
-        others = others[(others != following[i]) & (following[others] != i)]
+    for i, (a, b) in enumerate(zip(start, end, strict=True)):  # a row of pairs at a time
+        others = np.flatnonzero((number != i) & (number != after[i]) & (after != i))
         if len(others) == 0:
             continue
-        gap = _segment_distances(start[i], end[i], start[others], end[others])
+        c, d = start[others], end[others]
+        gap = np.minimum(_distances(c, a, b), _distances(d, a, b))
+        crossing = orientations(a, b, c) * orientations(a, b, d) < 0
+        crossing &= orientations(c, d, a) * orientations(c, d, b) < 0
+        gap[crossing] = 0.0
         k = int(gap.argmin())
         if gap[k] < best[0]:
-            best = (float(gap[k]), i, int(others[k]))
+            best = (float(gap[k]), min(i, int(others[k])), max(i, int(others[k])))
     return best
 
 
-def _segment_distances(a: Points, b: Points, c: Points, d: Points) -> Points:
-    """Distances (n,) between segment a-b and segments c-d (n, 2)."""
-    gap = np.minimum(
-        np.minimum(_distances(a, c, d), _distances(b, c, d)),
-        np.minimum(
-            _distances(c, np.broadcast_to(a, c.shape), np.broadcast_to(b, c.shape)),
-            _distances(d, np.broadcast_to(a, c.shape), np.broadcast_to(b, c.shape)),
-        ),
-    )
-    crossing = (_orientations(a, b, c) * _orientations(a, b, d) < 0) & (
-        _orientations_of(c, d, a) * _orientations_of(c, d, b) < 0
-    )
-    gap[crossing] = 0.0
-    return gap
+def keeps_edges(before: Points, after: Points, shortest: float) -> bool:
+    """Whether every edge of `after` runs along that of `before`, at least `shortest` long."""
+    old = np.roll(before, -1, axis=0) - before
+    new = np.roll(after, -1, axis=0) - after
+    along = (old * new).sum(axis=1) / np.hypot(old[:, 0], old[:, 1])
+    return bool((along >= shortest).all())
 
 
-def _distances(p: Points, a: Points, b: Points) -> Points:
-    """Distances (n,) from p, one point or one per segment, to the segments a-b (n, 2)."""
-    along = b - a
-    length2 = np.einsum("ij,ij->i", along, along)
-    t = np.einsum("ij,ij->i", p - a, along) / np.where(length2 > 0, length2, 1.0)
-    foot = a + np.clip(t, 0.0, 1.0)[:, None] * along
-    gap: Points = np.hypot(*(p - foot).T)
-    return gap
+def segments(
+    rings: Sequence[Points],
+) -> tuple[Points, Points, NDArray[np.int64], NDArray[np.int64]]:
+    """Return starts, ends, and the numbers of the first and the last corner of all edges."""
+    points = np.concatenate(rings)
+    first = np.arange(len(points))
+    last = first + 1
+    ends = np.cumsum([len(ring) for ring in rings])
+    last[ends - 1] = ends - [len(ring) for ring in rings]
+    return points, points[last], first, last
 
 
-def _orientations(a: Points, b: Points, c: Points) -> NDArray[np.int8]:
-    """Return the orientations of a, b with each point of c (n, 2)."""
-    left = (a[0] - c[:, 0]) * (b[1] - c[:, 1])
-    right = (a[1] - c[:, 1]) * (b[0] - c[:, 0])
-    return _signs(left, right, lambda k: (*a, *b, *c[k]))
+def edges_cross(rings: Sequence[Points]) -> bool:
+    """Whether two edges that share no corner meet, touching included, or neighbours fold back."""
+    starts, ends, a, b = segments(rings)
+    n = len(starts)
+    if n > 512:
+        return _sweep_crosses(starts, ends, a, b)
+    i, j = np.triu_indices(n, 1)
+    return _any_meeting(starts, ends, a, b, i, j)
 
 
-def _orientations_of(a: Points, b: Points, c: Points) -> NDArray[np.int8]:
-    """Return the orientations of each pair a, b (n, 2) with the one point c."""
-    left = (a[:, 0] - c[0]) * (b[:, 1] - c[1])
-    right = (a[:, 1] - c[1]) * (b[:, 0] - c[0])
-    return _signs(left, right, lambda k: (*a[k], *b[k], *c))
+def _sweep_crosses(
+    starts: Points, ends: Points, a: NDArray[np.int64], b: NDArray[np.int64]
+) -> bool:
+    """`edges_cross` for many edges: only pairs whose x ranges overlap."""
+    low = np.minimum(starts[:, 0], ends[:, 0])
+    high = np.maximum(starts[:, 0], ends[:, 0])
+    order = np.argsort(low, kind="stable")
+    reach = np.searchsorted(low[order], high[order], side="right")
+    for k, stop in enumerate(reach.tolist()):
+        others = order[k + 1 : stop]
+        if len(others) and _any_meeting(starts, ends, a, b, np.full(len(others), order[k]), others):
+            return True
+    return False
 
 
-def _signs(
-    left: Points, right: Points, corners: Callable[[int], tuple[float, ...]]
-) -> NDArray[np.int8]:
-    determinant = left - right
-    sign = np.sign(determinant).astype(np.int8)
-    doubtful = np.abs(determinant) <= _FILTER * (np.abs(left) + np.abs(right)) + _UNDERFLOW
-    for k in np.flatnonzero(doubtful):
-        sign[k] = _exact_orientation(*map(float, corners(int(k))))
-    return sign
+def _any_meeting(
+    starts: Points,
+    ends: Points,
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    i: NDArray[np.int64],
+    j: NDArray[np.int64],
+) -> bool:
+    """Whether any of the edge pairs (i, j) meets elsewhere than at a common corner."""
+    p, q, r, s = starts[i], ends[i], starts[j], ends[j]
+    chained = (b[i] == a[j]) | (b[j] == a[i])
+    d1, d2 = _doubled_area(p, q, r), _doubled_area(p, q, s)
+    d3, d4 = _doubled_area(r, s, p), _doubled_area(r, s, q)
+    apart = (np.minimum(d1, d2) > 0) | (np.maximum(d1, d2) < 0)
+    apart |= (np.minimum(d3, d4) > 0) | (np.maximum(d3, d4) < 0)
+    boxes = (np.maximum(p, q) < np.minimum(r, s)) | (np.maximum(r, s) < np.minimum(p, q))
+    apart |= boxes.any(axis=1)
+    if bool((~apart & ~chained).any()):
+        return True
+    u, v = (q - p)[chained], (s - r)[chained]
+    turn = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    dot = (u * v).sum(axis=1)
+    size = np.hypot(*u.T) * np.hypot(*v.T)
+    return bool(((np.abs(turn) <= 1e-12 * size) & (dot < 0)).any())
 
 
-def _exact_orientation(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int:
-    """Orientation in rational arithmetic: every double is a rational number."""
-    x, y = Fraction(cx), Fraction(cy)
-    determinant = (Fraction(ax) - x) * (Fraction(by) - y) - (Fraction(ay) - y) * (Fraction(bx) - x)
-    return (determinant > 0) - (determinant < 0)
+def distance(points: Points, rings: Sequence[Points]) -> Points:
+    """Return the distance of each of (n, 2) points to the nearest edge of the rings."""
+    best = np.full(len(points), np.inf)
+    for p, q in zip(*segments(rings)[:2], strict=True):
+        best = np.minimum(best, _distances(points, p, q))
+    return best
+
+
+def _distances(points: Points, p: Points, q: Points) -> Points:
+    """Return the distances of points (n, 2) from the segment p q."""
+    u = q - p
+    t = np.clip(((points - p) @ u) / max(float(u @ u), np.finfo(float).tiny), 0.0, 1.0)
+    gap = points - p - t[:, None] * u
+    away: Points = np.hypot(gap[:, 0], gap[:, 1])
+    return away
+
+
+def boxes_inside(centres: Points, half: ArrayLike, rings: Sequence[Points]) -> NDArray[np.bool_]:
+    """Whether boxes along the axes lie inside an area: no edge meets them, centres (n, 2) inside.
+
+    `half`: half sides, one for squares, or two.
+    """
+    free = points_inside(centres, rings)
+    size = np.broadcast_to(np.asarray(half, dtype=np.float64), 2)
+    starts, ends, _, _ = segments(rings)
+    for p, q in zip(starts, ends, strict=True):
+        low, high = np.minimum(p, q) - size, np.maximum(p, q) + size
+        near = ((centres >= low) & (centres <= high)).all(axis=1)
+        away = np.array([q[1] - p[1], p[0] - q[0]])
+        near &= np.abs((centres - p) @ away) <= size @ np.abs(away)
+        free &= ~near
+    return free
+
+
+def _doubled_area(p: Points, q: Points, r: Points) -> Points:
+    """Twice the signed areas of the triangles p, q, r."""
+    a, b = q - p, r - p
+    area: Points = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return area

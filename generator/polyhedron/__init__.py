@@ -10,12 +10,10 @@ from generator.polyhedron.frame import (
     face_frame,
     face_normal,
     face_polygon,
-    point_in_face,
     side_of_face,
-    surface_area,
     volume,
 )
-from generator.polyhedron.shapes import SHAPES, thesis_name, vertex_names
+from generator.polyhedron.shapes import SHAPES
 from generator.polyhedron.winged import Face, Loop, Polyhedron, WingedEdge, polyhedron
 
 __all__ = [
@@ -30,11 +28,7 @@ __all__ = [
     "face_frame",
     "face_normal",
     "face_polygon",
-    "point_in_face",
     "polyhedron",
     "side_of_face",
-    "surface_area",
-    "thesis_name",
-    "vertex_names",
     "volume",
 ]

@@ -21,12 +21,12 @@ from generator.errors import ShapeError
 from generator.plane.polygon import (
     area_vector,
     closest_pair,
+    distance,
     is_convex,
     plane_axes,
     side_of_polygon,
     signed_area,
 )
-from generator.plane.rings import distance
 
 PLANARITY = 1e-4  #: most a vertex may lie off its face's plane, of the size: more is no rounding
 CLOSENESS = 1e-6  #: two points, or a point and an edge, nearer than this share touch: float32

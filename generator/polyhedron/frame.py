@@ -61,11 +61,6 @@ def side_of_face(polyhedron: Polyhedron, face: int, points: ArrayLike) -> NDArra
     return side_of_polygon(face_polygon(polyhedron, face), points)
 
 
-def point_in_face(polyhedron: Polyhedron, face: int, points: ArrayLike) -> NDArray[np.bool_]:
-    """Whether points (n, 2) of the face frame lie in a face, its edges included; (n,) bool."""
-    return side_of_face(polyhedron, face, points) >= 0
-
-
 def edge_length(polyhedron: Polyhedron, edge: int) -> float:
     """Return the length of an edge, mm."""
     link = polyhedron.edges[edge]
@@ -92,11 +87,6 @@ def dihedral(polyhedron: Polyhedron, edge: int) -> float:
 def volume(polyhedron: Polyhedron) -> float:
     """Return the volume, mm^3."""
     return signed_volume(polyhedron.vertices, [face.loops for face in polyhedron.faces])
-
-
-def surface_area(polyhedron: Polyhedron) -> float:
-    """Return the area of all faces, mm^2."""
-    return math.fsum(face_area(polyhedron, face) for face in range(len(polyhedron.faces)))
 
 
 def size(polyhedron: Polyhedron) -> float:

@@ -16,9 +16,8 @@ its angle 2 pi sin(half angle)). Lines then stand a little outside the round sid
 of facets inside; the greatest distance of both is the chord error, pi^2 r / (3 N^2) to first
 order, which sets the number N of facets.
 
-Thesis 6.3, figures 6.14 to 6.19: C, B and D name the vertices of cube, parallelepiped and
-triangular prism. Its screens show the faces C2C3C6C7, B5B6B7B8 and D1D2D4D5, which are
-F3, F6 and F2 here; A for the tetrahedron is ours, the thesis shows none.
+Thesis 6.3, figures 6.14 to 6.19, whose screens show the faces F3 of the cube, F6 of the
+parallelepiped and F2 of the triangular prism.
 """
 
 from __future__ import annotations
@@ -39,8 +38,6 @@ MOST_SIDES = 64  #: of a prism or pyramid
 #: Of a round face's facets: a tenth of a printed layer; also of round faces that are read.
 CHORD_ERROR_MM = 0.02
 FACETS = (24, 240)  #: fewest and most to a full circle; also of round faces that are read
-
-VERTEX_LETTERS = {"tetrahedron": "A", "box": "B", "cube": "C", "triangular_prism": "D"}
 
 
 def cube(side: float) -> Polyhedron:
@@ -147,18 +144,6 @@ SHAPES: dict[str, Callable[..., Polyhedron]] = {
     "pyramid": pyramid,
     "polyhedron": polyhedron_of,
 }
-
-
-def vertex_names(solid: Polyhedron) -> tuple[str, ...]:
-    """Return the names of the vertices in the thesis's manner: C1, C2, ... of a cube."""
-    letter = VERTEX_LETTERS.get(solid.kind, "V")
-    return tuple(f"{letter}{number}" for number in range(1, len(solid.vertices) + 1))
-
-
-def thesis_name(solid: Polyhedron, face: int) -> str:
-    """Return the name of a face in the thesis's manner: its vertices in order, C2C3C6C7."""
-    names = vertex_names(solid)
-    return "".join(names[v] for v in sorted(solid.faces[face].loops[0]))
 
 
 def _prism(kind: str, base: NDArray[np.float64], height: float) -> Polyhedron:

@@ -39,20 +39,11 @@ class CalibratedImage:
 def calibrate_image(
     image: Frame | ArrayLike, calibration: Calibration | None = None
 ) -> CalibratedImage:
-    """Return the forces that an image shows.
+    """Return the forces that a frame, or counts (..., rows, columns), show.
 
-    Parameters
-    ----------
-    image
-        A frame, or (..., rows, columns) counts.
-    calibration
-        Of the sensor that read it; None reads counts as they are.
-
-    Returns
-    -------
-    Calibrated
-        sigma holds the noise of one frame, the uncertainty of the law, and the share that
-        hysteresis and creep leave open. What is not above three sigma of the noise is 0 N.
+    Without a calibration counts are read as they are. sigma holds the noise of one frame, the
+    uncertainty of the law, and the share that hysteresis and creep leave open; readings not above
+    three sigma of the noise are 0 N.
 
     Raises
     ------

@@ -54,17 +54,9 @@ def judge_tactels(
 ) -> NDArray[np.uint8]:
     """Return the condition (rows, columns) of every tactel.
 
-    Parameters
-    ----------
-    force_n, read_s, sigma_s, saturated
-        (L + 1, rows, columns); the first is rest. Conductances nan where contradictory.
-    high
-        (rows, columns) of `raised_tactels`.
-
-    Raises
-    ------
-    CalibrationError
-        If tactels were not loaded enough to be judged, or none responds.
+    The other arrays are (L + 1, rows, columns), the first at rest, conductances nan where
+    contradictory; `high` is that of `raised_tactels`. Raises CalibrationError: tactels were not
+    loaded enough to be judged, or none responds.
     """
     unloaded = force_n.max(axis=0) < LOADED_N
     if unloaded.any():
@@ -128,10 +120,7 @@ def check_loads(force_n: Array, firm: NDArray[np.bool_]) -> ClearLoads:
 
 
 def demand_loads(
-    known: ClearLoads,
-    force_n: Array,
-    saturated: NDArray[np.bool_],
-    live: NDArray[np.bool_],
+    known: ClearLoads, force_n: Array, saturated: NDArray[np.bool_], live: NDArray[np.bool_]
 ) -> None:
     """Refuse loads (CalibrationError) that leave the law of a live tactel open.
 

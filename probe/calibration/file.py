@@ -156,7 +156,7 @@ def read_calibration(path: str | os.PathLike[str], *, sensor: str | None = None)
     except ValueError as error:
         raise CalibrationError(
             f"is no JSON: {error}", fix="give a file that `probe-sensor calibrate` wrote",
-            place=place,
+            place=place
         ) from error  # fmt: skip
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise CalibrationError(

@@ -71,10 +71,8 @@ def calibration_from(
         (N, rows, columns) counts, frames with nothing on the sensor.
     loads
         Known loads; on every tactel 3 or more of different force, over a ratio of 3.
-    sensor
-        Its name; a file is used only with the sensor that it names.
-    made
-        When, as text; goes into the file as it is.
+    sensor, made
+        Its name (a file is used only with that sensor), and when, as text.
     board
         The electronics, whose equations take counts to conductances; None takes counts above
         the bias for conductances, which is right where tactels do not disturb each other.
@@ -145,7 +143,7 @@ def calibration_from(
         break_n=spread(law.break_n),
         covariance=spread(law.covariance[:, _UPPER[0], _UPPER[1]], (6,)),
         most_n=np.where(live, known.highest_n, np.nan),
-        scatter=float(np.sqrt((law.scatter**2).mean())), repeat=REPEAT,
+        scatter=float(np.sqrt((law.scatter**2).mean())), repeat=REPEAT
     )  # fmt: skip
 
 
@@ -181,16 +179,10 @@ def law_s(force_n: Array, gain_s: Array, exponent: Array, break_n: Array) -> Arr
 
 def fit_laws(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.bool_],
            preloaded: NDArray[np.bool_]) -> FittedLaw:  # fmt: skip
-    """Fit the law of every tactel.
+    """Fit the laws of T tactels to L loads.
 
-    Parameters
-    ----------
-    force_n, read_s, error_s
-        (L, T) N, S, S: force, conductance and its standard deviation, of L loads.
-    used
-        (L, T) readings that take part.
-    preloaded
-        (T,) tactels whose break force may be negative.
+    Force (N), conductance (S), its standard deviation, and the readings that take part are (L, T);
+    `preloaded` (T,) are tactels whose break force may be negative.
     """
     weight = np.where(used, 1.0 / error_s, 0.0)
     firm = used & (read_s > FIRM * error_s) & (force_n > 0)

@@ -78,21 +78,10 @@ class CalibrationLoad:
 
 
 def known_load(counts: ArrayLike, forces_n: ArrayLike, name: str = "") -> CalibrationLoad:
-    """Return a load whose force on each tactel is known.
+    """Return a load by its frames (N, rows, columns) and the force on each tactel, N.
 
-    Parameters
-    ----------
-    counts
-        (N, rows, columns) counts, frames of the steady load.
-    forces_n
-        (rows, columns) N on each tactel.
-    name
-        For messages and for the calibration file.
-
-    Raises
-    ------
-    CalibrationError
-        If frames or forces are none, or do not fit together.
+    The name is for messages and for the calibration file. Raises CalibrationError: frames or forces
+    are none, or do not fit together.
     """
     forces = np.asarray(forces_n, dtype=np.float64)
     label = name or f"{forces.sum():.4g} N"

@@ -103,22 +103,9 @@ def conductances(
 ) -> tuple[Image, FilmState]:
     """Return the conductance of every tactel (..., rows, columns), S, and its new state.
 
-    Parameters
-    ----------
-    fsr
-        The laws.
-    forces_n
-        (..., rows, columns) N, 0 or more; leading axes are independent touches.
-    state
-        Of the frame before, same shape; None for a matrix that was not loaded yet. Its noise is
-        carried on as it was.
-    elapsed_s
-        Time since that frame, s.
-
-    Raises
-    ------
-    CircuitError
-        If a force is negative or no number, or a shape is wrong.
+    Forces are of that shape, N, 0 or more; leading axes are independent touches. `state` is of the
+    frame before, `elapsed_s` ago; None for a matrix that was not loaded yet. Its noise is carried
+    on as it was. Raises CircuitError: a force is negative or no number, or a shape is wrong.
     """
     force = checked_forces(fsr, forces_n) + fsr.preload_n
     if state is None:

@@ -44,14 +44,12 @@ def invert_readings(
     bias_counts: ArrayLike | None = None,
     sigma_counts: ArrayLike | None = None,
 ) -> ConductanceEstimate:
-    """Return the conductances behind counts.
+    """Return the conductances behind counts (..., rows, columns), or means of counts.
 
     Parameters
     ----------
-    counts
-        (..., rows, columns) counts, or means of counts.
-    electronics
-        The board that read them.
+    counts, electronics
+        The readings, and the board that made them.
     bias_counts
         Reading at 0 V, per tactel or one for all; the board's by default.
     sigma_counts

@@ -197,19 +197,10 @@ def _disconnected_error() -> CircuitError:
 def loaded_columns(conductance_s: ArrayLike, floating: NDArray[np.bool_], load_ohm: float) -> Image:
     """Return the voltage over the load, as a share of the supply, for every row and column.
 
-    Parameters
-    ----------
-    conductance_s
-        (rows, columns) S; above 0 where a column would hang in the air otherwise.
-    floating
-        (rows,) whether a row floats while another one is read.
-    load_ohm
-        From the column that is read to ground.
-
-    Raises
-    ------
-    CircuitError
-        A shape is wrong, the load is not above 0, or a node is joined to nothing.
+    Conductances (rows, columns) are above 0 where a column would hang in the air otherwise;
+    `floating` (rows,) tells the rows that float while another one is read; the load lies between
+    the column that is read and ground. Raises CircuitError: a shape is wrong, the load is not above
+    0, or a node is joined to nothing.
     """
     g = checked_conductances(conductance_s)
     if g.ndim != 2 or np.shape(floating) != g.shape[:1] or not load_ohm > 0:

@@ -35,21 +35,9 @@ def read_counts(
 ) -> tuple[Counts, FilmState]:
     """Read a frame; returns counts (u16, of the forces' shape) and the new state.
 
-    Parameters
-    ----------
-    forces_n
-        (rows, columns) N on each tactel; or (N, rows, columns) for independent touches.
-    electronics, fsr
-        The board and the sensor.
-    state
-        What the frame before returned; None for a sensor that was not loaded yet.
-    rng
-        Source of the noise.
-
-    Raises
-    ------
-    CircuitError
-        If a force is negative or no number, or a shape is wrong.
+    Forces (N) are (rows, columns), or (N, rows, columns) for independent touches. `state` is of the
+    frame before; None for a sensor that was not loaded yet. `rng` is the source of the noise.
+    Raises CircuitError: a force is negative or no number, or a shape is wrong.
 
     Examples
     --------

@@ -21,7 +21,7 @@ from probe.client.receiver import ClientStatistics, Receiver
 from probe.errors import PortError, ProbeError
 from probe.frame import Frame
 from probe.port.address import Port
-from probe.port.url import open_port
+from probe.port.url import address_of, open_port
 from probe.protocol import (
     VERSION,
     Command,
@@ -34,6 +34,7 @@ from probe.protocol import (
 
 _BUFFER = 2048  #: frames, about 2 MB and 20 s
 _SILENCE_S = 0.5  #: after so long without a packet the stream is started again
+_IDENT_S = 2.0  #: for which the description of the probe is waited for
 _ANSWER_S = 5.0  #: a probe that has a boot loader answers within that
 _SLICE_S = 0.05  #: longest wait for bytes; a frame without successor is held so long
 _GATHER_S = 0.006  #: pause after few bytes, so that each byte does not wake the thread
@@ -119,6 +120,26 @@ class Client:
                     self._ready.notify_all()
             yield frame
 
+    def take(self, timeout_s: float) -> list[Frame]:
+        """Return all frames that wait; none if none came in `timeout_s`, or at the end.
+
+        Raises as `frames` does.
+        """
+        with self._ready:
+            self._ready.wait_for(lambda: self._frames or self._ended, timeout_s)
+            frames = list(self._frames)
+            self._frames.clear()
+            if not frames and self._ended and self._failure is not None:
+                raise self._failure
+            self._ready.notify_all()
+        return frames
+
+    @property
+    def ended(self) -> bool:
+        """Whether `take` will return no more frames, nor raise."""
+        with self._ready:
+            return self._ended and not self._frames and self._failure is None
+
     def notices(self) -> list[str]:
         """Return what happened since the last call, in words: reboots, reopenings, silence."""
         with self._ready:
@@ -140,6 +161,16 @@ class Client:
     def device(self) -> StatisticsPacket | None:
         """What the device counted, after `ask_device`; None before it answered."""
         return self._receiver.device
+
+    def wait_for_ident(self) -> IdentPacket | None:
+        """Return the ident of the selected sensor, after a short wait; None if none came."""
+        until_s = time.monotonic() + _IDENT_S
+        while time.monotonic() < until_s:
+            ident = self.ident
+            if ident is not None and self._sensor in (b"", b"%d" % ident.sensor):
+                break
+            time.sleep(0.02)
+        return self.ident
 
     def ask_device(self) -> None:
         """Ask the device for its statistics; the answer comes to `device`."""
@@ -292,3 +323,16 @@ def diagnose_silence(damages: Mapping[Damage, int], waited_s: float, url: str) -
         cause = f"the device was silent for {waited_s:g} s"
         fix = "try another baud rate, and see whether it has power and the probe's firmware"
     return PortError(cause, fix=fix, place=url)
+
+
+def name_of(ident: IdentPacket | None, url: str) -> str:
+    """Return how recordings and calibrations call the sensor that is read; empty: unknown.
+
+    A recording that is played names the sensor that made it; RecordingError if it is gone.
+    """
+    address = address_of(url)
+    if address.scheme == "file":
+        from probe.recording.read import Recording
+
+        return Recording(address.target).origin.sensor
+    return "" if ident is None else f"{ident.name}/{ident.sensor}"

@@ -139,7 +139,7 @@ def import_(
     sensor: Annotated[str, Option("Name of the sensor.")] = "",
     sensor_type: Typed = "",
     replace: Replace = False,
-    as_json: Json = False,
+    as_json: Json = False
 ) -> int:  # fmt: skip
     """Make a recording of others' images; values that are no counts are scaled."""
     from probe.command.recorded import check_output

@@ -35,7 +35,7 @@ from probe.calibration import (
 from probe.calibration.condition import common_bias, raised_tactels, tactel_words
 from probe.calibration.load import average_frames
 from probe.circuit import Electronics
-from probe.client.stream import Stream, name_of
+from probe.client.client import Client, name_of
 from probe.command.options import GuideOptions, LoadsOptions
 from probe.errors import CalibrationError, CircuitError, PortError
 from probe.port.url import means_port, typed_port
@@ -179,23 +179,23 @@ def _frames_of(
         return recording.block().counts, recording.origin.sensor, recording.sensor_type(sensor_type)
 
     port, kind = typed_port(source, sensor_type)
-    with interruption() as interrupted, Stream(port, sensor=sensor) as stream:
-        counts = _listen(stream, seconds)
+    with interruption() as interrupted, Client(port, sensor=sensor) as client:
+        counts = _listen(client, seconds)
         if interrupted.is_set():
             raise KeyboardInterrupt
         if not len(counts):
             raise PortError("no frame came", fix="see probe-sensor info", place=source)
         kind = choose_sensor_type(kind, "", counts.shape[1:], source)
-        return counts, name_of(stream.ident(), source), kind
+        return counts, name_of(client.wait_for_ident(), source), kind
 
 
-def _listen(stream: Stream, seconds: float) -> Counts:
+def _listen(client: Client, seconds: float) -> Counts:
     """Return the counts of the next seconds of a probe (device time), (N, rows, columns)."""
     images: list[Counts] = []
     began_ns: int | None = None
-    while not stream.ended:
-        frames = stream.take(1.0)
-        for notice in stream.client.notices():
+    while not client.ended:
+        frames = client.take(1.0)
+        for notice in client.notices():
             message(notice)
         for frame in frames:
             began_ns = frame.t_ns if began_ns is None else began_ns
@@ -232,7 +232,7 @@ def loads_given(words: list[str]) -> list[LoadRecording]:
         else:
             raise CalibrationError(
                 "no load is given with it", fix=f"write {word}=NEWTONS, 0 for the unloaded sensor",
-                place=word,
+                place=word
             )  # fmt: skip
     return given
 
@@ -262,7 +262,7 @@ def _read_list(path: Path) -> list[LoadRecording]:
             raise CalibrationError(
                 f"unknown columns {', '.join(unknown)}" if unknown
                 else "recording or newtons is missing",
-                fix=f"the columns are {', '.join(_COLUMNS)}", place=place,
+                fix=f"the columns are {', '.join(_COLUMNS)}", place=place
             )  # fmt: skip
         footprint = row.get("footprint") or ""
         given.append(
@@ -291,7 +291,7 @@ def _footprint(path: Path) -> NDArray[np.float64]:
     except (OSError, ValueError) as error:
         raise CalibrationError(
             f"cannot be read: {error}", fix="give a line a row of numbers with commas between",
-            place=str(path),
+            place=str(path)
         ) from error  # fmt: skip
     return shares
 
@@ -336,7 +336,7 @@ def describe_laws(
         "loads": ", ".join(found.loads),
         "sound": f"{values['sound']} of {alive.size} tactels",
         **{title: places(where) for title, where in unsound.items() if where.any()},
-        "fit": f"{found.scatter:.2f} (loads miss the law by so many of their errors)",
+        "fit": f"{found.scatter:.2f} (loads miss the law by so many of their errors)"
     }  # fmt: skip
     for force, median, worst in errors:
         lines[f"at {force:.2g} N"] = (

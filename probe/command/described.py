@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from encoded_objects.base.output import count_of, pairs, write_json
 from encoded_objects.base.sensor_type import SensorType
 from probe.calibration import calibration_hash, read_calibration
-from probe.client.stream import Stream, name_of
+from probe.client.client import Client, name_of
 from probe.command.calibrated import describe_laws
 from probe.port.url import means_port, typed_port
 from probe.recording.read import Recording
@@ -50,23 +50,23 @@ def _describe_probe(url: str, sensor: int | None, seconds: float, sensor_type: s
     peak, heard = 0, False
     shape: tuple[int, ...] = ()
     port, kind = typed_port(url, sensor_type)
-    with Stream(port, sensor=sensor) as stream:
+    with Client(port, sensor=sensor) as client:
         until_s = time.monotonic() + seconds
-        while not stream.ended:
-            for frame in stream.take(0.1):
+        while not client.ended:
+            for frame in client.take(0.1):
                 if not heard:
                     heard, until_s = True, time.monotonic() + seconds
                 peak = max(peak, int(frame.counts.max()))
                 shape = frame.counts.shape
             if heard and time.monotonic() > until_s:
-                stream.client.ask_device()
-                stream.take(_ANSWER_S)
+                client.ask_device()
+                client.take(_ANSWER_S)
                 until_s = time.monotonic() + _ANSWER_S
-                while stream.client.device is None and time.monotonic() < until_s:
+                while client.device is None and time.monotonic() < until_s:
                     time.sleep(0.02)
                 break
-        ident, device = stream.ident(), stream.client.device
-        counts, notices = stream.client.statistics(), stream.client.notices()
+        ident, device = client.wait_for_ident(), client.device
+        counts, notices = client.statistics(), client.notices()
     values = {
         "url": url,
         "sensor": name_of(ident, url),

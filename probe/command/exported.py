@@ -22,14 +22,9 @@ from probe.recording.read import Recording
 def export_files(options: ExportOptions) -> int:
     """Write the files that were asked for; returns the exit code.
 
-    Raises
-    ------
-    RecordingError
-        The recording cannot be read, or has no such frame.
-    CalibrationError, ContactError
-        The calibration is of another sensor; the blur of a pad so high cannot be taken back.
-    EncodedObjectsError
-        A file is there already.
+    Raises RecordingError: the recording cannot be read, or has no such frame; CalibrationError: of
+    another sensor; ContactError: the blur of a pad so high cannot be taken back;
+    EncodedObjectsError: a file is there already.
     """
     csv, npy, png, mcap = options.csv, options.npy, options.png, options.mcap
     outputs = []

@@ -16,7 +16,7 @@ from encoded_objects.base.files import refuse_taken
 from encoded_objects.base.output import message
 from encoded_objects.base.sensor_type import choose_sensor_type
 from probe.calibration.guide import CalibrationGuide
-from probe.client.stream import Stream, name_of
+from probe.client.client import Client, name_of
 from probe.command.calibrated import LoadRecording, board_from, calibrate_loads, write_list
 from probe.command.options import GuideOptions
 from probe.errors import CalibrationError, PortError
@@ -40,15 +40,15 @@ def guide_loads(options: GuideOptions) -> int:
     refuse_taken(folder / LIST, ".csv", replace=options.replace)
     port, kind = typed_port(options.url, options.sensor_type)
     guide = CalibrationGuide(options.forces_n, options.seconds)
-    with Stream(port, sensor=options.sensor) as stream:
-        sensor = name_of(stream.ident(), options.url)
+    with Client(port, sensor=options.sensor) as client:
+        sensor = name_of(client.wait_for_ident(), options.url)
         message(f"{sensor or options.url}; recordings go to {folder}")
         given: list[LoadRecording] = []
         while True:
             while not guide.done:
                 path = folder / f"load-{guide.step}-{guide.newtons:g}N.h5"
                 given.append(LoadRecording(path, guide.newtons))
-                _lead_through_step(guide, stream, options.url)
+                _lead_through_step(guide, client, options.url)
                 kind = choose_sensor_type(kind, "", guide.taken[-1].shape[1:], options.url)
                 with Recorder(path, sensor=sensor, sensor_type=kind, replace=True) as recorder:
                     for frame in guide.frames:
@@ -64,24 +64,24 @@ def guide_loads(options: GuideOptions) -> int:
                 guide.forces_n.append(more_n)
 
 
-def _lead_through_step(guide: CalibrationGuide, stream: Stream, url: str) -> None:
+def _lead_through_step(guide: CalibrationGuide, client: Client, url: str) -> None:
     """Have one load put on, read it, and describe it; again if the operator wants."""
     force, number = guide.newtons, f"{guide.step + 1}/{guide.steps}"
     what = f"put {force:g} N on the whole sensor, evenly" if force else "unload the sensor"
     while True:
         _ask(f"{number}  {what}, then press Enter: ")
-        while stream.take(0.0):
+        while client.take(0.0):
             pass  # what came while the load was put on
         guide.read()
         heard_s = time.monotonic()
         while guide.reading:
-            frames = stream.take(0.1)
+            frames = client.take(0.1)
             guide.take(frames)
             now_s = time.monotonic()
             heard_s = now_s if frames else heard_s
-            for notice in stream.client.notices():
+            for notice in client.notices():
                 message(f"     {notice}")
-            if guide.reading and (stream.ended or now_s - heard_s > _SILENT_S):
+            if guide.reading and (client.ended or now_s - heard_s > _SILENT_S):
                 if not guide.frames:
                     raise PortError("no frame came", fix="see probe-sensor info", place=url)
                 guide.end_step()

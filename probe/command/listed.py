@@ -68,7 +68,7 @@ def list_types(name: str, *, schema: bool, as_json: bool) -> int:
         table.add_row(
             entry["name"], f"{entry['rows']} x {entry['columns']}{missing}",
             f"{entry['pitch_mm']:g}", f"{wide:g} x {high:g}", entry["overlay"],
-            f"{entry['value']}, {entry['bits']} bits", f"{entry['proposed_pitch_mm']:g}",
+            f"{entry['value']}, {entry['bits']} bits", f"{entry['proposed_pitch_mm']:g}"
         )  # fmt: skip
     output.show(table)
     output.write("lengths in mm; symbols: the pitch that a type reads best.  A type of your "

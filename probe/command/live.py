@@ -32,7 +32,7 @@ from encoded_objects.base.console import INTERRUPTED, interruption
 from encoded_objects.base.output import message, write, write_json
 from probe.calibration import read_calibration
 from probe.client import ClientStatistics
-from probe.client.stream import Stream, name_of
+from probe.client.client import Client, name_of
 from probe.command.live_state import LiveState
 from probe.command.options import LiveOptions
 from probe.port.url import typed_port
@@ -63,41 +63,41 @@ def watch(options: LiveOptions) -> int:
     known = None if calibration is None else read_calibration(calibration)
     port, kind = typed_port(url, options.sensor_type)
     state = LiveState(url, options.folder, known, kind)
-    with interruption() as interrupted, Stream(port, sensor=options.sensor) as stream:
+    with interruption() as interrupted, Client(port, sensor=options.sensor) as client:
         try:
             if known is not None and calibration is not None:
-                read_calibration(calibration, sensor=name_of(stream.ident(), url) or None)
+                read_calibration(calibration, sensor=name_of(client.wait_for_ident(), url) or None)
             until_s = time.monotonic() + (float("inf") if seconds is None else seconds)
             if sys.stdout.isatty() and not options.as_json:
-                return _on_terminal(state, stream, interrupted, until_s)
-            return _in_lines(state, stream, interrupted, until_s, as_json=options.as_json)
+                return _on_terminal(state, client, interrupted, until_s)
+            return _in_lines(state, client, interrupted, until_s, as_json=options.as_json)
         finally:
             state.end_recording()
 
 
-def _on_terminal(state: LiveState, stream: Stream, interrupted: Event, until_s: float) -> int:
+def _on_terminal(state: LiveState, client: Client, interrupted: Event, until_s: float) -> int:
     console = Console(highlight=False)
     colours = console.color_system is not None and not console.no_color
     with _keys() as pressed, Live(console=console, screen=True, auto_refresh=False) as view:
-        while not (interrupted.is_set() or stream.ended) and time.monotonic() < until_s:
-            state.take(stream.take(0.0))
-            if notices := stream.client.notices():
+        while not (interrupted.is_set() or client.ended) and time.monotonic() < until_s:
+            state.take(client.take(0.0))
+            if notices := client.notices():
                 state.notice = "; ".join(notices[-3:])
-            counts, ident = stream.client.statistics(), stream.client.ident
+            counts, ident = client.statistics(), client.ident
             height = console.size.height
             picture = render_frame(state, counts, ident, height=height, colours=colours)
             view.update(picture, refresh=True)
-            if not _obey(state, stream, pressed):
+            if not _obey(state, client, pressed):
                 break
     return 0
 
 
-def _obey(state: LiveState, stream: Stream, pressed: KeyReader) -> bool:
+def _obey(state: LiveState, client: Client, pressed: KeyReader) -> bool:
     """Wait for the next picture's time, do what the keys say; False to quit."""
     actions: dict[str, Callable[[], None]] = {
         "b": state.toggle_bias,
         "s": state.save,
-        "r": lambda: state.toggle_recording(name_of(stream.client.ident, state.url)),
+        "r": lambda: state.toggle_recording(name_of(client.ident, state.url)),
     }
     for key in pressed(1 / _PICTURES_HZ):
         if key == "q":
@@ -107,7 +107,7 @@ def _obey(state: LiveState, stream: Stream, pressed: KeyReader) -> bool:
         elif key == "m":
             state.median = not state.median
         elif key in "01234567":
-            stream.client.select_sensor(int(key))
+            client.select_sensor(int(key))
             state.drop_bias()
             state.notice = f"sensor {key}"
         elif key in actions:
@@ -116,24 +116,24 @@ def _obey(state: LiveState, stream: Stream, pressed: KeyReader) -> bool:
 
 
 def _in_lines(
-    state: LiveState, stream: Stream, interrupted: Event, until_s: float, *, as_json: bool
+    state: LiveState, client: Client, interrupted: Event, until_s: float, *, as_json: bool
 ) -> int:
     due_s = time.monotonic() + 1.0
     while True:
-        state.take(stream.take(0.1))
-        for notice in stream.client.notices():
+        state.take(client.take(0.1))
+        for notice in client.notices():
             message(notice)
         now_s = time.monotonic()
-        over = interrupted.is_set() or stream.ended or now_s >= until_s
+        over = interrupted.is_set() or client.ended or now_s >= until_s
         if over or now_s >= due_s:
             due_s += 1.0
-            _report(state, stream, as_json=as_json)
+            _report(state, client, as_json=as_json)
         if over:
             return INTERRUPTED if interrupted.is_set() else 0
 
 
-def _report(state: LiveState, stream: Stream, *, as_json: bool) -> None:
-    counts, image = stream.client.statistics(), state.image()
+def _report(state: LiveState, client: Client, *, as_json: bool) -> None:
+    counts, image = client.statistics(), state.image()
     if as_json:
         values = {
             "seq": None if state.frame is None else state.frame.seq,

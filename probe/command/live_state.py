@@ -113,7 +113,7 @@ class LiveState:
         self.recorder = Recorder(
             path, sensor=sensor, sensor_type=self.sensor,
             calibration=calibration_hash(known) if known else "",
-            attributes={"url": self.url},
+            attributes={"url": self.url}
         )  # fmt: skip
         self.notice = f"recording {path.name}"
 

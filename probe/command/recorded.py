@@ -22,7 +22,7 @@ from encoded_objects.base.output import (
 )
 from encoded_objects.base.sensor_type import choose_sensor_type
 from probe.calibration import Calibration, calibration_hash, read_calibration
-from probe.client.stream import Stream, name_of
+from probe.client.client import Client, name_of
 from probe.command.options import RecordOptions
 from probe.errors import PortError, RecordingError
 from probe.frame import Frame
@@ -38,25 +38,20 @@ _SILENT_S = 5.0  #: without a frame for so long, the host's clock ends a recordi
 def record_port(options: RecordOptions) -> int:
     """Record a port; returns the exit code.
 
-    Raises
-    ------
-    PortError
-        The probe is not there, or went away for good; then the file holds the frames that came.
-    RecordingError
-        The file cannot be written.
-    CalibrationError, SensorTypeError
-        The calibration or the type is none, or of another sensor.
+    Raises PortError: the probe is not there, or went away for good (then the file holds the frames
+    that came); RecordingError: the file cannot be written; CalibrationError, SensorTypeError: none,
+    or of another sensor.
     """
     url, calibration = options.url, options.calibration
     check_output(options.output, replace=options.replace)
     known = None if calibration is None else read_calibration(calibration)
     total = options.seconds if options.frames is None else options.frames
     port, kind = typed_port(url, options.sensor_type)
-    stream = Stream(port, sensor=options.sensor, bits=options.bits)
-    with interruption() as interrupted, stream:
+    client = Client(port, sensor=options.sensor, bits=options.bits)
+    with interruption() as interrupted, client:
         first: list[Frame] = []
-        while not (first or stream.ended or interrupted.is_set()):
-            first = stream.take(_SLICE_S)
+        while not (first or client.ended or interrupted.is_set()):
+            first = client.take(_SLICE_S)
         if not first:
             if interrupted.is_set():
                 message("\nprobe-sensor: interrupted; nothing was recorded")
@@ -65,21 +60,21 @@ def record_port(options: RecordOptions) -> int:
                             place=url)  # fmt: skip
         rows, columns = first[0].counts.shape
         kind = choose_sensor_type(kind, "", (rows, columns), url)
-        name = _sensor(stream, url, known, calibration)
+        name = _sensor(client, url, known, calibration)
         recorder = Recorder(
             options.output, sensor=name, sensor_type=kind,
             calibration=calibration_hash(known) if known else "",
-            attributes={"url": url}, replace=options.replace,
+            attributes={"url": url}, replace=options.replace
         )  # fmt: skip
         try:
             with recorder, progress_bar("recording", total) as bar:
-                ended, seconds = _run(stream, recorder, first, options, interrupted, bar)
+                ended, seconds = _run(client, recorder, first, options, interrupted, bar)
         except EncodedObjectsError:
             files = ", ".join(map(str, recorder.files))
             kept = count_of(recorder.frames, "frame")
             message(f"{files} is complete and holds {kept}")
             raise
-        result = _result(stream, recorder, name, ended, seconds)
+        result = _result(client, recorder, name, ended, seconds)
     _say(result, options.as_json)
     return INTERRUPTED if ended == "interrupted" and total is not None else 0
 
@@ -95,16 +90,16 @@ def check_output(output: Path, *, replace: bool) -> None:
         raise
 
 
-def _sensor(stream: Stream, url: str, known: Calibration | None, calibration: Path | None) -> str:
+def _sensor(client: Client, url: str, known: Calibration | None, calibration: Path | None) -> str:
     """Return the sensor's name; refuse a calibration of another one."""
-    name = name_of(stream.ident(), url)
+    name = name_of(client.wait_for_ident(), url)
     if known is not None and calibration is not None and name and known.sensor != name:
         read_calibration(calibration, sensor=name)
     return name
 
 
 def _run(
-    stream: Stream,
+    client: Client,
     recorder: Recorder,
     frames: list[Frame],
     options: RecordOptions,
@@ -124,7 +119,7 @@ def _run(
             recorder.append(frame)
             last_ns = frame.t_ns
         seconds = (last_ns - began_ns) * 1e-9
-        _show_progress(stream, bar, recorder.frames, seconds if limit is None else None)
+        _show_progress(client, bar, recorder.frames, seconds if limit is None else None)
         now_s = time.monotonic()
         heard_s = now_s if frames else heard_s
         silent = limit_s is not None and now_s - heard_s > _SILENT_S
@@ -132,30 +127,30 @@ def _run(
             ended = "frames"
         elif interrupted.is_set():
             ended = "interrupted"
-        elif stream.ended:
+        elif client.ended:
             ended = "end"
         elif silent and now_s - began_s > (limit_s or 0.0):
             ended = "silence"
         elif not ended:
             if not frames:
                 recorder.flush()
-            frames = stream.take(_SLICE_S)
+            frames = client.take(_SLICE_S)
     return ended, seconds
 
 
-def _show_progress(stream: Stream, bar: ProgressBar, frames: int, seconds: float | None) -> None:
+def _show_progress(client: Client, bar: ProgressBar, frames: int, seconds: float | None) -> None:
     """Show counts and notices; the bar runs by seconds, or by frames if None."""
-    for notice in stream.client.notices():
+    for notice in client.notices():
         bar.say(notice)
-    counts = stream.client.statistics()
+    counts = client.statistics()
     text = f"{frames:,} frames  {counts.rate:5.1f}/s  lost {counts.lost}  failed {counts.failed}"
     bar.show(frames if seconds is None else seconds, text)
 
 
 def _result(
-    stream: Stream, recorder: Recorder, name: str, ended: str, seconds: float
+    client: Client, recorder: Recorder, name: str, ended: str, seconds: float
 ) -> dict[str, Any]:
-    counts = asdict(stream.client.statistics())
+    counts = asdict(client.statistics())
     del counts["frames"], counts["rate"]
     return {
         "files": [str(file) for file in recorder.files],
@@ -187,10 +182,10 @@ def _say(result: dict[str, Any], as_json: bool) -> None:
 
 def pipe_frames(url: str, *, as_json: bool) -> int:
     """Write the frames of a port to stdout, a line each; returns the exit code."""
-    with interruption() as interrupted, Stream(url) as stream:
+    with interruption() as interrupted, Client(url) as client:
         first = True
-        while not stream.ended and not interrupted.is_set():
-            frames = stream.take(0.1)
+        while not client.ended and not interrupted.is_set():
+            frames = client.take(0.1)
             if frames and first and not as_json:
                 rows, columns = frames[0].counts.shape
                 sys.stdout.write(",".join(table_header((rows, columns))) + "\n")

@@ -32,11 +32,11 @@ def simulate_touches(options: SimulateOptions) -> int:
     _check_outputs(options)
     touches = TouchOptions(
         options.x, options.y, options.theta, options.force, options.tilt_x, options.tilt_y,
-        options.touches, options.frames, options.seed, cast("ScanKind | None", options.scan),
+        options.touches, options.frames, options.seed, cast("ScanKind | None", options.scan)
     )  # fmt: skip
     probe = SimulatedProbe(
         options.target, touches, sensor_type=options.sensor_type, overlay=options.overlay,
-        accuracy=options.accuracy, noise="quiet" if options.noise == "quiet" else "typical",
+        accuracy=options.accuracy, noise="quiet" if options.noise == "quiet" else "typical"
     )  # fmt: skip
     number = len(probe)
     kept: list[dict[str, Any]] = []
@@ -102,7 +102,7 @@ def _say(
         write_json(summary | {
             "touches": len(kept), "frames": len(kept) * result["frames_per_touch"],
             "first": kept[0] | {"peak_counts": first.frames[0].counts.max()},
-            "written": written,
+            "written": written
         })  # fmt: skip
         return
     what = "/".join(part for part in (result["object"], result["face"]) if part)

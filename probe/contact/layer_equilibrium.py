@@ -7,46 +7,30 @@ A cell i with pressure p_i meets levels k with shares w_k of its bell and depths
     q_k = (h_k - R b - u_i)/D >= 0,   p_i = sum_k w_k q_k,   u = (C - D) p,   R = [1, y, -x],
 
 b = (z, tilt_x, tilt_y) is the plate, C the compliance between cells. A cell of which a share c
-is in touch has then D (1/c - 1) more compliance than a full one: this is how strokes thinner
-than a cell, slopes and flanks count. It is the minimum of a strictly convex quadratic
-function of q >= 0, since C is positive definite, also at nu = 1/2, with the balance of the plate
+is in touch has D (1/c - 1) more compliance than a full one: this is how strokes thinner than a
+cell, slopes and flanks count. It is the minimum of a strictly convex quadratic function of q >= 0
+with the balance of the plate, dA sum R p = (F, 0, 0) + K (b - b_0).
 
-    dA sum R p = (F, 0, 0) + K (b - b_0).
-
-`equilibrium` is a semismooth Newton method: each step solves for all cells in touch and the plate
-at once; levels with q < 0 leave, levels that would be run through enter. Only cells in touch are
-unknowns. For a given set the conditions are linear: where a share c of a cell is in touch at mean
-depth h, with A = C + D (1/c - 1) on the cells in touch,
+`equilibrium` is a semismooth Newton method [1]: each step solves for all cells in touch and the
+plate at once; levels with q < 0 leave, levels that would be run through enter. For a given set,
+where a share c of a cell is in touch at mean depth h, with A = C + D (1/c - 1),
 
     [ A    R ] [p]   [h]
     [ R'  -K ] [b] = [f - K b_0],    f = (F, 0, 0), K and f over the area of a cell,
 
-solved by conjugate gradients on pressures that keep the plate in balance (the diagonal of A
-with the rows of the plate as preconditioner): some ten products with C for four digits,
-whatever nu, since C on cells in touch is well conditioned (<= 36 for h = .1 ... 20, nu up to 1/2).
+solved by conjugate gradients on pressures that keep the plate in balance [2] (the diagonal of A
+with the rows of the plate as preconditioner): some ten products with C for four digits, since C on
+cells in touch is well conditioned (<= 36 for h = .1 ... 20, nu up to 1/2).
 
 A set that comes back ends it (some 1 % of scenes at random, with tiny forces on weak wrists), and
-`descend`, which always ends, takes over. It needs no matrix. Two convex problems, one in the other:
-
-- the plate held fast, the levels' spring compressions f = D q >= 0 are the
-  minimum of a strictly convex quadratic function: conjugate gradients on the levels in touch,
-  projected steps where the set changes; the pad acts by its fast Fourier transform;
-- the plate's energy is convex with a continuous gradient in its three unknowns: Newton's
-  step, halved while the energy rises along it. The three columns of its matrix are conjugate
-  gradients on the cells in touch.
-
+`descend`, which always ends, takes over: with the plate held fast, the levels' spring compressions
+f = D q >= 0 are found by projected conjugate gradients [3], a proven variant of [4]; the plate's
+energy is convex with a continuous gradient: Newton's step, halved while the energy rises along it.
 mm, N, MPa, rad; the turns are scaled by the matrix's reach.
 
-References
-----------
-M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set strategy as a semismooth
-Newton method", SIAM J. Optim. 13 (2002) 865-888.
-N. Gould, M. Hribar, J. Nocedal, "On the solution of equality constrained quadratic programming
-problems arising in optimization", SIAM J. Sci. Comput. 23 (2001) 1376-1395.
-Z. Dostal, J. Schoeberl, "Minimizing quadratic functions subject to bound constraints with the
-rate of convergence and finite termination", Comput. Optim. Appl. 30 (2005) 23-43.
-I. A. Polonsky, L. M. Keer, "A numerical method for solving rough contact problems", Wear 231
-(1999) 206-219: the projected conjugate gradients of which `descend` is the variant with a proof.
+[1] M. Hintermueller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002) 865-888. [2] N. Gould, M. Hribar,
+J. Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376-1395. [3] Z. Dostal, J. Schoeberl, Comput. Optim.
+Appl. 30 (2005) 23-43. [4] I. A. Polonsky, L. M. Keer, Wear 231 (1999) 206-219.
 """
 
 from __future__ import annotations
@@ -276,25 +260,13 @@ def solve_pressures(system: ContactSystem, rhs: Array, tolerance: float) -> Arra
 
     `tolerance` is the residual of each column, of its length.
     """
-    diagonal = system.diagonal
-    found = np.empty_like(rhs)
-    for column in range(rhs.shape[1]):
-        r = rhs[:, column].copy()
-        x, d, before = np.zeros(len(r)), np.zeros(len(r)), 1.0
-        enough = tolerance**2 * float(r @ r)
-        for _ in range(MOST_PRODUCTS):
-            if float(r @ r) <= enough:
-                break
-            z = r / diagonal
-            rz = float(r @ z)
-            d = z + (rz / before) * d
-            Ad = system.product(d)
-            step = rz / float(d @ Ad)
-            x += step * d
-            r -= step * Ad
-            before = rz
-        found[:, column] = x
-    return found
+    from scipy.sparse.linalg import LinearOperator, cg
+
+    shape, diagonal = (len(rhs), len(rhs)), system.diagonal
+    A = LinearOperator(shape, system.product, dtype=np.float64)
+    M = LinearOperator(shape, lambda r: r / diagonal, dtype=np.float64)
+    columns = [cg(A, b, rtol=tolerance, maxiter=MOST_PRODUCTS, M=M)[0] for b in rhs.T]
+    return np.column_stack(columns)
 
 
 def pseudo_inverse(system: Array) -> Array:

@@ -48,20 +48,10 @@ def frames_picture(
     azimuth_deg: float = -60.0,
     elevation_deg: float = 40.0,
 ) -> None:
-    """Draw images below each other, each from above and as a surface.
+    """Draw images (rows, columns) below each other, each from above and as a surface.
 
-    Parameters
-    ----------
-    images
-        Titles, and (rows, columns) readings, row 0 on top.
-    path
-        PNG to write.
-    unit
-        counts, N, or what else the readings are.
-    sensor
-        Whose images they are; the 16x16 matrix of the thesis by default.
-    azimuth_deg, elevation_deg
-        From where the surfaces are seen.
+    `images` holds them by title, `path` is the PNG. Their unit is counts, N, or another; `sensor`
+    is that of the thesis by default; the angles say from where the surfaces are seen.
     """
     matrix = sensor or SensorType()
     half_x, half_y = matrix.half_mm
@@ -96,7 +86,7 @@ def _surface(
     colours = ScalarMappable(heat, HEAT).to_rgba(patches)
     axes.plot_surface(
         centres[..., 0], centres[..., 1], values, rstride=1, cstride=1, facecolors=colours,
-        edgecolor=(0.1, 0.1, 0.1, 0.5), linewidth=0.3, shade=False,
+        edgecolor=(0.1, 0.1, 0.1, 0.5), linewidth=0.3, shade=False
     )  # fmt: skip
     axes.view_init(elev=seen_from_deg[1], azim=seen_from_deg[0])
     axes.set_zlim(heat.vmin, heat.vmax)

@@ -45,16 +45,9 @@ def touch_picture(
     *,
     title: str = "",
 ) -> None:
-    """Draw the patch of a surface under a sensor, the force on it, and its readings.
+    """Draw the patch of a surface under a sensor, the force (N) on it, and its readings.
 
-    Parameters
-    ----------
-    surface, sensor, touch
-        The surface, the sensor, and where it stands.
-    forces_n, counts
-        (rows, columns) N on each tactel, and its readings.
-    path, title
-        PNG to write, and its title.
+    Forces and counts are (rows, columns); the picture is a PNG.
     """
     forces, readings = np.asarray(forces_n, np.float64), np.asarray(counts, np.float64)
     with page(path, 1440, 430) as figure:

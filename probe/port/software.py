@@ -65,14 +65,8 @@ def endless_frames(opened: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
 class SoftwareProbe(CommandedProbe):
     """A `Port` to a probe that sends given frames.
 
-    Parameters
-    ----------
-    url, ident
-        Of a `CommandedProbe`; with `bits` 10, it obeys the commands for 8 and 10 bits.
-    frames
-        In order; their times say when they leave, their numbers are sent.
-    speed
-        1: in real time; 0: as fast as it is read.
+    Their times say when they leave, their numbers are sent; at `speed` 1 in real time, at 0 as fast
+    as they are read. With `bits` 10 in its ident, it obeys the commands for 8 and 10 bits.
     """
 
     def __init__(

@@ -74,11 +74,8 @@ def typed_port(url: str, asked: str = "") -> tuple[str, SensorType | None]:
     """Return the URL that opens a port with a type of sensor, and the type if it is known.
 
     A recording names its own; a simulated probe has the one of its option; `flexitac:` has one. The
-    type behind a serial line is known by its first frame alone. `asked` is a name or a file, as
-    `--sensor-type` gives it; empty: as the port tells.
-
-    Raises PortError: the URL is none; RecordingError: of a recording that cannot be read;
-    SensorTypeError: no such type, or one of another shape than the recording's images.
+    type behind a serial line is known by its first frame alone. `asked` is that of `--sensor-type`.
+    Raises PortError, RecordingError, SensorTypeError.
     """
     address = address_of(url)
     if address.scheme == "file":

@@ -164,21 +164,11 @@ def check_name(path: Path, *, replace: bool) -> None:
 def final_name(
     part: Path, path: Path, number: int = 1, *, last: bool = True, replace: bool
 ) -> Path:
-    """Give a closed file its name, and return that.
+    """Give the closed file `part` its name in the recording `path`, and return that.
 
-    Parameters
-    ----------
-    part, path
-        The closed file, and the name that was asked for.
-    number, last
-        Of the file in its recording, from 1, and whether the recording ends with it.
-    replace
-        Remove the files of an older recording of that name.
-
-    Raises
-    ------
-    RecordingError
-        Another file has got that name meanwhile; the closed file stays.
+    `number` is its place there, from 1, and `last` tells that the recording ends with it; `replace`
+    removes the files of an older recording. Raises RecordingError: another file has got that name
+    meanwhile; the closed file stays.
     """
     final = path if last and number == 1 else piece_of(path, number)
     if final.exists() and not replace:

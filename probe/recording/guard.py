@@ -56,14 +56,8 @@ def open_hdf5(
 ) -> Iterator[tuple[h5py.File, Superblock]]:
     """Open an HDF5 file for reading; gives its superblock too.
 
-    Parameters
-    ----------
-    path
-        The file.
-    live
-        Also one that its writer left open: the values that were flushed are read.
-    damaged
-        In whatever state, if the library can; parts may be missing.
+    `live`: also one that its writer left open, the values that were flushed are read; `damaged`: in
+    whatever state, if the library can, parts may be missing.
 
     Raises
     ------
@@ -174,15 +168,9 @@ class PaddedFile(io.RawIOBase):
 def check_file(file: h5py.File, path: Path) -> list[h5py.h5d.DatasetID]:
     """Check an open HDF5 file before anything in it is read.
 
-    Returns datasets to be kept open as long as the file: so their large chunks are not unpacked
-    again for every block.
-
-    Raises
-    ------
-    RecordingError
-        It leads to another file, or claims more values than it can hold.
-    RuntimeError, ValueError
-        It is damaged.
+    Returns datasets to be kept open as long as the file: their large chunks are then unpacked once.
+    Raises RecordingError: it leads to another file, or claims more values than it can hold;
+    RuntimeError, ValueError: it is damaged.
     """
     import h5py
 

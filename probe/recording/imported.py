@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import csv
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,14 +45,6 @@ _AT_ONCE: Final = 1024  #: images read at a time
 _FULL: Final = 65535  #: counts
 
 
-@dataclass(frozen=True, slots=True)
-class Scale:
-    """How values become counts: value = offset + scale * count."""
-
-    offset: float
-    scale: float
-
-
 def import_array(
     path: Path | str,
     out: Path | str,
@@ -71,18 +63,14 @@ def import_array(
         A .npy, .npz, .mat or HDF5 file with an array (N, rows, columns), (rows, columns, N) or
         (rows, columns), the first axis taken for time where both would do; a table (.csv) or a
         folder of pictures.
-    out
-        The recording to be made.
+    out, replace
+        The recording to be made, also in place of an older one.
     dataset
         Which array, when there are several.
     rate_hz
         Frames per second; the array does not tell.
-    sensor
-        What the recording shall say about its origin.
-    sensor_type
-        A type, its name or file: whose images they are; `fsr-16` if not given.
-    replace
-        Let it take the place of an older recording of that name.
+    sensor, sensor_type
+        Whose images they are: the name to be kept, and a type, its name or file; `fsr-16`.
 
     Raises
     ------
@@ -100,15 +88,52 @@ def import_array(
         scale = _scale(path, found, kind)
         more: dict[str, Any] = {"imported_from": path.name, "imported_array": found.name}
         if scale:
-            more |= {"scale": scale.scale, "scale_offset": scale.offset}
-        units = "counts" if scale is None or scale.scale == kind.unit else "scaled"
+            more |= {"scale": scale[1], "scale_offset": scale[0]}
+        units = "counts" if scale is None or scale[1] == kind.unit else "scaled"
         origin = RecordingOrigin(sensor, "", units, sensor_type_text(kind), MappingProxyType(more))
-        blocks = (
-            _block(images, first, scale, 1e9 / rate_hz)
-            for first, images in _images(found, kind.shape)
-        )
+        images = _images(path, found, kind.shape)
+        blocks = (_block(part, first, scale, 1e9 / rate_hz) for first, part in images)
         write_recording(out, origin, blocks, replace=replace)
     return Recording(out)
+
+
+@dataclass(frozen=True, slots=True)
+class FileArray:
+    """An array in a file, read a block at a time."""
+
+    name: str
+    values: Any  #: an ndarray, or a dataset of HDF5
+    reverse: bool = False  #: its axes stand in the order of MATLAB
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The axes in the order of the programme that wrote it."""
+        shape = tuple(map(int, self.values.shape))
+        return shape[::-1] if self.reverse else shape
+
+    def frames(self, image: tuple[int, int]) -> int | None:
+        """Return how many images of that shape it holds; None if it holds other things."""
+        shape = self.shape
+        if self.values.dtype.kind not in "biuf":
+            return None
+        if shape == image:
+            return 1
+        if len(shape) != 3 or image not in (shape[1:], shape[:2]):
+            return None
+        return shape[0] if shape[1:] == image else shape[2]
+
+    def images(self, image: tuple[int, int], start: int, stop: int) -> NDArray[Any]:
+        """Return images `start` ... `stop` - 1, (n, rows, columns)."""
+        everything, time = slice(None), slice(start, stop)
+        if self.shape == image:
+            return self._read(everything, everything)[None][time]
+        if self.shape[1:] == image:
+            return self._read(time, everything, everything)
+        return np.moveaxis(self._read(everything, everything, time), 2, 0)
+
+    def _read(self, *slices: slice) -> NDArray[Any]:
+        read: NDArray[Any] = self.values[slices[::-1] if self.reverse else slices]
+        return read.T if self.reverse else read
 
 
 @contextmanager
@@ -128,7 +153,7 @@ def _arrays_at(path: Path, image: tuple[int, int]) -> Iterator[list[FileArray]]:
         yield _matlab_arrays(path)
     else:
         with open_hdf5(path) as (hdf5, _):
-            yield _hdf5_arrays(hdf5)
+            yield _hdf5_arrays(path, hdf5)
 
 
 def _choose_array(
@@ -159,16 +184,20 @@ def _types_of(arrays: list[FileArray]) -> str:
     return " or ".join(alike) or "whose images they are"
 
 
-def _images(found: FileArray, image: tuple[int, int]) -> Iterator[tuple[int, NDArray[Any]]]:
+def _images(
+    path: Path, found: FileArray, image: tuple[int, int]
+) -> Iterator[tuple[int, NDArray[Any]]]:
     frames = found.frames(image) or 0
     for first in range(0, frames, _AT_ONCE):
-        yield first, found.images(image, first, min(first + _AT_ONCE, frames))
+        with explain_errors(path, "read"):
+            images = found.images(image, first, min(first + _AT_ONCE, frames))
+        yield first, images
 
 
-def _scale(path: Path, found: FileArray, kind: SensorType) -> Scale | None:
-    """Return how the values become counts; None if they are counts."""
+def _scale(path: Path, found: FileArray, kind: SensorType) -> tuple[float, float] | None:
+    """Return how counts become values, value = offset + scale * count; None if they are counts."""
     least, most, whole = 0.0, 0.0, True
-    for first, images in _images(found, kind.shape):
+    for first, images in _images(path, found, kind.shape):
         bad = ~np.isfinite(images)
         if bad.any():
             raise RecordingError(
@@ -182,7 +211,7 @@ def _scale(path: Path, found: FileArray, kind: SensorType) -> Scale | None:
     if whole and least >= 0 and most <= _FULL:
         return None
     if kind.value != "counts" and most <= _FULL * kind.unit:
-        return Scale(0.0, kind.unit)
+        return 0.0, kind.unit
     scale = most / _FULL - least / _FULL
     if scale < np.finfo(np.float64).tiny:
         raise RecordingError(
@@ -190,12 +219,14 @@ def _scale(path: Path, found: FileArray, kind: SensorType) -> Scale | None:
             fix="multiply the values by a power of ten",
             place=str(path),
         )
-    return Scale(least, scale)
+    return least, scale
 
 
-def _block(images: NDArray[Any], first: int, scale: Scale | None, period_ns: float) -> FrameBlock:
+def _block(
+    images: NDArray[Any], first: int, scale: tuple[float, float] | None, period_ns: float
+) -> FrameBlock:
     if scale:
-        images = np.rint(images / scale.scale - scale.offset / scale.scale).clip(0, _FULL)
+        images = np.rint(images / scale[1] - scale[0] / scale[1]).clip(0, _FULL)
     number = np.arange(first, first + len(images))
     return FrameBlock(
         images.astype(np.uint16),
@@ -206,44 +237,14 @@ def _block(images: NDArray[Any], first: int, scale: Scale | None, period_ns: flo
     )
 
 
-@dataclass(frozen=True, slots=True)
-class FileArray:
-    """An array in a file, read a block at a time."""
-
-    name: str
-    shape: tuple[int, ...]  #: with the axes in the order of the programme that wrote it
-    dtype: np.dtype[Any]
-    part: Callable[[tuple[slice, ...]], NDArray[Any]]  #: reads these slices
-
-    def frames(self, image: tuple[int, int]) -> int | None:
-        """Return how many images of that shape it holds; None if it holds other things."""
-        if self.dtype.kind not in "biuf":
-            return None
-        if self.shape == image:
-            return 1
-        if len(self.shape) == 3 and self.shape[1:] == image:
-            return self.shape[0]
-        if len(self.shape) == 3 and self.shape[:2] == image:
-            return self.shape[2]
-        return None
-
-    def images(self, image: tuple[int, int], start: int, stop: int) -> NDArray[Any]:
-        """Return images `start` ... `stop` - 1, (n, rows, columns)."""
-        if self.shape == image:
-            return self.part((slice(None), slice(None)))[None][start:stop]
-        if self.shape[1:] == image:
-            return self.part((slice(start, stop), slice(None), slice(None)))
-        return np.moveaxis(self.part((slice(None), slice(None), slice(start, stop))), 2, 0)
-
-
 def _numpy_arrays(path: Path) -> list[FileArray]:
     try:
         with explain_errors(path, "read"):
             loaded = np.load(path, mmap_mode="r", allow_pickle=False)
             if isinstance(loaded, np.ndarray):
-                return [_in_memory(path.stem, loaded)]
+                return [FileArray(path.stem, loaded)]
             with loaded:
-                return [_in_memory(name, loaded[name]) for name in loaded.files]
+                return [FileArray(name, loaded[name]) for name in loaded.files]
     except RecordingError as error:
         if not isinstance(error.__cause__, ValueError):
             raise
@@ -266,57 +267,35 @@ def _matlab_arrays(path: Path) -> list[FileArray]:
             "it is no MATLAB file, or it is damaged", fix="save it again", place=str(path)
         ) from error
     return [
-        _in_memory(name, array)
+        FileArray(name, array)
         for name, array in variables.items()
         if isinstance(array, np.ndarray) and not name.startswith("__")
     ]
 
 
-def _in_memory(name: str, array: NDArray[Any]) -> FileArray:
-    return FileArray(name, array.shape, array.dtype, lambda part: array[part])
-
-
-def _hdf5_arrays(file: h5py.File) -> list[FileArray]:
+def _hdf5_arrays(path: Path, file: h5py.File) -> list[FileArray]:
     import h5py
 
     found: list[FileArray] = []
 
     def note(name: str, item: object) -> None:
         if isinstance(item, h5py.Dataset) and item.shape is not None:
-            found.append(_dataset(name, item))
+            found.append(FileArray(name, item, "MATLAB_class" in item.attrs))
 
-    with explain_errors(Path(file.filename), "read"):
+    with explain_errors(path, "read"):
         file.visititems(note)
     return found
 
 
-def _dataset(name: str, dataset: h5py.Dataset) -> FileArray:
-    reverse = "MATLAB_class" in dataset.attrs
-    shape = dataset.shape[::-1] if reverse else dataset.shape
-
-    def part(slices: tuple[slice, ...]) -> NDArray[Any]:
-        with explain_errors(Path(dataset.file.filename), "read"):
-            read: NDArray[Any] = dataset[slices[::-1]].T if reverse else dataset[slices]
-        return read
-
-    return FileArray(name, tuple(map(int, shape)), dataset.dtype, part)
-
-
 def _folder_array(folder: Path, image: tuple[int, int]) -> FileArray:
-    """Return the pictures of a folder as one array; each is read when it is asked for."""
+    """Return the pictures of a folder as one array."""
     with explain_errors(folder, "read"):
         paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
     if not paths:
         raise RecordingError(
             "no picture in the folder", fix=f"put {', '.join(SUFFIXES)} there", place=str(folder)
         )
-    for path in paths:
-        _picture(path, image)
-
-    def part(slices: tuple[slice, ...]) -> NDArray[Any]:
-        return np.stack([_picture(path, image) for path in paths[slices[0]]])[:, *slices[1:]]
-
-    return FileArray(folder.name, (len(paths), *image), np.dtype(np.float64), part)
+    return FileArray(folder.name, np.stack([_picture(path, image) for path in paths]))
 
 
 def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
@@ -346,7 +325,7 @@ def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
             fix=f"write {rows * columns_} numbers a line, or give the --sensor-type",
             place=str(path),
         )
-    return FileArray(path.stem, values.shape, values.dtype, lambda slices: values[slices])
+    return FileArray(path.stem, values)
 
 
 def _picture(path: Path, image: tuple[int, int]) -> NDArray[np.float64]:
@@ -370,14 +349,6 @@ def _picture(path: Path, image: tuple[int, int]) -> NDArray[np.float64]:
     return values.astype(np.float64)
 
 
-def _are_numbers(cells: list[str]) -> bool:
-    try:
-        [float(cell) for cell in cells]
-    except ValueError:
-        return False
-    return True
-
-
 def _numbers(path: Path, lines: list[list[str]], headed: bool) -> NDArray[np.float64]:
     width = len(lines[0]) if lines else 0
     for number, line in enumerate(lines, 2 if headed else 1):
@@ -389,4 +360,12 @@ def _numbers(path: Path, lines: list[list[str]], headed: bool) -> NDArray[np.flo
             )
     if not lines:
         raise RecordingError("it holds no numbers", fix="write an image a line", place=str(path))
-    return np.array([[float(cell) for cell in line] for line in lines])
+    return np.array(lines, np.float64)
+
+
+def _are_numbers(cells: list[str]) -> bool:
+    try:
+        np.array(cells, np.float64)
+    except ValueError:
+        return False
+    return True

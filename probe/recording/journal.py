@@ -200,7 +200,7 @@ def _make_file(path: Path) -> int:
 def _record_type(shape: tuple[int, int]) -> np.dtype[Any]:
     return np.dtype([
         ("counts", "<u2", shape), ("wrist", "<u2", WRIST), ("t_ns", "<i8"), ("seq", "<i8"),
-        ("pose", "<f8", (4, 4)), ("crc", "<u4"),
+        ("pose", "<f8", (4, 4)), ("crc", "<u4")
     ])  # fmt: skip
 
 

@@ -118,21 +118,11 @@ def export_mcap(recording: Recording, out: Path) -> int:
 def import_mcap(
     path: Path, out: Path, *, sensor_type: SensorType | str = "", replace: bool = False
 ) -> Recording:
-    """Make a recording of an MCAP file.
+    """Make a recording of an MCAP file; `replace` an older one of that name if asked.
 
-    Parameters
-    ----------
-    path, out
-        The file, and the recording to be made.
-    sensor_type
-        A type, its name or file: whose images they are, where the file does not tell.
-    replace
-        Let it take the place of an older recording of that name.
-
-    Raises
-    ------
-    RecordingError
-        No MCAP file, no images in it, or images that are none of a touch; a name that is taken.
+    `sensor_type` (name or file) is that of the images, where the file does not tell. Raises
+    RecordingError: no MCAP file, no images in it, or images that are none of a touch; a name that
+    is taken.
     """
     check_name(out, replace=replace)
     origin, frames = _read_mcap(path)
@@ -158,13 +148,13 @@ def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
                 there = ", ".join(sorted(set(kinds.values()))) or "nothing"
                 raise RecordingError(
                     f"no {IMAGE} in it, but {there}", fix="record the tactile image too",
-                    place=str(path),
+                    place=str(path)
                 )  # fmt: skip
             said = {one.name: one.metadata for one in reader.iter_metadata()}.get(METADATA, {})
     except McapError as error:
         raise RecordingError(
             f"this is no MCAP file ({type(error).__name__})", fix="give a file of ROS 2 messages",
-            place=str(path),
+            place=str(path)
         ) from error  # fmt: skip
     try:
         more = json.loads(said.get("more", "{}"))
@@ -172,7 +162,7 @@ def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
         more = {}
     origin = RecordingOrigin(
         said.get("sensor", ""), said.get("calibration", ""), said.get("units", "counts"),
-        said.get("sensor_type", ""), MappingProxyType(dict(more)),
+        said.get("sensor_type", ""), MappingProxyType(dict(more))
     )  # fmt: skip
     return origin, _frames(path)
 
@@ -183,7 +173,7 @@ def _blocks(frames: Iterator[Frame], path: Path) -> Iterator[FrameBlock]:
         if odd:
             raise RecordingError(
                 f"images of {some[0].counts.shape} and of {odd[0].counts.shape} readings",
-                fix="keep the images of one sensor in a file", place=str(path),
+                fix="keep the images of one sensor in a file", place=str(path)
             )  # fmt: skip
         yield block_of(some)
 
@@ -232,7 +222,7 @@ def _messages(path: Path, kinds: Collection[str]) -> Iterator[tuple[str, Any]]:
         except McapError as error:
             raise RecordingError(
                 f"it is damaged ({type(error).__name__}: {error})",
-                fix="mend it with `mcap recover`", place=str(path),
+                fix="mend it with `mcap recover`", place=str(path)
             ) from error  # fmt: skip
 
 
@@ -263,14 +253,14 @@ def _counts(image: Any, number: int, path: Path) -> NDArray[Any]:
     if kind is None:
         raise RecordingError(
             f"image {number} is encoded as {image.encoding}",
-            fix=f"take {', '.join(_ENCODINGS)}", place=str(path),
+            fix=f"take {', '.join(_ENCODINGS)}", place=str(path)
         )  # fmt: skip
     order = ">" if image.is_bigendian else "<"
     rows = np.frombuffer(bytes(image.data), np.uint8)
     if rows.size != image.height * image.step or image.step < image.width * int(kind[1]):
         raise RecordingError(
             f"image {number} has {rows.size} bytes, not {image.height} rows of {image.step}",
-            fix="write its step and height as they are", place=str(path),
+            fix="write its step and height as they are", place=str(path)
         )  # fmt: skip
     plain = rows.reshape(image.height, image.step)[:, : image.width * int(kind[1])]
     return np.ascontiguousarray(plain).view(order + kind)

@@ -77,7 +77,7 @@ DEFINITIONS: Final[dict[str, str]] = {
 }
 
 _HEADER_FIELDS: Final = (
-    ("header.stamp.sec", "i"), ("header.stamp.nanosec", "I"), ("header.frame_id", "string"),
+    ("header.stamp.sec", "i"), ("header.stamp.nanosec", "I"), ("header.frame_id", "string")
 )  # fmt: skip
 _POSE_FIELDS: Final = tuple((f"pose.pose.position.{name}", "d") for name in "xyz") + tuple(
     (f"pose.pose.orientation.{name}", "d") for name in "xyzw"
@@ -86,9 +86,9 @@ _POSE_FIELDS: Final = tuple((f"pose.pose.position.{name}", "d") for name in "xyz
 FIELDS: Final[dict[str, tuple[tuple[str, str], ...]]] = {
     IMAGE: (
         *_HEADER_FIELDS, ("height", "I"), ("width", "I"), ("encoding", "string"),
-        ("is_bigendian", "B"), ("step", "I"), ("data", "bytes"),
+        ("is_bigendian", "B"), ("step", "I"), ("data", "bytes")
     ),
-    POSE_WITH_COVARIANCE: (*_HEADER_FIELDS, *_POSE_FIELDS, ("pose.covariance", "36d")),
+    POSE_WITH_COVARIANCE: (*_HEADER_FIELDS, *_POSE_FIELDS, ("pose.covariance", "36d"))
 }  # fmt: skip
 
 

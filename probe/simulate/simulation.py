@@ -70,20 +70,22 @@ class TouchOptions:
             low, high = TouchRanges().force_n
             ranges = TouchRanges(force_n=(share * low, share * high))
             drawn = next(random_touches(scene.region, rng, ranges))
-        touch = Touch(
-            _given_or_drawn(self.x_mm, drawn.x_mm),
-            _given_or_drawn(self.y_mm, drawn.y_mm),
-            math.radians(_given_or_drawn(self.theta_deg, math.degrees(drawn.theta_rad))),
-            _given_or_drawn(self.force_n, drawn.force_n),
-            math.radians(_given_or_drawn(self.tilt_x_deg, math.degrees(drawn.tilt_x_rad))),
-            math.radians(_given_or_drawn(self.tilt_y_deg, math.degrees(drawn.tilt_y_rad))),
-            drawn.wrist,
+        values = tuple(
+            other if named is None else named
+            for named, other in (
+                (self.x_mm, drawn.x_mm),
+                (self.y_mm, drawn.y_mm),
+                (self.theta_deg, math.degrees(drawn.theta_rad)),
+                (self.force_n, drawn.force_n),
+                (self.tilt_x_deg, math.degrees(drawn.tilt_x_rad)),
+                (self.tilt_y_deg, math.degrees(drawn.tilt_y_rad)),
+            )
         )
-        numbers = (touch.x_mm, touch.y_mm, touch.theta_rad, touch.force_n, touch.tilt_x_rad,
-                   touch.tilt_y_rad)  # fmt: skip
-        if not all(map(math.isfinite, numbers)):
+        if not all(map(math.isfinite, values)):
             raise SurfaceError("a touch at what is no finite number", fix="give mm, degrees and N")
-        return touch
+        x, y, theta, force, tilt_x, tilt_y = values
+        return Touch(x, y, math.radians(theta), force, math.radians(tilt_x), math.radians(tilt_y),
+                     drawn.wrist)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,24 +124,7 @@ class SimulatedTouch:
 
 
 class SimulatedProbe:
-    """A probe over a target, ready to touch it.
-
-    Parameters
-    ----------
-    target
-        A written part, `out/cube/Cube-F1.stl` (with `@lab.db`: in the frame of its face), a
-        registered face, `lab.db#Cube/F1`, or `washer`.
-    options
-        Which touches.
-    sensor_type
-        The sensor: a type, its name or file; `fsr-16` if not given.
-    overlay
-        tab or pad instead of the type's own overlay.
-    accuracy
-        auto, a level of the contact model (footprint, tabs, layer), or the largest
-        error of an image, as "0.01".
-    noise
-        Of contacts and board: typical or quiet.
+    """A probe over a target, ready to touch it; parameters as `simulate`.
 
     Raises
     ------
@@ -241,13 +226,9 @@ class SimulatedProbe:
                                fix="leave x, y and tilts out, or the scan")  # fmt: skip
         return scan_path(
             self.scene, self.sensor, options.scan, np.random.default_rng([options.seed, _WAY]),
-            most=options.touches, theta_rad=math.radians(_given_or_drawn(options.theta_deg, 0.0)),
-            force_n=_given_or_drawn(options.force_n, usual_force_n(self.sensor)),
+            most=options.touches, theta_rad=math.radians(options.theta_deg or 0.0),
+            force_n=usual_force_n(self.sensor) if options.force_n is None else options.force_n,
         )  # fmt: skip
-
-
-def _given_or_drawn(given: float | None, drawn: float) -> float:
-    return drawn if given is None else given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -259,8 +240,7 @@ class Simulation:
 
     def frames(self) -> Iterator[Frame]:
         """Yield the frames of all touches, in order."""
-        for touch in self.touches:
-            yield from touch.frames
+        return (frame for touch in self.touches for frame in touch.frames)
 
     @property
     def counts(self) -> NDArray[np.uint16]:
@@ -315,8 +295,9 @@ def simulate(
 
     Parameters
     ----------
-    target, sensor_type, overlay, accuracy, noise
-        See `SimulatedProbe`.
+    target
+        A written part, `out/cube/Cube-F1.stl` (with `@lab.db`: in the frame of its face), a
+        registered face, `lab.db#Cube/F1`, or `washer`.
     x, y
         Place of the sensor's centre, mm, frame of the face: origin at its first vertex, x
         along its first edge. The middle, or anywhere with `touches`.
@@ -335,10 +316,19 @@ def simulate(
         Of each touch, 220 a second.
     seed
         Of places and noise.
+    sensor_type
+        A type, its name or file; `fsr-16` if not given.
+    overlay
+        tab or pad instead of the type's own overlay.
+    accuracy
+        auto, a level of the contact model (footprint, tabs, layer), or the largest
+        error of an image, as "0.01".
+    noise
+        Of contacts and board: typical or quiet.
 
     Raises
     ------
-    SurfaceError, ContactError
+    SurfaceError, ContactError, PoseError
         As `SimulatedProbe`; also for a touch that has no equilibrium.
 
     Examples

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from encoded_objects.base.errors import EncodedObjectsError
+from probe.client.client import Client
 from probe.client.receiver import ClientStatistics
-from probe.client.stream import Stream
 from probe.frame import Frame
 from probe.recording.layout import FrameBlock
 from probe.recording.read import Recording
@@ -59,7 +59,7 @@ class ProbeFeed(Feed):
     def __init__(self, url: str, sensor: int | None = None) -> None:
         self._url = url
         self._sensor = sensor
-        self._stream: Stream | None = None
+        self._stream: Client | None = None
         self._notices: list[str] = []
         self._state, self._cause, self._fix = "waiting", "", ""
         self._heard_s = self._tried_s = -1e9
@@ -76,7 +76,7 @@ class ProbeFeed(Feed):
         try:
             if self._stream is None and not self._closed and began_s - self._tried_s > RETRY_S:
                 self._tried_s = began_s
-                self._stream = Stream(self._url, sensor=self._sensor)
+                self._stream = Client(self._url, sensor=self._sensor)
             if self._stream is not None:
                 frames = self._stream.take(timeout_s)
         except EncodedObjectsError as gone:
@@ -93,8 +93,8 @@ class ProbeFeed(Feed):
         """Return the state, and what the client counted."""
         stream = self._stream
         if stream is not None:
-            self._counts = stream.client.statistics()
-        ident = None if stream is None else stream.client.ident
+            self._counts = stream.statistics()
+        ident = None if stream is None else stream.ident
         counts = self._counts
         return {
             "state": self._state, "cause": self._cause, "fix": self._fix,
@@ -110,7 +110,7 @@ class ProbeFeed(Feed):
         """Return notices since the last call."""
         stream = self._stream
         notices, self._notices = self._notices, []
-        return notices + ([] if stream is None else stream.client.notices())
+        return notices + ([] if stream is None else stream.notices())
 
     def select(self, sensor: int) -> None:
         """Read another sensor of the board."""
@@ -118,7 +118,7 @@ class ProbeFeed(Feed):
             raise BenchError(f"sensor {sensor}", fix="the board has sensors 0 to 7")
         self._sensor = sensor
         if self._stream is not None:
-            self._stream.client.select_sensor(sensor)
+            self._stream.select_sensor(sensor)
 
     def rest(self, *, wanted: bool) -> None:
         """Close the port while nobody wants frames."""
@@ -138,7 +138,7 @@ class ProbeFeed(Feed):
 
     def _end_stream(self) -> None:
         if self._stream is not None:
-            self._counts = self._stream.client.statistics()
+            self._counts = self._stream.statistics()
             self._stream.__exit__(None, None, None)
             self._stream = None
 

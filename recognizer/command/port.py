@@ -60,16 +60,18 @@ def listen(
         The probe is not there, or went away for good; the calibration is another sensor's.
     """
     from probe.calibration import read_calibration
-    from probe.client.stream import Stream, name_of
+    from probe.client.client import Client, name_of
 
-    with Stream(source.place, sensor=number) as stream:
+    with Client(source.place, sensor=number) as client:
         if calibration is not None:
-            read_calibration(calibration, sensor=name_of(stream.ident(), source.place) or None)
+            read_calibration(
+                calibration, sensor=name_of(client.wait_for_ident(), source.place) or None
+            )
 
         def frames() -> Iterator[Frame]:
-            while not (stream.ended or interrupted.is_set()):
-                waiting = stream.take(SLICE_S)
-                for notice in stream.client.notices():
+            while not (client.ended or interrupted.is_set()):
+                waiting = client.take(SLICE_S)
+                for notice in client.notices():
                     message(notice)
                 yield from waiting[-1:] if source.newest else waiting
 

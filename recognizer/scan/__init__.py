@@ -8,7 +8,6 @@ mosaic   overlapping touches -> one image and the pose of each
 views    touch -> its few possible lattices; poses of touches in a plane
 lattice  views -> the lattice that most agree with, and the evidence of each cell
 path     poses of touches without measured motion, through registered places
-answer   evidence -> places of the database -> Recognition
-belief   the belief of one face: `begin_scan`, `extend_scan`
+belief   the belief of one face and its answer: `begin_scan`, `extend_scan`
 session  `Scan`: counts and poses in, the answer of all faces out
 """

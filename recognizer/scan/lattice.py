@@ -233,7 +233,6 @@ def _unambiguous_shifts(away: Array, precision: Array, pitch_mm: float) -> NDArr
 def _refit_lattice(
     views: LatticeViews, touch_poses: TouchPoses, found: Agreement, pitch_mm: float
 ) -> PlaneLattice:
-    """Return the lattice moved to the chosen views."""
     chosen = found.chosen[found.chosen >= 0]
     if not len(chosen):
         return found.lattice

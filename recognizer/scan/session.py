@@ -23,8 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.arm import SensorPose
-from recognizer.scan.answer import ScanHypothesis
-from recognizer.scan.belief import ScanBelief, begin_scan, extend_scan
+from recognizer.scan.belief import ScanBelief, ScanHypothesis, begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import (
     ARM_SD,
     BY_HAND_SD,
@@ -320,7 +319,6 @@ def _nats_against(one: _ObjectHypothesis, others: Sequence[_ObjectHypothesis]) -
 
 
 def _is_one_object(a: _ObjectHypothesis, b: _ObjectHypothesis) -> bool:
-    """Whether two faces may be of one object in one place."""
     if a.object != b.object:
         return False
     if a.T_base_object is None or b.T_base_object is None:

@@ -1,10 +1,13 @@
-"""Figures of `open-bench`: rates, latency, CPU, memory, many pages, touch to answer.
+"""Figures of `open-bench`: rates, latency, CPU, memory, many pages, clicks, stale pictures.
 
-    python tests/bench/open_bench.py --database lab.db
+    python tests/bench/open_bench.py --database lab.db [--touches 40] [--round Cylinder]
     python tests/bench/open_bench.py --database lab.db --rates --touches 0 --pages --soak 600
 
 Server, browser (software drawing) and the simulated probe share the machine; CPU is that of the
-server's process, in percent of one core, without the browser. The database needs an object.
+server's process, in percent of one core, without the browser. The database needs an object, and a
+round one for `--round`. A picture is stale that shows an answer, a lit face or a pose while the
+touch at hand is not read yet: every picture that the browser paints is looked at. Clicks on a round
+face are compared with the reader's answers at the same places without a page.
 """
 
 from __future__ import annotations
@@ -14,9 +17,9 @@ import asyncio
 import json
 import os
 import random
+import re
 import socket
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -27,87 +30,142 @@ import httpx
 from playwright.sync_api import sync_playwright
 from websockets.asyncio.client import connect
 
+from encoded_objects import Reader, open_lab, simulate
+
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from bench_page import CHROMIUM, FLAGS, until
+from bench_page import CHROMIUM, FLAGS, opened, rest, running, shown, until
 
 STATIC = Path(__file__).parents[2] / "recognizer" / "bench" / "static"
+NEAR_MM = 0.5  #: a click that is read this near is read right
+FORCE_N = 80.0
+WATCH = """() => { window.seen = []; let before = performance.now(); const look = () => {
+    const now = performance.now();
+    window.seen.push([bench.touch, bench.state, bench.lit,
+      document.getElementById('answer').innerText, document.getElementById('pose').innerText,
+      now - before]);
+    before = now; requestAnimationFrame(look); }; look(); }"""
+UPGRADE = (
+    "GET /live HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nUpgrade: websocket\r\n"
+    "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+)
 
 
 @contextmanager
-def served(database, *options):
-    """Run the server; yields its address and its process."""
-    with tempfile.TemporaryDirectory() as folder:
-        words = ("--database", database, "--folder", folder, "--web-port", "0", *options)
-        command = [sys.executable, "-m", "recognizer.bench.command", *words]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-            try:
-                address = process.stdout.readline().split()[-1]
-                while not httpx.get(address + "api/lab").json()["encodings"]:
-                    time.sleep(0.2)
-                yield address, process.pid
-            finally:
-                process.terminate()
-                process.wait()
+def served(database, port):
+    """Run a server at a simulated probe until its lab is read; yields its address and number."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        running("--database", database, "--folder", folder, "--port", port) as (address, process),
+    ):
+        while not httpx.get(address + "api/lab").json()["encodings"]:
+            time.sleep(0.2)
+        yield address, process.pid
 
 
-def cpu_s(pid):
-    """Return the seconds of CPU that a process has taken."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+class Meter:
+    """CPU and memory of a process, since it was begun."""
+
+    def __init__(self, pid):
+        self.folder = Path(f"/proc/{pid}")
+        self.cpu, self.began = self._cpu_s(), time.monotonic()
+
+    def _cpu_s(self):
+        fields = (self.folder / "stat").read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def memory_mb(self):
+        status = (self.folder / "status").read_text()
+        return int(status.split("VmRSS:")[1].split()[0]) / 1024
+
+    def __str__(self):
+        used = 100 * (self._cpu_s() - self.cpu) / (time.monotonic() - self.began)
+        return f"server CPU {used:.1f} %, memory {self.memory_mb():.0f} MB"
 
 
-def memory_mb(pid):
-    """Return the memory that a process holds."""
-    status = Path(f"/proc/{pid}/status").read_text()
-    return int(status.split("VmRSS:")[1].split()[0]) / 1024
+def spread(times_ms):
+    """Return median and 95 % of times."""
+    found = sorted(times_ms)
+    late = found[round(0.95 * (len(found) - 1))]
+    return f"median {statistics.median(found):.0f} ms, p95 {late:.0f} ms"
 
 
 def at_rates(browser, database, rates, seconds):
     """Print a line per rate of the source."""
-    print("source    to page   painted   latency median   p95     server CPU   memory")
     for rate in rates:
-        with served(database, "--port", f"touch:?rate={rate}") as (address, pid):
-            page = browser.new_page(viewport={"width": 1440, "height": 900})
-            asked = []
-            page.on("request", lambda request, asked=asked: asked.append(request.url))
-            page.goto(address)
-            until(page, "bench.shown !== '' && bench.frames > 10")
+        with (
+            served(database, f"touch:?rate={rate}") as (address, pid),
+            opened(browser, address) as page,
+        ):
             time.sleep(2)
             before = page.evaluate("[bench.frames, bench.paints]")
             page.evaluate("bench.latency_ms.length = 0")
-            cpu, began = cpu_s(pid), time.monotonic()
+            meter = Meter(pid)
             time.sleep(seconds)
-            passed = time.monotonic() - began
             frames, paints, late = page.evaluate("[bench.frames, bench.paints, bench.latency_ms]")
-            late.sort()
-            foreign = [url for url in asked if not url.startswith((address, "ws://" + address[7:]))]
-            print(
-                f"{rate:3.0f} Hz {(frames - before[0]) / passed:9.1f}/s"
-                f" {(paints - before[1]) / passed:8.1f}/s {statistics.median(late):11.1f} ms"
-                f" {late[int(0.95 * len(late))]:9.1f} ms {100 * (cpu_s(pid) - cpu) / passed:9.1f} %"
-                f" {memory_mb(pid):8.0f} MB   {len(foreign)} requests to others"
-            )
-            page.close()
+            print(f"{rate:3.0f} Hz: {(frames - before[0]) / seconds:.1f}/s to the page, "
+                  f"{(paints - before[1]) / seconds:.1f}/s painted, latency {spread(late)}, "
+                  f"{meter}")  # fmt: skip
 
 
-def touches(browser, database, number):
-    """Print how long a touch takes from the click to its answer on the page."""
-    random.seed(1)
-    with served(database, "--port", "touch:?hold=0.6") as (address, _):
-        page = browser.new_page(viewport={"width": 1440, "height": 900})
-        page.goto(address)
-        until(page, "bench.shown !== '' && bench.frames > 10")
-        faces = page.locator("#touch-face option").all_inner_texts()
-        for i in range(number):
-            page.locator("#touch-face").select_option(random.choice(faces))
-            page.locator("#touch-theta").fill(str(random.randint(-180, 180)))
-            page.locator("#touch button").click()
-            until(page, f"bench.click_ms.length > {i}")
-            until(page, "bench.contact === false")
-        took = sorted(page.evaluate("bench.click_ms"))
-        print(f"click to answer on the page: median {statistics.median(took):.0f} ms, "
-              f"p95 {took[int(0.95 * len(took))]:.0f} ms, {number} touches")  # fmt: skip
-        page.close()
+def clicked(page, across, down):
+    """Click on the part; returns the face, the place that was asked for and the one read."""
+    answers = page.evaluate("bench.answers")
+    box = page.get_by_test_id("part").bounding_box()
+    page.mouse.click(box["x"] + across * box["width"], box["y"] + down * box["height"])
+    until(page, f"bench.answers > {answers}")
+    asked = [float(page.locator(f"#touch-{axis}").input_value()) for axis in "xy"]
+    face = page.get_by_test_id("touch-face").input_value()
+    read = re.search(r"x (-?[\d.]+), y (-?[\d.]+) mm", page.locator("#pose").inner_text())
+    rest(page)
+    return face, asked, read and [float(value) for value in read.groups()]
+
+
+def near(asked, read):
+    """Tell whether a place was read where it was asked for."""
+    return bool(read) and max(abs(a - b) for a, b in zip(asked, read, strict=True)) < NEAR_MM
+
+
+def touches(page, number, rng):
+    """Print stale pictures, and the time from a click to its answer."""
+    name = page.evaluate("bench.shown")
+    rest(page)
+    first = page.evaluate("bench.touch")
+    page.evaluate(WATCH)
+    page.evaluate("bench.click_ms.length = 0")
+    for _ in range(number):
+        clicked(page, rng.uniform(0.38, 0.6), rng.uniform(0.4, 0.65))
+    seen = page.evaluate("window.seen")
+    new = [one for one in seen if one[0] > first and one[1] in ("felt", "reading")]
+    stale = [one for one in new if one[2] or one[4] or name in one[3]]
+    print(f"{number} touches, {len(seen):,} pictures, {len(new)} of touches not read yet; "
+          f"stale: {len(stale)} pictures, {sum(one[5] for one in stale):.0f} ms\n"
+          f"click to answer: {spread(page.evaluate('bench.click_ms'))}")  # fmt: skip
+
+
+def mantle(page, database, name, number, rng):
+    """Print how many clicks on a round face are read right, with the page and without."""
+    shown(page, name)
+    reader = Reader(open_lab(database))
+    round_face = page.evaluate(
+        f"fetch('/api/objects/{name}').then((a) => a.json())"
+        ".then((o) => o.faces.find((f) => f.round).name)"
+    )
+    tried = right = alone = 0
+    while tried < number:
+        theta = rng.randint(-180, 180)
+        page.locator("#touch-theta").fill(str(theta))
+        face, asked, read = clicked(page, rng.uniform(0.36, 0.64), rng.uniform(0.42, 0.72))
+        if face != round_face:
+            continue
+        tried += 1
+        right += near(asked, read)
+        where = f"{database}#{name}/{face}"
+        frame = simulate(where, x=asked[0], y=asked[1], theta=theta, force=FORCE_N)
+        answer = reader.read(frame.counts)
+        alone += bool(answer) and near(asked, [answer.x_mm, answer.y_mm])
+    print(f"clicks on the mantle of {name}: {right} of {tried} read within {NEAR_MM} mm; "
+          f"the same places without a page: {alone} of {tried}")  # fmt: skip
 
 
 async def listen(address, seconds):
@@ -127,38 +185,29 @@ def many(database, pages, seconds):
     async def all_of_them(address):
         return await asyncio.gather(*(listen(address, seconds) for _ in range(pages)))
 
-    with served(database, "--port", "touch:?rate=100") as (address, pid):
+    with served(database, "touch:?rate=100") as (address, pid):
         time.sleep(0 if pages else 8)  # until the port is let go
-        cpu, began = cpu_s(pid), time.monotonic()
+        meter = Meter(pid)
         got = asyncio.run(all_of_them(address)) if pages else [0.0]
         time.sleep(0 if pages else seconds)
-        used = 100 * (cpu_s(pid) - cpu) / (time.monotonic() - began)
-        print(f"{pages} pages at 100 Hz: {min(got):.0f} ... {max(got):.0f} frames/s each, "
-              f"server CPU {used:.1f} %, memory {memory_mb(pid):.0f} MB")  # fmt: skip
+        print(f"{pages} pages at 100 Hz: {min(got):.0f} ... {max(got):.0f} frames/s each, {meter}")
 
 
 def never_read(database, pages, seconds):
     """Print what pages cost that never read, and what one that reads gets meanwhile."""
-    with served(database, "--port", "touch:?rate=100") as (address, pid):
+    with served(database, "touch:?rate=100") as (address, pid):
         host = address.split("/")[2]
         name, port = host.split(":")
         deaf = []
         for _ in range(pages):
             line = socket.create_connection((name, int(port)))
             line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-            line.sendall(
-                f"GET /live HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n"
-                "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-                "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
-            )
+            line.sendall(UPGRADE.format(host).encode())
             deaf.append(line)
-        before, cpu, began = memory_mb(pid), cpu_s(pid), time.monotonic()
-        got = asyncio.run(listen(address, seconds))
-        used = 100 * (cpu_s(pid) - cpu) / (time.monotonic() - began)
-        print(
-            f"{pages} pages that never read, 100 Hz: one that reads gets {got:.0f} frames/s, "
-            f"server CPU {used:.1f} %, memory {before:.0f} to {memory_mb(pid):.0f} MB"
-        )
+        meter = Meter(pid)
+        before, got = meter.memory_mb(), asyncio.run(listen(address, seconds))
+        print(f"{pages} pages that never read, 100 Hz: one that reads gets {got:.0f} frames/s, "
+              f"{meter}, {before:.0f} MB before")  # fmt: skip
         for line in deaf:
             line.close()
 
@@ -184,14 +233,12 @@ def soak(database, seconds):
                 await asyncio.sleep(3)
                 if time.monotonic() > due:
                     due = time.monotonic() + 60
-                    print(f"  {memory_mb(pid):.0f} MB", flush=True)
+                    print(f"  {meter.memory_mb():.0f} MB", flush=True)
 
-    with served(database, "--port", "touch:?rate=100") as (address, pid):
-        cpu, began = cpu_s(pid), time.monotonic()
+    with served(database, "touch:?rate=100") as (address, pid):
+        meter = Meter(pid)
         asyncio.run(one(address))
-        used = 100 * (cpu_s(pid) - cpu) / (time.monotonic() - began)
-        print(f"{seconds:.0f} s of touches at 100 Hz: server CPU {used:.1f} %, "
-              f"memory {memory_mb(pid):.0f} MB")  # fmt: skip
+        print(f"{seconds:.0f} s of touches at 100 Hz: {meter}")
 
 
 def main():
@@ -200,17 +247,25 @@ def main():
     asked.add_argument("--seconds", type=float, default=15.0)
     asked.add_argument("--rates", type=float, nargs="*", default=[50, 100, 200])
     asked.add_argument("--touches", type=int, default=20)
+    asked.add_argument("--round", default="", help="a round object, whose mantle is clicked on")
     asked.add_argument("--pages", type=int, nargs="*", default=[0, 1, 20])
     asked.add_argument("--deaf", type=int, default=64, help="pages that never read")
     asked.add_argument("--soak", type=float, default=0.0, metavar="SECONDS")
     given = asked.parse_args()
+    rng = random.Random(1)
     size = sum(file.stat().st_size for file in STATIC.iterdir())
     print(f"the page: {size / 1000:.0f} kB")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         at_rates(browser, given.database, given.rates, given.seconds)
         if given.touches:
-            touches(browser, given.database, given.touches)
+            with (
+                served(given.database, "touch:?hold=0.6") as (address, _),
+                opened(browser, address) as page,
+            ):
+                touches(page, given.touches, rng)
+                if given.round:
+                    mantle(page, given.database, given.round, given.touches, rng)
         browser.close()
     if given.soak:
         soak(given.database, given.soak)

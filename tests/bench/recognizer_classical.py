@@ -1,4 +1,4 @@
-"""The thesis's way of reading, in figures: edges, mosaics, symbols, answers, and what it takes.
+"""The thesis's way of reading, in figures: edges, mosaics, symbols, answers.
 
     python tests/bench/recognizer_classical.py [--edges 200] [--scans 2] [--seed 1]
 
@@ -37,12 +37,9 @@ from probe.surface.polygon import polygon
 from recognizer.scan.mosaic.planar import relative_pose, transform_points
 from recognizer.thesis.edge_fit import face_edges
 from recognizer.thesis.edges import classical_edges, vertices
-from recognizer.thesis.filters import median, subtract_bias
-from recognizer.thesis.grid import grid
 from recognizer.thesis.merge import merge_touches
 from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_scan, spatial_pose
-from recognizer.thesis.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.tactile_image import touch_image
 
@@ -277,41 +274,6 @@ def bench_scans(url, scans, seed, sigmas):
         for placing, tally in tallies.items():
             shown = "arm" if sigma is None else f"{sigma:g}"
             print(f"{level:9}{shown:>6}  {placing:9}{tally.row()}", flush=True)
-    print()
-    return lab
-
-
-def bench_stages(lab, url, seed):
-    encoding = lab.arrays[0]
-    scene = registered_surface(url, "Cube", "F1")
-    believed, readings, _ = scanned(scene, "typical", np.random.default_rng(seed), 0.0, None)
-    timed = {}
-
-    def stage(name, call):
-        spent = []
-        for _ in range(5):
-            begun = time.process_time()
-            result = call()
-            spent.append(time.process_time() - begun)
-        timed[name] = np.median(spent) * 1e3
-        return result
-
-    image = stage("merge by products", lambda: merge_touches(SENSOR, readings, believed)).image
-    stage("merge as believed", lambda: merge_touches(SENSOR, readings, believed,
-                                              "believed"))  # fmt: skip
-    over = stage("bias, median", lambda: median(subtract_bias(image)))
-    found = stage("ink, thinning, counting", lambda: symbols(over, encoding.alphabet,
-                                                             encoding.style))  # fmt: skip
-    stage("grid", lambda: grid(found, encoding.style.pitch_mm))
-    whole = stage("all but merging", lambda: read_classically(lab, image))
-    timed["decode, place, pose"] = max(
-        0.0, timed["all but merging"] - sum(
-            timed[k] for k in ("bias, median", "ink, thinning, counting", "grid"))
-    )  # fmt: skip
-    print(f"stages, a scan of {len(readings)} touches of the cube "
-          f"(answered: {whole.recognition.object}), ms, and ms a touch")  # fmt: skip
-    for name, spent in timed.items():
-        print(f"  {name:26}{spent:9.2f}{spent / len(readings):9.3f}")
 
 
 def main():
@@ -329,8 +291,7 @@ def main():
         (folder / "set.yaml").write_text(SET)
         url = f"sqlite:///{folder / 'lab.db'}"
         encode(read_specs([folder / "set.yaml"]), folder=folder / "out", database=url, formats=())
-        lab = bench_scans(url, given.scans, given.seed, sigmas) if given.scans else open_lab(url)
-        bench_stages(lab, url, given.seed)
+        bench_scans(url, given.scans, given.seed, sigmas)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import pytest
 from generator.array.profiles import profile
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Occupancy
-from generator.layout.torus import cells_at, place_pieces
+from generator.layout.torus import place_pieces
 from generator.polyhedron import shapes
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
@@ -48,11 +48,11 @@ def loaded(rows, columns, turns, seed=5):
         *NONE, SimpleNamespace(rows=rows, columns=columns, first=(0, 0))
     )
     spots = place_pieces(occupancy, [(mask, turns) for mask in masks])
-    cells = [
-        cells_at(mask, spot, rows, columns)
-        for mask, spot in zip(masks, spots, strict=True)
-        if spot is not None
-    ]
+    cells = []
+    for mask, spot in zip(masks, spots, strict=True):
+        if spot is not None:
+            r, c = np.nonzero(np.rot90(mask, spot.quarter))
+            cells.append(((r + spot.row) % rows, (c + spot.column) % columns))
     full = occupancy.with_cells(*(np.concatenate(part) for part in zip(*cells, strict=True)))
     assert full.used == sum(len(part[0]) for part in cells)
     return full.density

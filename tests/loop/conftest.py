@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from contextlib import contextmanager
 
 import pytest
-from bench_page import CHROMIUM, FLAGS, opened, rest, shown
+from bench_page import CHROMIUM, FLAGS, opened, rest, running, shown
 from playwright.sync_api import sync_playwright
 
 ENDED_S = 30.0
@@ -39,20 +37,17 @@ def served(lab):
     """Return a context manager: options -> address of a server, that has to end in order."""
 
     @contextmanager
-    def running(*options, folder=None):
+    def server(*options, folder=None):
         words = ("--database", lab / "lab.db") if folder is None else ()
-        words += ("--folder", (folder or lab) / "recordings", "--web-port", 0)
-        command = [sys.executable, "-m", "recognizer.bench.command", *map(str, (*words, *options))]
-        with subprocess.Popen(
-            command, stdout=subprocess.PIPE, text=True, cwd=folder
-        ) as process:  # fmt: skip
+        words += ("--folder", (folder or lab) / "recordings")
+        with running(*words, *options, folder=folder) as (address, process):
             try:
-                yield process.stdout.readline().split()[-1]
+                yield address
             finally:
                 process.terminate()
                 assert process.wait(ENDED_S) == 0
 
-    return running
+    return server
 
 
 @pytest.fixture(scope="module")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import signal
 import subprocess
-import sys
 import threading
 import time
 from contextlib import contextmanager
 
 import httpx
 import pytest
+from bench_page import running
 from hostile_recordings import HOSTILE, SECRET, write_hostile, write_zeros
 
 from recognizer.command import run as recognize_object
@@ -23,16 +23,12 @@ LONG = 1_900_000  #: frames, which take 20 s to read
 @contextmanager
 def started(folder):
     """Start a server on an empty folder; gives the process and its client."""
-    command = (sys.executable, "-m", "recognizer.bench.command", "--folder", "recordings",
-               "--web-port", "0", "--port", "sim:")  # fmt: skip
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
-    with subprocess.Popen(command, cwd=folder, **pipes) as process:
-        try:
-            address = process.stdout.readline().split()[-1]
-            with httpx.Client(base_url=address, timeout=PATIENCE_S) as client:
-                yield process, client
-        finally:
-            process.kill()
+    words = ("--folder", "recordings", "--port", "sim:")
+    with (
+        running(*words, folder=folder, errors=subprocess.DEVNULL) as (address, process),
+        httpx.Client(base_url=address, timeout=PATIENCE_S) as client,
+    ):
+        yield process, client
 
 
 @pytest.fixture

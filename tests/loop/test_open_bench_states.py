@@ -5,13 +5,11 @@ from __future__ import annotations
 import re
 import signal
 import sqlite3
-import subprocess
-import sys
-from contextlib import closing, contextmanager
+from contextlib import closing
 
 import httpx
 import pytest
-from bench_page import PATIENCE_MS, opened, rest, shown, touched, until
+from bench_page import PATIENCE_MS, opened, rest, running, shown, touched, until
 from playwright.sync_api import expect
 
 GROWTH = """() => new Promise((done) => { const heights = []; const look = () => {
@@ -25,24 +23,17 @@ def bench(served):
         yield address
 
 
-@contextmanager
-def process_of(lab, port):
-    """Run a server at a port of its own, 0: any; yields its address and its process."""
-    command = [
-        sys.executable, "-m", "recognizer.bench.command", "--database", lab / "lab.db",
-        "--folder", lab / "recordings", "--port", "touch:?hold=1.0", "--web-port", port,
-    ]  # fmt: skip
-    with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True) as process:
-        try:
-            yield process.stdout.readline().split()[-1], process
-        finally:
-            process.kill()
-            process.wait()
+def process_of(lab, port=0):
+    """Run a server at a port, 0: any; yields its address and its process."""
+    return running(
+        "--database", lab / "lab.db", "--folder", lab / "recordings", "--port", "touch:?hold=1.0",
+        "--web-port", port,
+    )  # fmt: skip
 
 
 def test_a_killed_server_is_said_and_one_that_comes_back_is_found(browser, lab):
     page = browser.new_page(viewport={"width": 1440, "height": 900})
-    with process_of(lab, 0) as (address, first):
+    with process_of(lab) as (address, first):
         page.goto(address)
         until(page, "bench.shown !== '' && bench.frames > 0")
         shown(page, "Cube")
@@ -86,7 +77,7 @@ def test_offline_is_said_and_overcome(page):
 
 
 def test_a_line_that_falls_silent_is_given_up_and_opened_again(browser, lab):
-    with process_of(lab, 0) as (address, process), opened(browser, address) as page:
+    with process_of(lab) as (address, process), opened(browser, address) as page:
         frames = page.evaluate("bench.frames")
         process.send_signal(signal.SIGSTOP)  # no word that it has gone, as with a cut cable
         until(page, "document.body.dataset.line === 'gone'")

@@ -22,8 +22,7 @@ from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
 from generator.pipeline import encode
-from generator.plane.polygon import points_inside
-from generator.plane.rings import distance
+from generator.plane.polygon import distance, points_inside
 from generator.polyhedron.development import development
 from generator.polyhedron.winged import developable_from
 from generator.spec import read_specs

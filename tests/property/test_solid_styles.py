@@ -18,15 +18,14 @@ from generator.alphabet import (
 )
 from generator.errors import AlphabetError, SolidError
 from generator.layout.placement import FaceLayout, Layout, Placement
-from generator.plane.polygon import points_inside, signed_area
-from generator.plane.rings import boxes_inside, distance, edges_cross
+from generator.plane.polygon import boxes_inside, distance, edges_cross, points_inside, signed_area
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.shapes import prism, pyramid
 from generator.printers import PRINTERS
 from generator.solid import emboss_whole, panels, prove_closed, triangles, volume
 from generator.solid.closed import edges_once
-from generator.solid.emboss import turn
-from generator.solid.inset import inset, regular
+from generator.solid.part import turn
+from generator.solid.plate import inset, regular
 
 ALPHABET = st.sampled_from(list(ALPHABETS.values()))
 STYLE = st.builds(

@@ -2,12 +2,10 @@
 
 Quadratic bricks with a linear pressure of their own in each of them (Q2-P1: no locking), bonded
 at the base, free at the sides, loaded by normal forces on the nodes of the top. The mesh is a
-product of three lines, so each matrix is a sum of Kronecker products of matrices along a line and
-needs no assembly in space. Nodes of a line ascend, the middle ones of quadratic elements included.
-
-The pad is symmetric about x = 0 and y = 0: a quarter of it serves, in the four parities
-(even, odd) x (even, odd). One sweep of block Cholesky along x gives, for each of them, the
-displacement of the top and the force on each tactel per force on the top.
+product of three lines, so each matrix is a sum of Kronecker products. Nodes of a line ascend, the
+middle ones included. A quarter of the pad serves, in the four parities (even, odd) x (even, odd):
+one sweep of block Cholesky along x gives, for each, the displacement of the top and the force on
+each tactel per force on the top.
 
 mm, N, MPa; x, y in the sensor frame, w = displacement of the top into the pad.
 """
@@ -55,10 +53,7 @@ class LineBasis:
 
 
 def line_bases(boundaries: Array, *degrees: int) -> tuple[LineBasis, ...]:
-    """Return shape functions of some degrees (0 ... 2) over elements between boundaries.
-
-    All share the quadrature of the first.
-    """
+    """Return shape functions of some degrees (0 ... 2) that share the quadrature of the first."""
     mesh = MeshLine(np.asarray(boundaries, dtype=np.float64))
     basis = Basis(mesh, LINE_ELEMENTS[degrees[0]](), intorder=POINTS[degrees[0]])
     bases = [basis, *(basis.with_element(LINE_ELEMENTS[d]()) for d in degrees[1:])]
@@ -113,23 +108,11 @@ def mirror(half: Array) -> Array:
 
 
 def per_tactel(boundaries: Array, edges: Array, parity: int) -> sp.csr_matrix:
-    """Take reactions on the nodes of half a line to the forces on the tactels along it.
+    """Take reactions on the nodes of half a line to the forces on the tactels of that half.
 
-    The stress that has these reactions (the consistent one, by the mass matrix) is integrated
-    over each tactel.
-
-    Parameters
-    ----------
-    boundaries
-        (n + 1,) elements of the half with x >= 0, mm.
-    edges
-        (tactels + 1,) boundaries of all tactels, ascending and symmetric; on the line's own.
-    parity
-        1, -1: reactions of the other half are the same, the negative.
-
-    Returns
-    -------
-    (ceil(tactels / 2), 2 n + 1) for the tactels of the half, that in the middle included.
+    The stress that has these reactions (the consistent one, by the mass matrix) is integrated over
+    each tactel. `boundaries` (n + 1,) are those of the elements with x >= 0, `edges` those of all
+    tactels; by `parity` reactions of the other half are the same (1) or the negative (-1).
     """
     whole = quadratic(mirror(boundaries))
     middles = whole.nodes[1::2]
@@ -221,16 +204,9 @@ class CondensedPad:
 def condense(
     lines: PadLines, young: float, poisson: float, tactel_edges: tuple[Array, Array]
 ) -> CondensedPad:
-    """Condense a pad to the nodes of its top and to the tactels.
+    """Condense a pad to the nodes of its top and to the tactels between edges along x and y.
 
-    Parameters
-    ----------
-    lines
-        Mesh of the quarter x, y >= 0.
-    young, poisson
-        MPa, and 0 ... .5; above (1 - 1e-7)/2 it counts as that.
-    tactel_edges
-        Boundaries of the tactels along x, and along y, ascending, mm; all on lines of the mesh.
+    Poisson's ratio above (1 - 1e-7)/2 counts as that; all edges lie on lines of the mesh.
     """
     along = [quadratic(part) for part in (lines.x, lines.y, lines.z)]
     shape = tuple(part.nodes.size for part in along)

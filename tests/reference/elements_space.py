@@ -47,14 +47,9 @@ def elements(
 ) -> Contact:
     """Press a pad, held by a wrist of some stiffness, on a surface.
 
-    Parameters
-    ----------
-    per_tactel, layers
-        Quadratic elements along a tactel, and through the pad.
-    margin_mm
-        How far the pad reaches beyond the matrix, on each side; 0: the sides are free there.
-    walls_mm
-        Places |x| and |y|, sensor frame, where more lines of the mesh are wanted.
+    `per_tactel` and `layers` are quadratic elements along a tactel and through the pad, which
+    reaches `margin_mm` beyond the matrix (0: its sides are free there); at `walls_mm`, places |x|
+    and |y| of the sensor frame, the mesh has more lines.
     """
     pad = condensed_pad(sensor, per_tactel, layers, margin_mm, walls_mm)
     heights = heights_at(surface, touch, pad.nodes_mm)

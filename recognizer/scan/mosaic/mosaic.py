@@ -214,7 +214,6 @@ def add_touch(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
 
 
 def _place_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> TouchPlacement:
-    """Return start and constraints of a new touch."""
     number = len(mosaic)
     given = _given_constraints(touch, number)
     predicted = _predict_pose(mosaic, touch)
@@ -256,8 +255,6 @@ def _place_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> Touch
 
 
 def _given_constraints(touch: PlacedTouch, number: int) -> list[Constraint]:
-    """Return the constraints by arm, steps and reader."""
-
     def constraint(a: int, place: PlanarBelief, kind: Kind) -> Constraint:
         return Constraint(a, number, place.pose, np.asarray(np.linalg.inv(place.covariance)), kind)
 
@@ -272,7 +269,6 @@ def _given_constraints(touch: PlacedTouch, number: int) -> list[Constraint]:
 
 
 def _contradicts_decoded(mosaic: Mosaic, touch: PlacedTouch) -> bool:
-    """Whether a decoded pose contradicts the arm or the step."""
     if touch.decoded is None or not len(mosaic) or not (touch.believed or touch.stepped):
         return False
     expected = _predict_pose(mosaic, replace(touch, decoded=None))
@@ -411,7 +407,6 @@ def _frame_for_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> M
 
 
 def _change_frame(mosaic: Mosaic, T_new_old: Array) -> Mosaic:
-    """Return the mosaic in another frame."""
     turn = rotation(float(T_new_old[2]))
     canvas, entries = empty_canvas(mosaic.sensor.pitch_mm), list(mosaic.entries)
     for n, entry in enumerate(mosaic.entries):
@@ -484,7 +479,6 @@ def _apply_solution(mosaic: Mosaic, found: PoseGraphSolution, fresh: set[int]) -
 def _move_entry(
     mosaic: Mosaic, canvas: Canvas, found: PoseGraphSolution, n: int, now: CanvasEntry | None
 ) -> tuple[Canvas, CanvasEntry | None]:
-    """Return the canvas with a touch at its pose, and its entry."""
     pose, gain = found.poses[n], float(mosaic.gains[n])
     shown = mosaic.reasons[n] in SHOWN and mosaic.patches[n].scale >= 0
     if now is not None:

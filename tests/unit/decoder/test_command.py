@@ -1,4 +1,4 @@
-"""`decode-window`: its JSON, its exit codes, its messages, its picture."""
+"""`decode-window`: its picture, what it imports, and what a database adds."""
 
 import json
 import subprocess
@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import pytest
 from PIL import Image
 
 from decoder.command import run
@@ -18,64 +17,6 @@ def outcome(capsys, *arguments):
     code = run(list(arguments))
     output = capsys.readouterr()
     return code, output.out, output.err
-
-
-@pytest.mark.parametrize("method", ["table", "serial", "milestones", "logarithm"])
-def test_json_of_the_contract(capsys, method):
-    code, out, err = outcome(capsys, WINDOW, "--profile", "thesis", "--method", method, "--json")
-    found = json.loads(out)
-    assert code == 0
-    assert (found["row"], found["column"], found["t"]) == (1, 61, 2206)
-    assert (found["reason"], err) == ("", "")
-
-
-def test_likelihood_refuses_to_guess_and_lists(capsys):
-    arguments = [WINDOW, "--profile", "thesis", "--method", "likelihood", "--json"]
-    code, out, _ = outcome(capsys, *arguments, "--top", "3")
-    found = json.loads(out)
-    assert code == 1
-    assert (found["row"], found["reason"], len(found["candidates"])) == (None, "ambiguous", 3)
-    code, out, _ = outcome(capsys, *arguments, "--error", "1e-6", "--blank", "0")
-    assert (code, json.loads(out)["t"]) == (0, 2206)
-
-
-def test_text_erasures_and_rows_as_arguments(capsys):
-    code, out, _ = outcome(capsys, "2?", "65", "?5", "21", "--profile", "product")
-    assert code == 0
-    assert out.startswith("row 5, column 7 (t = 82)\n")
-    code, out, _ = outcome(capsys, "01 11 01 ?1 00 01", "--profile", "thesis")
-    assert code == 1
-    assert "too few symbols" in out
-    assert "row 1, column 61" in out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["01 1x", "--profile", "thesis"], "'x' is no symbol"),
-        (["01 1"], "equally long"),
-        ([""], "empty"),
-        (["01", "--profile", "nothing"], "unknown profile"),
-        (["01", "--method", "nothing"], "unknown method"),
-        (["01", "--nothing"], "nothing"),
-        (["01", "--array", "{"], "--array cannot be read"),
-        (["01", "--array", "[1]"], "--array cannot be read"),
-        (["01", "--array", '{"family": "none"}'], "none"),
-        (["01", "--array", "{}", "--profile", "thesis"], "both"),
-        (["01", "--method", "likelihood", "--error", "2"], "error rate"),
-        (["01", "--method", "likelihood", "--rotations", "x"], "quarter turns"),
-        ([], ""),
-    ],
-)
-def test_bad_input(capsys, arguments, message):
-    code, _, err = outcome(capsys, *arguments)
-    assert code == 2
-    assert message in err
-    assert not arguments or (err.startswith("error: ") and "  fix: " in err)
-    if arguments:
-        code, out, _ = outcome(capsys, *arguments, "--json")
-        assert code == 2
-        assert message in json.loads(out)["error"]["cause"]
 
 
 def test_picture(capsys, tmp_path):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from decoder import MethodError, WindowError, decode_exact
-from decoder.exact import conversion
+from decoder import MethodError, WindowError, decode_exact, strength, strength_of_window
 from generator.array import PROFILES, array_from
 from generator.array.polynomial import search_primitive
 
+ROBUST = array_from({"family": "prba", "polynomial": "0x1655", "rows": 63, "columns": 65})
 METHODS = ("table", "serial", "milestones", "logarithm")
 
 
@@ -115,28 +115,17 @@ def test_too_few_cells_list_the_places_that_they_allow():
     for place in found.candidates:
         there = windows_at(array, [place.row], [place.column], (6, 2))[0]
         assert (there == window)[seen].all()
+    odd = array_from({"family": "prmva", "order": 3, "degree": 8})
+    product = PROFILES["product"].array()
+    for array, number in ((odd, 3), (product, 4)):
+        window = windows_at(array, [5], [7], array.window)[0]
+        window[0] = -1 if array is product else [-1, *window[0, 1:]]
+        found = decode_exact(array, window)[0]
+        assert found.reason == "too few symbols"
+        assert (5, 7) in {(c.row, c.column) for c in found.candidates}
+        assert len(found.candidates) <= number
     nothing = np.full((6, 2), -1)
     assert decode_exact(array, nothing)[0].reason == "too few symbols"
-
-
-def test_too_few_cells_of_a_product_array():
-    array = PROFILES["product"].array()
-    window = windows_at(array, [5], [7], (4, 2))[0]
-    window[2] = -1
-    found = decode_exact(array, window)[0]
-    assert found.reason == "too few symbols"
-    assert {(c.row, c.column) for c in found.candidates} >= {(5, 7)}
-    assert {c.column for c in found.candidates} == {7}
-
-
-def test_odd_field_lists_candidates_too():
-    array = array_from({"family": "prmva", "order": 3, "degree": 8})
-    window = windows_at(array, [5], [7], array.window)[0]
-    window[0, 0] = -1
-    found = decode_exact(array, window)[0]
-    assert found.reason == "too few symbols"
-    assert (5, 7) in {(c.row, c.column) for c in found.candidates}
-    assert len(found.candidates) == 3
 
 
 def test_methods_refuse_sizes_that_would_not_end():
@@ -167,11 +156,6 @@ def test_a_batch_may_be_empty():
         found[0]
 
 
-def test_tables_are_made_once():
-    sequence = PROFILES["thesis"].array().sequence
-    assert conversion(sequence, "table") is conversion(sequence, "table")
-
-
 @pytest.mark.parametrize(
     "values",
     [
@@ -200,3 +184,19 @@ def test_windows_that_each_miss_other_symbols_decode_as_one_by_one(values):
         assert (found.row, found.column, found.reason) == (alone.row, alone.column, alone.reason)
         assert found.candidates == alone.candidates
         assert not found or (found.row, found.column) == place
+
+
+def test_errors_and_erasures():
+    able = strength_of_window(ROBUST, 6, 6)
+    assert (able.errors, able.erasures, able.identifies, able.cells) == (4, 9, True, 36)
+    lost = strength(PROFILES["thesis"].array(), [0, 0], [0, 1])
+    assert (lost.errors, lost.erasures, lost.identifies, lost.rank) == (0, 0, False, 2)
+
+
+def test_any_set_of_cells():
+    rng = np.random.default_rng(0)
+    cells = np.nonzero(rng.random((7, 7)) < 0.5)
+    able = strength(ROBUST, *cells)
+    everywhere = np.indices((63, 65)).reshape(2, -1)
+    words = ROBUST.symbols(everywhere[0][:, None] + cells[0], everywhere[1][:, None] + cells[1])
+    assert able.distance == np.count_nonzero(words, axis=1).min()

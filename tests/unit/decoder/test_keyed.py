@@ -54,17 +54,6 @@ def test_likelihood_and_good_tuples_with_wrong_and_missing_symbols(array):
     assert (right & tuples.answered).mean() > 0.9
 
 
-def test_scores_are_those_of_the_symbols(array):
-    rows, columns, windows = views(array, (4, 4), 10)
-    scores = np.where(np.arange(4) == windows[..., None], 0.0, -3.0)
-    found = Likelihood(array).decode(scores)
-    prior = np.stack([rows, columns], axis=1)
-    by_places = Likelihood(array, prior=prior).decode(scores)
-    for each in (found, by_places):
-        assert each.answered.all()
-        np.testing.assert_array_equal(each.rows, rows)
-
-
 def test_a_key_says_whose_array(array):
     _, _, windows = views(array, array.window, 1)
     name = "one-touch" if array.rows == 63 else "large"

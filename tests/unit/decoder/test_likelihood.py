@@ -5,7 +5,7 @@ import pytest
 
 from decoder import Likelihood, MethodError, WindowError, decode_good_tuple, decode_likelihood
 from decoder.ordered import Ordered
-from decoder.ranking import AllPlaces, best_of
+from decoder.ranking import AllPlaces
 from decoder.window import hard_scores
 from generator.array import PROFILES, array_from
 
@@ -80,28 +80,6 @@ def test_ordered_statistics_agree_with_the_transform_at_few_errors(name):
     assert (found.values[:, 0] <= whole.values[:, 0] + 1e-3).all()
 
 
-def test_every_window_of_a_profile_by_likelihood():
-    for name in ("thesis", "one-touch", "product"):
-        array = PROFILES[name].array()
-        rows, columns, windows = every_window(array, array.window)
-        found = decode_likelihood(array, windows, error=1e-6, blank=0)
-        assert found.answered.all()
-        np.testing.assert_array_equal(found.rows, rows)
-        np.testing.assert_array_equal(found.columns, columns)
-
-
-def test_views_that_correct_two_errors_do():
-    rng = np.random.default_rng(5)
-    rows, columns, windows = every_window(ROBUST, (5, 5))
-    assert ROBUST.minimum_distance(*np.indices((5, 5))) == 5
-    read = windows.reshape(-1, 25).copy()
-    for window in read:
-        window[rng.choice(25, 2, replace=False)] ^= 1
-    found = Likelihood(ROBUST, doubt=1.0).decode(read.reshape(-1, 5, 5))
-    np.testing.assert_array_equal(found.rows, rows)
-    np.testing.assert_array_equal(found.columns, columns)
-
-
 def test_floor_of_success_rates():
     """Hard decisions, likeliest place if single; `encoding.md`: 96 and 75, 99.9 and 95 %."""
     rng = np.random.default_rng(6)
@@ -127,45 +105,6 @@ def test_default_threshold_gives_no_wrong_answer_and_no_window_is_lost():
         assert refused.row is None
         assert refused.reason in ("ambiguous", "not an encoded surface")
         assert bool(refused.candidates) == (refused.reason == "ambiguous")
-
-
-def test_prior_and_rotations():
-    rng = np.random.default_rng(8)
-    rows, columns, windows = every_window(ROBUST, (6, 6))
-    registered = rng.choice(rows.size, 400, replace=False)
-    prior = np.stack([rows, columns], axis=1)[registered]
-    turns = rng.integers(0, 4, 400)
-    read = np.array([np.rot90(w, -k) for w, k in zip(windows[registered], turns, strict=True)])
-    found = Likelihood(ROBUST, prior=prior, rotations=(0, 1, 2, 3)).decode(read)
-    assert found.answered.mean() > 0.95
-    right = found.answered
-    np.testing.assert_array_equal(found.rows[right], prior[right, 0])
-    np.testing.assert_array_equal(found.rotations[right], turns[right])
-    without = Likelihood(ROBUST, rotations=(0, 1, 2, 3)).decode(read)
-    assert without.answered.mean() < found.answered.mean()
-
-
-def test_a_window_that_is_not_square_turned_by_a_right_angle():
-    array = ARRAYS["GF(4)"]
-    window = array.symbols(*np.indices((4, 6)))
-    found = decode_likelihood(array, np.rot90(window, -1), rotations=(0, 1))[0]
-    assert (found.row, found.column, found.rotation) == (0, 0, 1)
-
-
-def test_prior_at_any_size():
-    array = array_from({"family": "prba", "order": 2, "degree": 64})
-    rng = np.random.default_rng(9)
-    prior = np.stack([rng.integers(0, array.rows, 300, np.uint64),
-                      rng.integers(0, array.columns, 300, np.uint64)], axis=1)  # fmt: skip
-    prior[0] = array.rows - 1, array.columns - 1  # wraps
-    a, b = np.indices((6, 6)).astype(np.uint64)
-    rows = (prior[:, 0, None, None] + a) % np.uint64(array.rows)
-    columns = (prior[:, 1, None, None] + b) % np.uint64(array.columns)
-    read = array.symbols(rows, columns) ^ (rng.random((300, 6, 6)) < 0.02)
-    found = Likelihood(array, prior=prior).decode(read)
-    assert found.answered.mean() > 0.97
-    np.testing.assert_array_equal(found.rows[found.answered], prior[found.answered, 0])
-    assert found[0].t == array.sequence.period - 1 if found.answered[0] else True
 
 
 @pytest.mark.parametrize(("order", "degree"), [(2, 64), (4, 32), (2, 40), (3, 20)])
@@ -236,30 +175,12 @@ def test_scores_that_are_not_finite_are_refused(bad):
 
 @pytest.mark.parametrize(
     "options",
-    [{"error": 0.5}, {"error": 0.0}, {"doubt": 0.0}, {"blank": 1.0}, {"rotations": ()},
-     {"rotations": (4,)}, {"prior": [1, 2]}, {"prior": np.zeros((0, 2), int)}],
+    [{"error": 0.5}, {"prior": [1, 2]}, {"prior": np.zeros((0, 2), int)}],
 )  # fmt: skip
 def test_options_out_of_range_are_refused(options):
     with pytest.raises(WindowError) as refused:
         decode_likelihood(ROBUST, np.zeros((6, 6), int), **options)
     assert refused.value.fix
-
-
-def test_large_product_arrays_are_searched_exactly():
-    array = array_from({"family": "prmvpa", "factors": {
-        "rows": {"order": 2, "degree": 10}, "columns": {"order": 4, "degree": 5}}})  # fmt: skip
-    rng = np.random.default_rng(12)
-    places = np.stack([rng.integers(0, 1023, 6), rng.integers(0, 1023, 6)], axis=1)
-    a, b = np.indices((12, 8))
-    read = array.symbols(places[:, 0, None, None] + a, places[:, 1, None, None] + b)
-    read = np.where(rng.random(read.shape) < 0.1, (read + 3) % 8, read)
-    found = decode_likelihood(array, read)
-    np.testing.assert_array_equal(found.rows[found.answered], places[found.answered, 0])
-    assert found.answered.sum() >= 4
-    with pytest.raises(MethodError, match="prior"):
-        decode_likelihood(array_from({"family": "prpa", "factors": {
-            "rows": {"order": 2, "degree": 20}, "columns": {"order": 2, "degree": 10}}}),
-            np.zeros((20, 10), int))  # fmt: skip
 
 
 def test_good_tuple_is_the_weaker_way():
@@ -276,16 +197,3 @@ def test_good_tuple_is_the_weaker_way():
         decode_good_tuple(ROBUST, np.zeros((2, 2), int))
     with pytest.raises(MethodError):
         decode_good_tuple(ARRAYS["product"], np.zeros((6, 6), int))
-
-
-def test_best_of_many_and_few():
-    rng = np.random.default_rng(14)
-    for places in (1, 2, 3, 17, 1023, 4096, 5000):
-        values = rng.normal(size=(4, places)).astype(np.float32)
-        for number in (2, 5, 16):
-            found, chosen, rest = best_of(values.copy(), number)
-            truth = -np.sort(-values, axis=1)[:, : found.shape[1]]
-            kept = min(number, places)
-            np.testing.assert_allclose(chosen[:, :kept], truth[:, :kept])
-            others = np.exp(values - values.max(axis=1, keepdims=True)).sum(axis=1) - 1
-            np.testing.assert_allclose(rest, others, rtol=1e-3, atol=1e-6)

@@ -10,7 +10,6 @@ import pytest
 
 from generator.alphabet import (
     ALPHABETS,
-    Alphabet,
     Glyph,
     SymbolStyle,
     alphabet_named,
@@ -23,8 +22,7 @@ from generator.alphabet.known import line
 from generator.alphabet.outline import engrave
 from generator.alphabet.printable import gap_between_mm, gap_inside_mm
 from generator.errors import AlphabetError
-from generator.plane.polygon import points_inside, signed_area
-from generator.plane.rings import edges_cross
+from generator.plane.polygon import edges_cross, points_inside, signed_area
 from generator.printers import PRINTERS
 
 FDM = PRINTERS["fdm-0.4"]
@@ -83,12 +81,6 @@ def test_top_keeps_the_stroke_and_draft_widens_the_foot():
         [2 * 1.82 + 1.4 + 2 * 0.1 * draft - 0.2] * 2, rel=1e-14
     )
     assert chamfered.rings[0][0] == pytest.approx(foot, rel=1e-14)
-
-
-def test_a_loop_leaves_a_hole():
-    tiers = outlines(alphabet_named("dense-8"), style_for(alphabet_named("dense-8"), 10.0))[2]
-    assert [len(rings) for rings in tiers.rings] == [2, 2]
-    assert -signed_area(tiers.rings[-1][1]) == pytest.approx(0.6**2, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -152,17 +144,6 @@ def test_each_advised_way_out_removes_its_cause(style):
         number = math.radians(float(value)) if name == "draft" else float(value)
         unit = "rad" if name == "draft" else "mm"
         outlines(DENSE, replace(style, **{f"{name}_{unit}": number}))
-
-
-def test_pitch_advised_for_touching_symbols_works():
-    style = SymbolStyle(pitch_mm=7.0, stroke_mm=3.3, draft_rad=0.0)
-    open_ones = Alphabet("open", (DENSE.glyphs[0], DENSE.glyphs[3]), 0.26, 0.2)
-    with pytest.raises(AlphabetError, match="touch") as caught:
-        footprint_half_mm(open_ones, style)
-    pitch = float(re.search(r"pitch to ([0-9.]+)", caught.value.fix)[1])
-    stroke = float(re.search(r"stroke to ([0-9.]+)", caught.value.fix)[1])
-    assert footprint_half_mm(open_ones, replace(style, pitch_mm=pitch)) < pitch / 2
-    assert footprint_half_mm(open_ones, replace(style, stroke_mm=stroke)) < 3.5
 
 
 def test_gaps_are_measured_on_the_outline():

@@ -7,6 +7,7 @@ from generator.array.profiles import profile
 from generator.errors import LayoutError
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Occupancy
+from generator.layout.placement import CODE_LETTERS, FaceLayout, Layout, Placement, object_code
 from generator.polyhedron import shapes
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
@@ -55,7 +56,7 @@ def test_the_60_mm_cube_carries_384_symbols():
         assert np.allclose(np.unique(np.round(face.centres_mm, 4)), x, atol=1e-4)
 
 
-@pytest.mark.parametrize("kind", ["faces", "net", "auto"])
+@pytest.mark.parametrize("kind", ["faces", "net"])
 @pytest.mark.parametrize(
     "solid",
     [
@@ -71,22 +72,7 @@ def test_the_usual_solids(solid, kind):
     layout = laid_out(solid, kind=kind)
     check(layout)
     assert all(face.places > 0 for face in layout.faces)
-    assert kind in ("auto", layout.kind)
-
-
-def test_auto_shows_as_many_places_as_either_kind():
-    solid = shapes.octahedron(70.0)
-    places = {
-        k: sum(f.places for f in laid_out(solid, kind=k).faces) for k in ("auto", "net", "faces")
-    }
-    assert places["auto"] == max(places.values())
-
-
-def test_a_net_lays_one_lattice_through_all_faces():
-    layout = laid_out(shapes.cube(56.0), kind="net")
-    check(layout)
-    anchors = {(face.placement.row, face.placement.column) for face in layout.faces}
-    assert len(anchors) == 1
+    assert kind == layout.kind
 
 
 def test_the_same_object_gives_the_same_layout_and_a_second_one_other_cells():
@@ -186,9 +172,40 @@ def test_clearances_must_match_the_edges():
             lay_out(solid, ARRAY, 7.0, 2.7, bad, NONE)
 
 
-def test_large_arrays_and_profiles():
-    for name, pitch, half in (("thesis", 12.0, 4.5), ("large", 7.0, 2.7), ("fine", 4.5, 1.8)):
-        array = profile(name).array()
-        layout = laid_out(shapes.cube(60.0), array=array, pitch=pitch, half=half)
-        check(layout, array)
-        assert all(face.places > 0 for face in layout.faces)
+def layout_at(*cells):
+    """Return a layout of a blank face and one face for each cell."""
+    place = Placement(0, 0, 0.0, 0.0, 0.0)
+    blank = np.zeros(0, dtype=np.int64)
+    faces = [FaceLayout(0, place, blank, blank, blank, np.zeros((0, 2)), 0)]
+    for row, column in cells:
+        one = np.ones(1, dtype=np.int64)
+        faces.append(FaceLayout(1, place, row * one, column * one, one, np.zeros((1, 2)), 0))
+    return Layout("faces", 7.0, tuple(faces))
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "cells", "code"),
+    [
+        (63, 65, [(0, 0)], "222"),
+        (63, 65, [(1, 0)], "24Y"),  # 65 = 2 * 22 + 21
+        (63, 65, [(2, 0), (1, 0), (1, 5)], "24Y"),  # the first cell
+        (51, 1285, [(50, 1284)], "C5EU"),  # 65534 = ((6 * 22 + 3) * 22 + 8) * 22 + 18
+        (2**32, 2**32, [(2**32 - 1, 2**32 - 1)], "D" + "?" * 14),
+    ],
+)
+def test_codes_count_cells(rows, columns, cells, code):
+    found = object_code(layout_at(*cells), rows, columns)
+    number = 0
+    for letter in found:
+        number = number * len(CODE_LETTERS) + CODE_LETTERS.index(letter)
+    row, column = min(cells)
+    assert number == row * columns + column
+    assert len(found) == len(code)
+    if "?" not in code:
+        assert found == code
+
+
+def test_every_cell_has_its_own_code():
+    codes = {object_code(layout_at((r, c)), 63, 65) for r in range(63) for c in range(65)}
+    assert len(codes) == 63 * 65
+    assert "F" not in "".join(codes)

@@ -9,7 +9,6 @@ from generator.layout.footprint import (
     mirror_region,
     move_region,
     region_of,
-    slack,
 )
 
 SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
@@ -31,11 +30,6 @@ def test_each_edge_has_its_own_clearance():
     x, y = np.array([4.9, 5.0, 7.0, 7.1]), np.array([1.9, 2.0, 6.0, 6.1])
     expected = np.outer([False, True, True, False], [False, True, True, False])
     assert np.array_equal(free_grid(region, 2.0, y, x), expected)
-
-
-def test_nothing_is_free_outside():
-    grid = np.array([-20.0, -3.0, 13.0, 20.0])
-    assert not free_grid(square(0.0), 0.5, grid, grid).any()
 
 
 def test_a_hole_keeps_its_distance_on_every_side():
@@ -81,11 +75,3 @@ def test_moved_and_mirrored_keep_the_face_on_the_left():
     x = np.array([5.0])
     assert free_grid(region, 2.0, x, x).all()
     assert free_grid(mirror_region(region), 2.0, x, x).all()
-
-
-def test_slack_is_the_way_to_the_nearest_limits():
-    centres = np.array([[4.0, 5.0], [6.0, 5.0]])
-    assert slack(square(), 2.0, centres) == pytest.approx((1.0, 1.0), abs=1e-6)
-    assert slack(square(), 2.0, centres + np.array([0.5, 0.0])) == pytest.approx(
-        (1.5, 0.5), abs=1e-6
-    )

@@ -19,7 +19,6 @@ from generator.layout.recognition_rate import (
     face_views,
     measured_answers,
     measured_types,
-    sensor_view,
 )
 from generator.polyhedron import face_polygon, shapes
 
@@ -123,14 +122,6 @@ def test_a_60_mm_face_shows_what_was_measured(pitch_mm, half_mm, mean):
         assert views.seen[near == sides].mean() == pytest.approx(symbols, abs=0.35)
 
 
-def test_a_blank_face_shows_nothing():
-    blank = FaceLayout(0, Placement(0, 0, 0.0, 0.0, 0.0), *NONE, NONE[0], np.empty((0, 2)), 0)
-    views = face_views((SQUARE,), blank, 7.0, VIEW)
-    assert not views.seen.any()
-    assert not views.lines.any()
-    assert (views.loaded > 0.2).all()
-
-
 def test_a_promise_weighs_measured_answers():
     coarse = np.array([[0.0, 0.2], [0.4, 0.8], [0.8, 1.0]])
     again = (-1.0, 1.5, -0.5)
@@ -150,18 +141,6 @@ def test_a_promise_weighs_measured_answers():
     assert answered_shares(views, table, 6.0) == pytest.approx((once.mean(), within.mean()))
 
 
-def test_the_table_that_ships_was_measured():
-    """More of the sensor on the face, or more symbols, never tells less; none tell nothing."""
-    table = measured_answers()
-    assert table.probability.shape == tuple(map(len, (table.pitch_mm, table.seen, table.loaded)))
-    assert ((table.probability >= 0) & (table.probability <= 1)).all()
-    assert (table.probability[:, -1, -1] > 0.9).all()
-    assert (table.probability[:, 0, 0] < 0.1).all()
-    for pitch in (4.5, 5.5, 7.0):
-        middle = table.at(pitch, np.full(5, 9), np.linspace(0.3, 1.0, 5))
-        assert (np.diff(middle) > -0.05).all()
-
-
 def test_other_sensors_answer_a_share_of_what_the_usual_one_does():
     table, seen, loaded = measured_answers(), np.full(3, 40), np.array([0.4, 0.7, 1.0])
     usual = answered_at_once(table, 5.0, seen, loaded)
@@ -178,17 +157,6 @@ def test_other_sensors_answer_a_share_of_what_the_usual_one_does():
             assert here[1] == pytest.approx(usual[1] / (1 + math.exp(-logit)))
             assert (here < usual).all()
             assert (np.diff(here) >= 0).all()
-
-
-def test_a_larger_sensor_steps_farther_and_within_three_is_said_of_the_usual_one_alone():
-    mat = sensor_type_named("mat-32x32")
-    assert sensor_view(mat, 2.0).around_mm == pytest.approx(20 * 64 / 25.4)
-    assert sensor_view(SensorType(), 2.0) == SensorView((12.7, 12.7), 2.0)
-    views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW)
-    once, within = answered_shares(views, measured_answers(), 6.0, mat)
-    assert 0 < once < 1
-    assert within is None
-    assert answered_shares(views, measured_answers(), 6.0)[1] is not None
 
 
 def test_a_type_of_your_own_is_taken_for_the_one_most_like_it():

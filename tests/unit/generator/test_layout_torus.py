@@ -5,15 +5,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from generator.layout.occupancy import Occupancy
-from generator.layout.torus import TorusPosition, cells_at, place_pieces
+from generator.layout.occupancy import TILE, Occupancy, cells_of_tiles, tiles_of
+from generator.layout.torus import CORNER, TorusPosition, board_size, place_pieces
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
 TURNS = (0, 1, 2, 3)
 
 
-def torus(rows, columns, cells=NONE):
-    return Occupancy.from_cells(*cells, SimpleNamespace(rows=rows, columns=columns, first=(0, 0)))
+def torus(rows, columns, cells=NONE, first=(0, 0)):
+    return Occupancy.from_cells(*cells, SimpleNamespace(rows=rows, columns=columns, first=first))
+
+
+def cells_at(mask, at, rows, columns):
+    """The array rows and columns of a mask at a position, on the torus."""
+    r, c = np.nonzero(np.rot90(mask, at.quarter))
+    return (r.astype(object) + at.row) % rows, (c.astype(object) + at.column) % columns
 
 
 def block(rows, columns):
@@ -45,17 +51,6 @@ def test_a_piece_is_turned_only_where_that_is_allowed():
     assert place_pieces(occupancy, [(block(1, 3), TURNS)]) == [TorusPosition(1, 2, 1)]
 
 
-def test_turns_of_a_piece_without_symmetry():
-    form = np.array([[1, 1, 1], [1, 0, 0]], dtype=bool)
-    hole = np.rot90(form, 3)
-    taken = np.ones((9, 9), dtype=bool)
-    taken[3:6, 4:6] = ~hole
-    (spot,) = place_pieces(torus(9, 9, np.nonzero(taken)), [(form, TURNS)])
-    assert spot == TorusPosition(3, 4, 3)
-    rows, columns = cells_at(form, spot, 9, 9)
-    assert not taken[rows, columns].any()
-
-
 def test_the_place_with_most_contact_is_taken():
     taken = np.zeros((12, 12), dtype=bool)
     taken[5, 3:9] = taken[6, 3] = taken[6, 8] = True  # a bay, four cells wide
@@ -68,17 +63,6 @@ def test_what_does_not_fit_is_left_and_the_rest_is_placed():
         torus(6, 6), [(block(7, 1), (0,)), (block(6, 6), (0,)), (block(1, 1), (0,))]
     )
     assert spots == [None, TorusPosition(0, 0, 0), None]
-
-
-def test_empty_pieces_need_no_place():
-    assert place_pieces(torus(6, 6), [(np.zeros((0, 0), dtype=bool), (0,))]) == [None]
-
-
-def test_occupancy_counts_each_cell_once_and_on_the_torus():
-    occupancy = torus(5, 7, ([0, 5, -5, 4], [1, 8, 1, 6]))
-    assert (occupancy.used, occupancy.free) == (2, 33)
-    assert occupancy.density == pytest.approx(2 / 35)
-    assert occupancy.with_cells([4, 3], [6, 0]).used == 3
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(4095, 4097), (2**32 - 1, 2**32 + 1), (2**63, 5)])
@@ -116,9 +100,119 @@ def test_placing_from_another_first_cell_is_a_shift_of_the_same(size):
     rows, columns = size
     pieces = [(block(5, 7), (0, 1)), (block(4, 4), (0,))] * 3
     first = (rows - 3, columns // 2)
-    array = SimpleNamespace(rows=rows, columns=columns, first=first)
-    elsewhere = place_pieces(Occupancy.from_cells(*NONE, array), pieces)
+    elsewhere = place_pieces(torus(rows, columns, first=first), pieces)
     for one, other in zip(place_pieces(torus(rows, columns), pieces), elsewhere, strict=True):
         assert other == TorusPosition(
             (one.row + first[0]) % rows, (one.column + first[1]) % columns, one.quarter
         )
+
+
+KINDS = {
+    "rectangle": lambda a, b: np.ones((a, b), dtype=bool),
+    "triangle": lambda a, _: np.add.outer(np.arange(a + 1), np.arange(a + 1)) <= a,
+    "hexagon": lambda a, _: np.add.outer(*[np.abs(np.arange(a + 1) - a / 2)] * 2) <= 0.8 * a,
+    "parallelogram": lambda a, b: np.array(
+        [[row <= column < row + b for column in range(a + b)] for row in range(a)]
+    ),
+}
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_mixed_faces_fill_the_array(seed):
+    """At full load at least 0.88 of the default array is used."""
+    random = np.random.default_rng(seed)
+    rows, columns, masks = 63, 65, []
+    while sum(int(mask.sum()) for mask in masks) < rows * columns:
+        kind = list(KINDS)[random.integers(4)]
+        masks.append(KINDS[kind](*random.integers(3, 8, 2)))
+    occupancy = torus(rows, columns)
+    spots = place_pieces(occupancy, [(mask, (0, 1, 2, 3)) for mask in masks])
+    for mask, spot in zip(masks, spots, strict=True):
+        if spot is not None:
+            before = occupancy.used
+            occupancy = occupancy.with_cells(*cells_at(mask, spot, rows, columns))
+            assert occupancy.used == before + mask.sum()
+    assert occupancy.density >= 0.88
+
+
+PLACES = {
+    "corner": (np.array([0, 0, 63, 64, 127]), np.array([0, 64, 63, 64, 0])),
+    "far": (np.array([0, 2**62, 2**63 - 2]), np.array([2**63 - 2, 5, 2**63 - 2])),
+    "none": (np.empty(0, np.int64), np.empty(0, np.int64)),
+    "many": tuple(np.unravel_index(np.random.default_rng(2).permutation(200 * 300)[:9000],
+                                   (200, 300))),
+}  # fmt: skip
+
+
+def cells(row, column, height, width):
+    return tuple(i.ravel() for i in np.mgrid[row : row + height, column : column + width])
+
+
+def listed(cells):
+    return list(zip(*(part.tolist() for part in cells), strict=True))
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_cells_come_back_sorted(place):
+    assert listed(cells_of_tiles(tiles_of(*PLACES[place]))) == sorted(listed(PLACES[place]))
+
+
+def test_cells_are_taken_and_freed_one_by_one():
+    chance = np.random.default_rng(7)
+    held, occupancy = set(), torus(130, 150)
+    for _ in range(30):
+        some = np.stack([chance.integers(0, 130, 200), chance.integers(0, 150, 200)])
+        if chance.random() < 0.6:
+            occupancy, held = occupancy.with_cells(*some), held | set(listed(some))
+        else:
+            occupancy, held = occupancy.without_cells(*some), held - set(listed(some))
+        assert occupancy.used == len(held)
+        assert listed(occupancy.cells()) == sorted(held)
+    rows, columns = occupancy.cells()
+    whole = np.zeros((130, 150), dtype=bool)
+    whole[rows, columns] = True
+    for size in ((130, 150), (64, 128), (1, 149), (100, 7)):
+        assert np.array_equal(occupancy.corner(*size), whole[: size[0], : size[1]])
+    array = SimpleNamespace(rows=130, columns=150, first=(0, 0))
+    assert Occupancy.from_tiles(occupancy.tiles, array).used == len(held)
+    assert occupancy.without_cells(rows, columns).tiles == {}
+
+
+def test_more_cells_change_their_own_tiles_alone():
+    before = torus(4095, 4097, cells(0, 0, 640, 640))
+    after = before.with_cells(*cells(60, 640, 8, 8))
+    changed = [at for at in after.tiles if after.tiles[at] is not before.tiles.get(at)]
+    assert sorted(changed) == [(0, 10), (1, 10)]
+    assert before.used == 640**2
+    assert after.used == before.used + 64
+
+
+def test_what_is_opened_of_a_large_array_follows_its_objects():
+    far = cells(2000, 3000, 8, 8)
+    assert board_size(torus(4095, 4097)) == (CORNER, CORNER)
+    assert board_size(torus(4095, 4097, cells(0, 0, 700, 700))) == (704, 704)
+    # another lab's objects, imported from elsewhere on the array, open nothing
+    assert board_size(torus(4095, 4097, cells(0, 0, 700, 700)).with_cells(*far)) == (704, 704)
+    assert board_size(torus(1023, 1025, cells(0, 0, 1023, 1025))) == (1023, 1025)
+    assert board_size(torus(255, 257)) == (255, 257)
+    assert min(board_size(torus(2**32 - 1, 2**32 + 1, cells(0, 0, 10, 30 * TILE)))) >= 30 * TILE
+
+
+@pytest.mark.parametrize("first", [(0, 0), (1, 1), (64, 128), (129, 149), (100, 60)])
+def test_the_corner_begins_at_the_first_cell_and_goes_round(first):
+    chance = np.random.default_rng(7)
+    taken = chance.random((130, 150)) < 0.3
+    occupancy = torus(130, 150, np.nonzero(taken), first)
+    assert occupancy.first == first
+    assert occupancy.with_cells([1], [1]).first == first
+    seen = np.roll(taken, (-first[0], -first[1]), axis=(0, 1))
+    for size in ((130, 150), (64, 128), (1, 149), (100, 7)):
+        assert np.array_equal(occupancy.corner(*size), seen[: size[0], : size[1]])
+
+
+@pytest.mark.parametrize("first", [(0, 0), (5, 3), (4000, 4090), (2048, 64)])
+def test_what_is_opened_begins_at_the_first_cell(first):
+    near = torus(4095, 4097, cells(*first, 700, 700), first)
+    assert all(640 <= side <= 704 for side in board_size(near))
+    far = torus(4095, 4097, cells(first[0] + 1500, first[1] + 1500, 8, 8), first)
+    assert board_size(far) == (CORNER, CORNER)

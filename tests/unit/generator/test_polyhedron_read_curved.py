@@ -70,11 +70,6 @@ def test_cone_either_way_up_and_to_its_tip(low, high):
     assert volume(solid) == pytest.approx(exact, rel=2e-3)
 
 
-def test_half_a_cylinder_is_open():
-    half = BRepPrimAPI_MakeCylinder(30, 80, math.pi).Shape()
-    assert kinds(polyhedron_from(half)) == [("cylinder", False, False)]
-
-
 def test_bore_is_concave_and_goes_through():
     block = BRepPrimAPI_MakeBox(60, 60, 60).Solid()
     bore = BRepPrimAPI_MakeCylinder(axes(30, 30, -10), 20, 80).Shape()
@@ -113,11 +108,6 @@ def shell(wall: float):
     inner = BRepPrimAPI_MakeSphere(axes(0, 0, 0, (1, 2, 9)), 60.0 - wall).Shape()  # divided apart
     half = BRepPrimAPI_MakeBox(gp_Pnt(0, -99, -99), 99, 198, 198).Solid()
     return BRepAlgoAPI_Common(BRepAlgoAPI_Cut(outer, inner).Shape(), half).Shape()
-
-
-def test_a_thin_round_shell_is_divided_finely_enough_not_to_cut_itself():
-    solid = polyhedron_from(shell(1.0))
-    assert volume(solid) == pytest.approx(math.pi * 2 / 3 * (60**3 - 59**3), rel=0.1)
 
 
 def test_a_wall_thinner_than_the_division_says_so():

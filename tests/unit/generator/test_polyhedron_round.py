@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from generator.errors import ShapeError
-from generator.polyhedron import volume
 from generator.polyhedron.development import development
 from generator.polyhedron.shapes import cone, cylinder
-from generator.polyhedron.winged import developable_from
 
 SOLIDS = [cylinder(60, 80), cylinder(12, 5), cone(70, 80, 30), cone(60, 60), cone(300, 40, 290)]
 
@@ -59,24 +57,6 @@ def test_the_chord_error_is_the_distance_from_the_round_side(solid):
     off = max(np.abs(corners - surface.radius_mm).max(), np.abs(middles - surface.radius_mm).max())
     assert off == pytest.approx(surface.chord_error_mm, rel=1e-6)
     assert surface.chord_error_mm <= 0.0201
-
-
-def test_volumes_are_those_of_the_round_solids():
-    assert volume(cylinder(60, 80)) == pytest.approx(math.pi * 30**2 * 80, rel=1e-3)
-    assert volume(cone(60, 60)) == pytest.approx(math.pi * 30**2 * 20, rel=2e-3)
-
-
-def test_a_round_face_is_named_and_described_as_one():
-    solid = cylinder(60, 80)
-    (surface,) = solid.surfaces
-    assert [solid.faces[k].name for k in surface.facets[:3]] == ["F2", "F2.2", "F2.3"]
-    assert (solid.faces[0].name, solid.faces[-1].name) == ("F1", "F3")
-    assert developable_from(surface.definition()).facets == surface.facets
-
-
-def test_the_outline_of_a_pointed_cone_is_one_polygon():
-    d = unrolled(cone(60, 60))
-    assert len(d.outline) == len(d.low) + 1 == len(d.outline_edges())
 
 
 def test_wrong_lengths_are_refused():

@@ -17,13 +17,12 @@ from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.simulate.registered import registered_surface
 from recognizer.scan.mosaic.planar import relative_pose, transform_points
-from recognizer.thesis.merge import average_touches, merge_touches, relative_poses
+from recognizer.thesis.merge import merge_touches, relative_poses
 from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_scan
-from recognizer.thesis.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW
-from recognizer.touch.tactile_image import ImageError, tactile_image, touch_image
+from recognizer.touch.tactile_image import ImageError, tactile_image
 
 SENSOR = SensorType()
 SET = """
@@ -112,6 +111,8 @@ def test_poses_in_any_frame_become_those_in_the_first_sensor_frame():
     assert relative_poses(tilted @ spatial) == pytest.approx(expected, abs=1e-9)
     with pytest.raises(ImageError, match="shape"):
         relative_poses(np.zeros((3, 2)))
+    with pytest.raises(ImageError, match="2 touches with 1 poses"):
+        merge_touches(SENSOR, [np.zeros((16, 16))] * 2, np.zeros((1, 3)))
 
 
 def test_touches_lie_where_they_were_felt():
@@ -158,30 +159,11 @@ def test_bad_tactels_are_filled_by_other_touches():
     assert np.abs(found.image.values - pattern(at[..., 0], at[..., 1]))[inner].max() < 0.3
 
 
-def test_touches_without_poses_are_refused():
-    with pytest.raises(ImageError, match="2 touches with 1 poses"):
-        merge_touches(SENSOR, [np.zeros((16, 16))] * 2, np.zeros((1, 3)))
-
-
-def test_image_of_one_touch_is_the_magnified_touch():
-    image = touch_image(SENSOR, felt_at([0, 0, 0]))
-    found = average_touches(SENSOR, [image], np.zeros((1, 3)))
-    place = found.xy_mm(*np.indices(found.values.shape))
-    middle = np.abs(place).max(axis=-1) < 5
-    assert np.abs(found.values - pattern(place[..., 0], place[..., 1]))[middle].max() < 0.25
-
-
 def test_bounded_errors_do_not_add_up(scan):
-    errors = {
-        placing: off_mm(
-            merge_touches(SENSOR, scan.readings, scan.believed, placing).poses,
-            scan.true,
-        )
-        for placing in ("product", "bounded", "believed")
-    }
-    assert errors["product"] < 1.6 * SENSOR.pitch_mm
-    assert errors["bounded"] < 0.5 * SENSOR.pitch_mm
-    assert errors["believed"] < 0.3 * SENSOR.pitch_mm  # this arm is better than quarter steps
+    # this arm is better than quarter steps
+    for placing, most in (("product", 1.6), ("bounded", 0.5), ("believed", 0.3)):
+        merged = merge_touches(SENSOR, scan.readings, scan.believed, placing)
+        assert off_mm(merged.poses, scan.true) < most * SENSOR.pitch_mm
 
 
 # --- reading ----------------------------------------------------------------------------
@@ -258,12 +240,3 @@ def test_an_object_of_another_lab_is_not_taken_for_one_of_ours(lab, tmp_path):
     found = read_scan(lab, SENSOR, scan.readings, scan.believed, "believed")
     assert len(found.grid.members) > 24  # its symbols are read, and are none of ours
     assert not found.recognition
-
-
-def test_symbols_of_a_face_are_read_as_the_database_has_them(lab, scan):
-    image = merge_touches(SENSOR, scan.readings, scan.true, "believed").image
-    encoding = lab.arrays[0]
-    found = symbols(image, encoding.alphabet, encoding.style)
-    named = [symbol for symbol in found if symbol.label >= 0]
-    assert len(named) >= 30
-    assert all(math.isfinite(symbol.theta_rad) for symbol in named)

@@ -68,7 +68,7 @@ def test_no_points_in_nothing_and_beside_what_is_undefined():
     assert len(edge_points(tactile_image(values, step_mm=1.0, defined=known))) == 0
 
 
-@pytest.mark.parametrize("degrees", range(-180, 180, 20))
+@pytest.mark.parametrize("degrees", range(-180, 180, 60))
 def test_line_through_points_and_its_covariance(degrees):
     rng, angle = np.random.default_rng(degrees + 180), math.radians(degrees)
     normed = []

@@ -51,14 +51,7 @@ from recognizer.scan.mosaic.pose_graph import (
     solve_pose_graph,
 )
 from recognizer.scan.mosaic.register import APART, CONSTANT, NOISE, register_patches
-from recognizer.scan.mosaic.search import (
-    KnownRaster,
-    cross_correlate,
-    magnify_patch,
-    peaks,
-    points_mm,
-    resample,
-)
+from recognizer.scan.mosaic.search import KnownRaster, cross_correlate, peaks, points_mm
 from recognizer.thesis.merge import product_shift
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
@@ -231,18 +224,6 @@ def test_bad_tactels_are_filled_from_around():
     broken = np.where(trust > 0, readings, 1e6)
     assert np.abs(patch(broken, trust).values - patch(readings).values).max() < 0.35
     assert patch(broken, np.zeros((16, 16))).scale == 0
-
-
-def test_a_raster_is_resampled_on_another():
-    found = magnify_patch(patch(sampled()))
-    assert found.values.shape == (64, 64)
-    pose = np.array([2.0, -1.0, 0.3])
-    under = resample(found, found, pose)
-    at = transform_points(pose, points_mm(found)[under.known])
-    inside = (np.abs(at) < 10).all(axis=1)
-    scale = patch(sampled()).scale
-    assert np.abs(under.values[under.known] * scale - waves(at))[inside].max() < 0.15
-    assert 0.7 < under.known.mean() < 0.95
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.2])
@@ -486,16 +467,6 @@ def test_the_canvas_shows_a_touch_where_it_lies():
     inside = (np.abs(at) < 9).all(axis=1)
     assert inside.sum() > 1000
     assert np.abs(shown.values[shown.known] - waves(at))[inside].max() < 0.15
-
-
-def test_a_doubtful_place_counts_little_at_edges_only():
-    step = patch(1 + (TACTELS[:, 0] > 0).reshape(16, 16).astype(float))
-    other = patch(np.full((16, 16), 5.0))
-    canvas = empty_canvas(P)
-    canvas = add_to_canvas(canvas, step, CanvasEntry(np.zeros(3), np.diag([1.0, 1.0, 1e-4]), 1.0))
-    values = image_of(add_to_canvas(canvas, other, CanvasEntry(np.zeros(3), SURE, 1.0))).values
-    assert values[32, 4] < 2.0  # as sure as the brighter touch is uncertain
-    assert values[32, 32] > 4.5
 
 
 # --- scans: without and with decoded places, blank, wrong, by steps ---------------------------

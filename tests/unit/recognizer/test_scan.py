@@ -17,8 +17,7 @@ from probe.simulate.scene import Scene
 from probe.simulate.world.levels import MISMATCH, TYPICAL
 from probe.simulate.world.sensor import LevelSensor
 from probe.surface.polygon import polygon
-from recognizer.scan.answer import ScanHypothesis
-from recognizer.scan.belief import begin_scan, extend_scan
+from recognizer.scan.belief import ScanHypothesis, begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import BY_HAND_SD, PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces, _Face, _hypotheses_of, contradict, join_faces
 from recognizer.touch.hypothesis import Hypothesis

@@ -8,18 +8,15 @@ import pytest
 
 from recognizer.scan.lattice import (
     AGREEMENT_NATS,
-    CELL_NATS,
     CORRELATION,
     LEFT_OUT_NATS,
-    WORSE_NATS,
     accumulate,
-    predict_pose,
     predicted_fit,
     refine_agreement,
     same_lattice,
     seed_lattice,
 )
-from recognizer.scan.mosaic.planar import compose_poses, inverse
+from recognizer.scan.mosaic.planar import compose_poses
 from recognizer.scan.views import LatticeView, TouchPoses, stack_views
 from recognizer.touch.symbols.fit import Fit
 
@@ -94,22 +91,6 @@ def test_touches_on_one_lattice_agree_and_their_cells_meet():
     assert both.fit.y_mm + PITCH * origin[1] == pytest.approx(true[-1, 1], abs=1e-6)
 
 
-def test_the_lattice_is_more_precise_than_the_arm():
-    _true, touch_poses, fits = a_scan(number=25, sigma_mm=0.4)
-    views = views_from([(f,) for f in fits])
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 3), PITCH)
-    middle = compose_poses(T_PLANE_LATTICE, np.array([80.0, 5.0, 0.3]))
-    at, covariance = predict_pose(
-        found.lattice, TouchPoses(middle[None], np.zeros((1, 3, 3)), None)
-    )
-    away = at[:2] - compose_poses(inverse(T_PLANE_LATTICE), middle)[:2]
-    away -= np.rint(away / PITCH) * PITCH
-    assert np.hypot(*away) < 0.25
-    sigma = np.sqrt(np.diag(covariance)[:2])
-    assert (sigma < 0.2).all()
-    assert (np.abs(away) < 4 * sigma).all()
-
-
 @pytest.mark.parametrize("worse", [0.0, 200.0])
 def test_a_wrong_lattice_of_one_touch_is_passed_over(worse):
     _true, touch_poses, fits = a_scan()
@@ -127,26 +108,13 @@ def test_a_wrong_lattice_of_one_touch_is_passed_over(worse):
     assert found.score > 5 * AGREEMENT_NATS - LEFT_OUT_NATS - 10
 
 
-def test_a_touch_that_plainly_shows_another_lattice_is_left_out():
-    _true, touch_poses, fits = a_scan()
-    wrong = replace(fits[2], x_mm=fits[2].x_mm + 4.0, theta_rad=fits[2].theta_rad + 1.2)
-    each = [(f,) for f in fits]
-    each[2] = (wrong, replace(fits[2], value=fits[2].value - 2 * WORSE_NATS))
-    views = views_from(each)
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
-    assert found.chosen.tolist() == [0, 1, -1, 4, 5, 6]
-
-
 def test_a_touch_with_ambiguous_whole_pitches_is_left_out():
     _true, touch_poses, fits = a_scan()
     views = views_from([(f,) for f in fits])
     wide = touch_poses.covariances.copy()
     wide[4] = np.diag([PITCH / 2, PITCH / 2, 0.01]) ** 2
     found = refine_agreement(
-        views,
-        TouchPoses(touch_poses.poses, wide, None),
-        seed_lattice(views, touch_poses, 0),
-        PITCH,
+        views, TouchPoses(touch_poses.poses, wide, None), seed_lattice(views, touch_poses, 0), PITCH
     )
     assert found.chosen.tolist() == [0, 1, 2, 3, -1, 5]
     both = accumulate(views, touch_poses, found, PITCH)
@@ -164,15 +132,6 @@ def test_touches_of_one_cell_share_errors():
     assert both is not None
     assert -both.fit.scores.min() == pytest.approx(2.0 * 30 / (1 + 29 * CORRELATION))
     assert -both.fit.scores.min() < 2.0 / CORRELATION
-
-
-def test_the_evidence_of_one_touch_is_bounded():
-    true, touch_poses, _fits = a_scan(number=1)
-    views = views_from([(fit_at(true[0], (0, 0), sure=500.0),)])
-    only = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
-    both = accumulate(views, touch_poses, only, PITCH)
-    assert both is not None
-    assert both.fit.scores.min() == -CELL_NATS
 
 
 def test_a_touch_that_contradicts_all_others_is_left_out():

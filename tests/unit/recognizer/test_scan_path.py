@@ -89,15 +89,6 @@ def test_a_path_decides_places_that_one_touch_leaves_open(encoding):
     assert np.sqrt(np.diag(poses.covariances[3])) == pytest.approx(PLACED_SD)
 
 
-def test_a_path_that_may_end_in_two_places_says_so(encoding):
-    row, column = corner(encoding, 1)  # its symbols are alike along a diagonal
-    views = [[view(block(encoding, row, column + i)[0])] for i in range(4)]
-    path = followed(encoding, views)
-    assert path.placed.all()
-    assert path.margin < 1
-    assert path.ambiguity > 1
-
-
 def test_a_touch_that_fits_nowhere_is_left_out(encoding):
     row, column = corner(encoding, 4)
     views = [[view(block(encoding, row, column + i, rows=3)[0])] for i in range(4)]

@@ -8,12 +8,16 @@ import pytest
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW
 from recognizer.touch.verdict import (
+    CONTRADICTION,
+    STRONG_CONTRADICTION,
     Evidence,
     is_encoded,
     least_explained,
     may_count_border,
     reject_chance,
     reject_few,
+    reject_joined,
+    reject_margin,
     reject_reason,
 )
 
@@ -108,6 +112,37 @@ def test_of_many_cells_a_share_may_contradict(wrong, reason):
 )  # fmt: skip
 def test_few_symbols_name_a_place_and_leave_others_behind(inliers, margin, matches, reason):
     assert reject_few(replace(GOOD, inliers=inliers), margin, matches, LIMITS) == reason
+
+
+CUBE = ("Cube", "F1")
+
+
+@pytest.mark.parametrize(
+    ("confirmed", "outliers", "sd_mm", "reason"),
+    [
+        (None, 0, 0.6, ""), (CUBE, 0, 0.6, ""), (CUBE, 0, 0.601, TOO_FEW),
+        (("Cube", "F2"), 0, 0.1, AMBIGUOUS), (("Box", "F1"), 9, 9.0, AMBIGUOUS),
+        # a touch that disagrees is answered by the others, while it is one of few
+        (CUBE, 3, 0.1, ""), (CUBE, 4, 0.1, NOT_ENCODED), (None, 1, 0.1, NOT_ENCODED),
+        (CUBE, 4, 9.0, NOT_ENCODED),
+    ],
+)  # fmt: skip
+def test_the_answer_of_several_touches(confirmed, outliers, sd_mm, reason):
+    assert reject_joined(CUBE, confirmed, outliers, 3, sd_mm) == reason
+
+
+def test_one_touch_alone_is_one_that_agrees():
+    few = replace(GOOD, touches=2)
+    assert reject_reason(few, TEN, LIMITS) == TOO_FEW  # one of two: no more than half
+    assert reject_reason(replace(few, agreeing=2), TEN, LIMITS) == ""
+    assert reject_reason(replace(GOOD, agreeing=0), TEN, LIMITS) == ""
+    assert [reject_margin(margin, 3.0) for margin in (3.0, 2.99)] == ["", AMBIGUOUS]
+
+
+def test_evidence_of_cells_alone_is_that_of_an_image_without_fault():
+    """As a scan has it; cells contradict by 8 nats, strongly by 16."""
+    assert Evidence(20.0, 12, 0) == Evidence(20.0, 12, 0, 0, 0, 1.0, 0.0, math.inf, 1, 1)
+    assert (CONTRADICTION, STRONG_CONTRADICTION) == (8.0, 16.0)
 
 
 def test_chance_and_what_an_image_must_explain():
