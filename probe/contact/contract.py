@@ -110,3 +110,11 @@ def nothing_under(touch: Touch) -> ContactError:
         f"there is nothing under the sensor to bear {touch.force_n:g} N",
         fix="move the sensor over the object",
     )
+
+
+def heights_under(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
+    """Return the heights under points (..., 2) of the sensor; refuse to press on nothing."""
+    heights = heights_at(surface, touch, points_mm)
+    if heights.max(initial=-math.inf) == -math.inf:
+        raise nothing_under(touch)
+    return heights

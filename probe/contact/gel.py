@@ -22,9 +22,8 @@ from probe.contact.contract import (
     STEEPEST_RAD,
     Contact,
     Touch,
-    heights_at,
+    heights_under,
     no_contact,
-    nothing_under,
 )
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import check_load, rest
@@ -55,9 +54,7 @@ def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
         return no_contact(sensor, touch, "gel")
     step = sensor.pitch_mm / FINE
     points = _grid(sensor, step)
-    heights = heights_at(surface, touch, points)
-    if heights.max(initial=-math.inf) == -math.inf:
-        raise nothing_under(touch)
+    heights = heights_under(surface, touch, points)
     law = Linear(_bed_n_mm3(sensor) * step**2)
     found = rest(points.reshape(-1, 2), heights.ravel(), law, touch)
     tilt = max(abs(found.pose.tilt_x_rad), abs(found.pose.tilt_y_rad))

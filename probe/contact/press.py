@@ -21,10 +21,10 @@ from functools import lru_cache, partial
 from importlib import resources
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import Contact, Touch, no_contact
+from probe.contact.contract import Contact, Touch, heights_under, no_contact
 from probe.contact.engines import Engine
 from probe.contact.plate import PlatePose, check_load
-from probe.contact.tabs import heights_under, tabs
+from probe.contact.tabs import tabs
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
