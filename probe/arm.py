@@ -113,11 +113,8 @@ def inverse(arm: Arm, pose: ArrayLike) -> list[NDArray[np.float64]]:
     One to four solutions in (-pi, pi]: base forwards before backwards, q3 > 0 before q3 < 0.
     Over the base axis with a vertical approach the first angle is free, and 0 is taken.
 
-    Raises
-    ------
-    PoseError
-        The pose is no rigid transform, out of reach, off the plane of the arm, or only
-        reached beyond the range of a joint.
+    Raises `PoseError` if the pose is no rigid transform, out of reach, off the plane of the arm, or
+    only reached beyond the range of a joint.
     """
     given = np.asarray(pose, np.float64)
     _check(arm, given)
@@ -232,10 +229,7 @@ def joint_speeds(arm: Arm, q: ArrayLike, twist: ArrayLike) -> NDArray[np.float64
     other directions are followed exactly, and no unit of speed (a link's length per second) asks
     for more than GAIN over that value, 58 rad/s.
 
-    Raises
-    ------
-    PoseError
-        A value that is no number.
+    Raises `PoseError` for a value that is no number.
     """
     wanted = np.asarray(twist, np.float64)
     if wanted.shape != (6,) or not np.isfinite(wanted).all():
@@ -265,10 +259,7 @@ def sensor_pose(
 
     `joint_covariance` is (5, 5) of the joints' errors, rad^2; or (5,) standard deviations, rad.
 
-    Raises
-    ------
-    PoseError
-        Joint angles or their covariance are none.
+    Raises `PoseError` for joint angles or a covariance that are none.
     """
     errors = np.asarray(joint_covariance, np.float64)
     if errors.shape == (AXES,):

@@ -89,10 +89,7 @@ def refuse_steep(tilt_x_rad: float, tilt_y_rad: float, steepest_rad: float = STE
 def heights_at(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
     """Return heights (...), mm, at points (..., 2) of the sensor frame.
 
-    Raises
-    ------
-    ContactError
-        For heights that are no numbers, or +inf.
+    Raises `ContactError` for heights that are no numbers, or +inf.
     """
     points = touch.on_surface(points_mm.reshape(-1, 2))
     heights = np.asarray(surface.heights_mm(points), np.float64)

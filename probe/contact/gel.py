@@ -40,10 +40,8 @@ MOST_STEPS = 2000  # of the membrane; each takes off 1 / (1 + 4 way^2) of its er
 def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     """Press a gel on a surface. No force gives an exactly zero image.
 
-    Raises
-    ------
-    ContactError
-        Another overlay, nothing under the sensor, a plate that tips, a gel pressed through.
+    Raises `ContactError` for another overlay, nothing under the sensor, a plate that tips, a gel
+    pressed through.
     """
     if sensor.overlay.kind != "gel":
         raise ContactError(

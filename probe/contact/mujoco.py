@@ -68,12 +68,8 @@ MOVED_MM = 0.05  # by which the mesh of heights may move, to need fewer triangle
 def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
     """Press a sensor with tabs on a written part, or on heights alone, which are meshed first.
 
-    Raises
-    ------
-    ContactError
-        An overlay that is no tabs, nothing under the sensor, or no rest.
-    SurfaceError
-        The triangles of a part close no body.
+    Raises `ContactError` for an overlay that is no tabs, nothing under the sensor, or no rest;
+    `SurfaceError` if the triangles of a part close no body.
     """
     if sensor.overlay.kind != "tab":
         raise ContactError(
@@ -253,12 +249,8 @@ def triangles_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> tup
 def mesh_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> Mesh:
     """Return the surface under the sensor: corners (n, 3) and triangles (m, 3).
 
-    Raises
-    ------
-    ContactError
-        There is nothing of it.
-    SurfaceError
-        The triangles of a part close no body.
+    Raises `ContactError` if there is nothing of it; `SurfaceError` if the triangles of a part close
+    no body.
     """
     solid_mm = body_of(surface)
     if solid_mm is None:

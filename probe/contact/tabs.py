@@ -64,12 +64,9 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
 
     No force gives an exactly zero image; other forces (rows, columns) sum to the touch's.
 
-    Raises
-    ------
-    ContactError
-        For an overlay that is no tabs, nothing under the sensor, a plate that tips or comes to
-        rest at a tilt that is not small, a force that is negative or no number, heights that
-        are no numbers, strokes too thin for any pattern.
+    Raises `ContactError` for an overlay that is no tabs, nothing under the sensor, a plate that
+    tips or comes to rest at a tilt that is not small, a force that is negative or no number,
+    heights that are no numbers, strokes too thin for any pattern.
     """
     overlay = sensor.overlay
     _check_tabs(overlay)

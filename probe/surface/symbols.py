@@ -137,10 +137,7 @@ class SymbolReliefs:
 def emboss(glyphs: tuple[Strokes, ...], unit_mm: float, relief: Relief) -> SymbolReliefs:
     """Return the symbols of an alphabet, whose strokes join nodes in units of `unit_mm`.
 
-    Raises
-    ------
-    SurfaceError
-        When a number is out of range, or draft or chamfer make an edge vanish.
+    Raises `SurfaceError` when a number is out of range, or draft or chamfer make an edge vanish.
     """
     _check(relief)
     rings = tuple(
@@ -228,10 +225,7 @@ def outline(strokes_mm: ArrayLike, stroke_mm: float) -> tuple[Ring, ...]:
 
     `stroke_mm` is the distance of two opposite flats of the nib.
 
-    Raises
-    ------
-    SurfaceError
-        For no strokes, a stroke without length, or a width that is not positive.
+    Raises `SurfaceError` for no strokes, a stroke without length, or a width that is not positive.
     """
     strokes = np.asarray(strokes_mm, dtype=np.float64)
     if strokes.ndim != 3 or strokes.shape[1:] != (2, 2) or not len(strokes):
