@@ -14,7 +14,7 @@ this, a damaged one only frames next to bytes that vanished without a trace.
 
 What is left: a corruption inside one packet that spares its number and time passes the check
 sum once in 65,536, and must then leave the six upper bits of every 10-bit reading zero. Of
-three million corrupted packets none was handed on (tests/campaigns/probe_corruption.py).
+three million corrupted packets none was handed on.
 Readings of 8 bits have no bits to spare: there it is a few of a million.
 
 Number (u16) and time (u32, us) are unwrapped to whole numbers without end. When the device

@@ -27,8 +27,7 @@ from generator.printed.prints import (
     surface_keys,
     surface_path,
 )
-from generator.printed.profiles import DEFAULT
-from generator.printed.slicer import find_slicer, slicer_version
+from generator.printed.slicer import DEFAULT, find_slicer, slicer_version
 from generator.printed.surface import is_written, read_surface
 from probe.errors import SurfaceError
 from probe.simulate.registered import face_of, registered_object

@@ -73,7 +73,7 @@ from recognizer.touch.symbols.fit import refine_lattices, score_cells
 from recognizer.touch.symbols.image import Image, bend_image
 from recognizer.touch.symbols.posterior import explained_share, refit_pose
 from recognizer.touch.verdict import Face, least_explained, reject_joined
-from recognizer.touch.verify import SHARES, bend_at
+from recognizer.touch.verify import SHARES, curvature_at
 
 Array = NDArray[np.float64]
 Views = tuple[tuple[LatticeView, ...], ...]  #: of each touch
@@ -403,7 +403,7 @@ def refine_last_pose(reader: Reader, image: Image, found: ScanHypothesis) -> Sca
     embossed, hypothesis, fit = found.embossed, found.hypothesis, found.fit
     worn = fit.cells[weigh_cells(embossed, fit, hypothesis).worn]
     labels = unworn_labels_at(embossed, hypothesis, worn)
-    bend = bend_at(embossed, hypothesis, fit)
+    bend = curvature_at(embossed, hypothesis, fit)
     shares = (1.0,) if bend is None else SHARES
     if bend is not None:
         image = bend_image(image, reader.sensor, bend, shares)

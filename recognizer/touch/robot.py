@@ -156,15 +156,15 @@ def fuse_poses(poses: Sequence[ObjectPose]) -> FusedPose:
     frame, in the order of their time; all are fused, whether or not the object was moved in
     between.
     """
-    told = np.stack([pose.T_robot_object for pose in poses])
+    every = np.stack([pose.T_robot_object for pose in poses])
     own = [pose.covariance - pose.shared for pose in poses]
     weights = np.asarray(np.linalg.inv(own), np.float64)
     information = weights.sum(axis=0)
-    T = told[0]
+    T = every[0]
     for _ in range(FUSION_STEPS):
-        pull = np.einsum("nij,nj->i", weights, _differences(told, T))
+        pull = np.einsum("nij,nj->i", weights, _differences(every, T))
         T = _displaced(T, np.asarray(np.linalg.solve(information, pull)))
-    offs = _differences(told, T)
+    offs = _differences(every, T)
     chi2 = float(np.einsum("ni,nij,nj->", offs, weights, offs))
     whole = np.linalg.inv(information) + poses[0].shared
     placed = ObjectPose(T, (whole + whole.T) / 2, poses[0].shared)

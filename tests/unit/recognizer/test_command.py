@@ -168,21 +168,6 @@ def test_nothing_to_recognise(asked, lab):
     assert len(rest) == 9
 
 
-def test_what_is_not_recognised_says_why_and_what_to_do(asked, lab):
-    half = np.zeros((16, 16))
-    half[:, :7] = 180  # a bare face up to its edge
-    path = recorded(lab / "bare.h5", [half] * 6)
-    code, out, _ = asked(path)
-    assert code == 1
-    assert out.startswith("0: not recognised: ")
-    assert "; " in out
-    entry = json.loads(asked(path, "--json")[1])[0]
-    assert entry["object"] is entry["face"] is entry["index"] is entry["T_face_probe"] is None
-    assert (entry["reason"], entry["reason_code"]) == ("not an encoded surface", "not_encoded")
-    assert "not an encoded surface: no strokes are felt, readings vary by 113 %" in out
-    assert entry["evidence"]["variation"] == pytest.approx(math.sqrt(9 / 7))
-
-
 @pytest.fixture(scope="module")
 def calibrated_touch(lab):
     """A sensor with dead tactels, its calibration, and touches that name it."""

@@ -18,7 +18,7 @@ from generator.errors import PrintError
 from generator.pipeline import encode
 from generator.printed import prints, slicer
 from generator.printed.prints import surface_keys, surface_path
-from generator.printed.surface import Coverage, PrintedSurface, write_surface
+from generator.printed.surface import PrintedSurface, write_surface
 from generator.spec import read_specs
 from probe.errors import SurfaceError
 from probe.simulate import printed
@@ -78,10 +78,8 @@ def print_as_designed(part: PartToPrint, database: str, folder: Path, faces: int
         heights = scene.surface.heights_mm(points - np.array((0.1, 0.0)))
         heights[heights < -2.5] = -np.inf
         side = (len(line), len(line))
-        surface = PrintedSurface(
-            heights.reshape(side).astype(np.float32), (-1.0, -1.0), 0.1, np.eye(4),
-            face.embossing.T_part_facet, Coverage(0, 0, 0),
-        )  # fmt: skip
+        laid = heights.reshape(side).astype(np.float32)
+        surface = PrintedSurface(laid, (-1.0, -1.0), 0.1, np.eye(4))
         write_surface(surface, surface_path(folder, keys[face.name]), moved_mm=(0.1, 0.0))
 
 
