@@ -7,12 +7,13 @@ replaced or removed.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, delete, insert, select
 
+from generator.database.read import read_only
 from generator.database.tables import as_built
 
 PARAMETERS = ("scale_x", "scale_y", "skew_rad", "stroke_mm")  #: order in the covariance
@@ -32,6 +33,9 @@ class AsBuilt:
     stroke_mm: float  #: width of the strokes of symbols
     covariance: NDArray[np.float64]  #: (4, 4) of (scale_x, scale_y, skew_rad, stroke_mm)
     touches: int  #: on which it rests
+
+
+_COLUMNS = tuple(as_built.c[field.name] for field in fields(AsBuilt))
 
 
 def write_as_built(connection: Connection, measured: AsBuilt) -> None:
@@ -63,24 +67,7 @@ def read_as_built(connection: Connection, object_id: int | None = None) -> tuple
     """
     of_object = as_built.c.object_id.is_not_distinct_from(object_id)
     found = [
-        AsBuilt(
-            object_id=row.object_id,
-            part=row.part,
-            printer=row.printer,
-            material=row.material,
-            scale_x=row.scale_x,
-            scale_y=row.scale_y,
-            skew_rad=row.skew_rad,
-            stroke_mm=row.stroke_mm,
-            covariance=_read_only(row.covariance),
-            touches=row.touches,
-        )
-        for row in connection.execute(select(as_built).where(of_object))
+        AsBuilt(**row._asdict() | {"covariance": read_only(json.loads(row.covariance))})
+        for row in connection.execute(select(*_COLUMNS).where(of_object))
     ]
     return tuple(sorted(found, key=lambda one: (one.part or "", one.printer, one.material)))
-
-
-def _read_only(text: str) -> NDArray[np.float64]:
-    matrix = np.array(json.loads(text), np.float64)
-    matrix.setflags(write=False)
-    return matrix

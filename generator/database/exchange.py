@@ -11,8 +11,8 @@ from __future__ import annotations
 import os
 import sqlite3
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from generator.database.transaction import (
     retry_on_conflict,
     write_transaction,
 )
-from generator.database.transfer import CopyReport, Origin, copy_objects
+from generator.database.transfer import CopyReport, copy_objects
 from generator.errors import DatabaseError
 
 
@@ -110,46 +110,25 @@ def import_objects(
         raise DatabaseError(cause, fix=fix, place=place_of(home))
     from_file = home.get_backend_name() == "sqlite"
     name = Path(home.database or "").name if from_file else place_of(home)
-    origin = Origin(name, datetime.now(UTC).isoformat(timespec="seconds"))
+    utc = datetime.now(UTC).isoformat(timespec="seconds")
+    origin = {"imported_from": name, "imported_utc": utc}
     with _open_unchanged(home) as source_engine, read_transaction(source_engine) as source:
 
         def work(target: Connection) -> CopyReport:
-            return copy_objects(
-                source,
-                target,
-                names=names,
-                renamed=renamed,
-                origin=origin,
-                skip_refused=skip_refused,
-                homes=(home, engine_home),
-            )
+            carried = copy_objects(
+                source, target, names=names, renamed=renamed, origin=origin,
+                skip_refused=skip_refused, homes=(home, engine_home),
+            )  # fmt: skip
+            if dry_run:
+                target.rollback()
+            return carried
 
         if not database_exists(url):  # what is refused leaves no database behind
             with tempfile.TemporaryDirectory() as folder:
                 carried = retry_on_conflict(open_database(str(Path(folder) / "lab.db")), work)
             if dry_run:
                 return carried
-        return (
-            _undone(open_database(url), work)
-            if dry_run
-            else retry_on_conflict(open_database(url), work)
-        )
-
-
-class _UndoneError(Exception):
-    """Undoes the transaction of a dry run."""
-
-
-def _undone(engine: Engine, work: Callable[[Connection], CopyReport]) -> CopyReport:
-    outcome: list[CopyReport] = []
-
-    def work_and_undo(target: Connection) -> None:
-        outcome.append(work(target))
-        raise _UndoneError
-
-    with suppress(_UndoneError):
-        retry_on_conflict(engine, work_and_undo)
-    return outcome[-1]
+        return retry_on_conflict(open_database(url), work)
 
 
 @contextmanager

@@ -265,21 +265,17 @@ def _update_schema(engine: Engine, wait_s: float, keep_older: bool) -> bool:
     with read_transaction(engine) as connection:
         version = _schema_version(connection)
     if version is not None and version < SCHEMA_VERSION:
-        older = _for_migration(engine.url, version, wait_s)
+        try:
+            older = database_engine(engine.url, writable=True, wait_s=wait_s)
+        except DatabaseError as error:
+            raise DatabaseError(
+                f"the database has schema version {version}, must be brought to {SCHEMA_VERSION}, "
+                f"and {error.cause}",
+                fix="open it once where it may be written: encode-object list --database FILE",
+                place=place_of(engine.url),
+            ) from error
         migrate(older, _schema_version, keep=keep_older)
     return version is not None
-
-
-def _for_migration(url: URL, version: int, wait_s: float) -> Engine:
-    try:
-        return database_engine(url, writable=True, wait_s=wait_s)
-    except DatabaseError as error:
-        raise DatabaseError(
-            f"the database has schema version {version}, must be brought to {SCHEMA_VERSION}, "
-            f"and {error.cause}",
-            fix="open it once where it may be written: encode-object list --database FILE",
-            place=place_of(url),
-        ) from error
 
 
 def _schema_version(connection: Connection) -> int | None:
@@ -291,7 +287,10 @@ def _schema_version(connection: Connection) -> int | None:
     if not ours and (not names or url.get_backend_name() != "sqlite"):
         return None
     stored: dict[str, str] = {}
-    if "meta" in ours and {"key", "value"} <= _columns_of_meta(connection):
+    columns = (
+        connection.execute(text("SELECT * FROM meta LIMIT 0")).keys() if "meta" in ours else ()
+    )
+    if {"key", "value"} <= set(columns):
         stored = {str(key): str(value) for key, value in connection.execute(select(meta))}
     if stored.get("format") != FORMAT:
         raise DatabaseError(
@@ -315,10 +314,6 @@ def _schema_version(connection: Connection) -> int | None:
             place=place_of(url),
         )
     return version
-
-
-def _columns_of_meta(connection: Connection) -> set[str]:
-    return set(connection.execute(text("SELECT * FROM meta LIMIT 0")).keys())
 
 
 def _create_schema(connection: Connection, lab_key: str) -> None:

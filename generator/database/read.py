@@ -132,27 +132,22 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
     entry = object_entry(connection, name)
     polyhedron = _read_polyhedron(connection, entry)
     layout = _layout_of(connection, entry)
-    row = connection.execute(
-        select(tables.objects, tables.alphabets.c.definition, tables.provenance.c.spec)
+    alphabet, text, *style = connection.execute(
+        select(tables.alphabets.c.definition, tables.provenance.c.spec, *tables.STYLE)
+        .select_from(tables.objects)
         .join(tables.alphabets)
         .join(tables.provenance)
         .where(tables.objects.c.object_id == entry.object_id)
     ).one()
-    spec = json.loads(row.spec)
+    spec = json.loads(text)
     return RegisteredObject(
         entry=entry,
         polyhedron=polyhedron,
         faces=_read_faces(connection, entry, polyhedron, layout, surfaces_of(spec)),
         layout=layout,
-        style=SymbolStyle(
-            pitch_mm=row.pitch_mm,
-            height_mm=row.height_mm,
-            stroke_mm=row.stroke_mm,
-            draft_rad=row.draft_rad,
-            chamfer_mm=row.chamfer_mm,
-        ),
+        style=SymbolStyle(*style),
         array=read_array(connection, entry.array_id),
-        alphabet=json.loads(row.definition),
+        alphabet=json.loads(alphabet),
         parts=read_parts(connection, entry.object_id),
         spec=spec,
     )
@@ -202,10 +197,10 @@ def _layout_of(connection: Connection, entry: ObjectEntry) -> Layout:
             FaceLayout(
                 face=row.face_id,
                 placement=Placement(row.row, row.column, row.rotation_rad, row.x_mm, row.y_mm),
-                rows=_read_only(r, np.int64),
-                columns=_read_only(c, np.int64),
-                labels=_read_only(label, np.int64),
-                centres_mm=_read_only(np.array([x, y], dtype=np.float64).T, np.float64),
+                rows=read_only(r, np.int64),
+                columns=read_only(c, np.int64),
+                labels=read_only(label, np.int64),
+                centres_mm=read_only(np.array([x, y], dtype=np.float64).T),
                 places=row.places,
             )
         )
@@ -227,11 +222,7 @@ def read_styles(connection: Connection) -> tuple[RegisteredStyle, ...]:
             objects.name,
             objects.array_id,
             tables.alphabets.c.definition,
-            objects.pitch_mm,
-            objects.height_mm,
-            objects.stroke_mm,
-            objects.draft_rad,
-            objects.chamfer_mm,
+            *tables.STYLE,
         )
         .select_from(tables.objects)
         .join(tables.alphabets)
@@ -269,7 +260,7 @@ def read_parts(connection: Connection, object_id: int) -> tuple[RegisteredPart, 
             row.format,
             row.file,
             row.sha256,
-            _read_only(json.loads(row.T_object_part), np.float64),
+            read_only(json.loads(row.T_object_part)),
         )
         for row in connection.execute(
             select(tables.parts).where(parts.object_id == object_id).order_by(parts.position)
@@ -311,7 +302,7 @@ def _read_polyhedron(connection: Connection, entry: ObjectEntry) -> Polyhedron:
         )
         for row in connection.execute(_rows_of_object(tables.edges, entry, "edge_id"))
     )
-    return Polyhedron(entry.object_type, _read_only(points, np.float64), faces, edges)
+    return Polyhedron(entry.object_type, read_only(points), faces, edges)
 
 
 def _read_faces(
@@ -325,26 +316,23 @@ def _read_faces(
         face.face: face.placement for face in layout.faces if face.face not in layout.blank_faces
     }
     rounds = {one.carrier: round_face(polyhedron, one) for one in surfaces}
-    faces = []
-    for row in connection.execute(_rows_of_object(tables.faces, entry, "face_id")):
-        faces.append(
-            RegisteredFace(
-                face_id=row.face_id,
-                name=row.name,
-                face_type=row.face_type,
-                area_mm2=row.face_area,
-                T_object_face=_read_only(face_frame(polyhedron, row.face_id), np.float64),
-                polygon_mm=tuple(
-                    _read_only(loop, np.float64) for loop in face_polygon(polyhedron, row.face_id)
-                ),
-                placement=placements.get(row.face_id),
-                round=rounds.get(row.face_id),
-            )
+    return tuple(
+        RegisteredFace(
+            face_id=k,
+            name=row.name,
+            face_type=row.face_type,
+            area_mm2=row.face_area,
+            T_object_face=read_only(face_frame(polyhedron, k)),
+            polygon_mm=tuple(read_only(loop) for loop in face_polygon(polyhedron, k)),
+            placement=placements.get(k),
+            round=rounds.get(k),
         )
-    return tuple(faces)
+        for row in connection.execute(_rows_of_object(tables.faces, entry, "face_id"))
+        for k in [row.face_id]
+    )
 
 
-def _read_only(values: Any, dtype: type[np.generic]) -> NDArray[Any]:
+def read_only(values: Any, dtype: type[np.generic] = np.float64) -> NDArray[Any]:
     """Return a read-only array of its own, contiguous."""
     array = np.array(values, dtype=dtype, order="C")
     array.setflags(write=False)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any
 
@@ -74,11 +74,16 @@ def register(connection: Connection, registration: ObjectRecord, *, replace: boo
     known = find_object(connection, registration.name)
     if known is not None:
         require_in_use(connection, known)
-    if known is not None and not replace:
-        _check_same(connection, known, registration)
-        record_parts(connection, known.object_id, registration.parts)
-        return known.object_id
-    if known is not None:
+        if not replace:
+            require_same_spec(connection, known, registration.spec)
+            if not same_layout(read_layout(connection, known.name), registration.layout):
+                raise DatabaseError(
+                    f"'{known.name}' is registered already, on other cells or at other places",
+                    fix="replace the registered one with --replace",
+                    place=place_of(connection.engine.url),
+                )
+            record_parts(connection, known.object_id, registration.parts)
+            return known.object_id
         remove_object(connection, known.object_id)
     array_id, object_id = _insert_object(connection, registration, known)
     for table, rows in polyhedron_rows(object_id, registration.polyhedron):
@@ -88,19 +93,14 @@ def register(connection: Connection, registration: ObjectRecord, *, replace: boo
     take_cells(connection, array_id, _all_cells(registration.layout))
     record_parts(connection, object_id, registration.parts)
     spec = canonical(registration.spec)
-    insert_rows(
-        connection,
-        tables.provenance,
-        [
-            {
-                "object_id": object_id,
-                "tool_version": registration.tool_version,
-                "spec_hash": digest(spec),
-                "spec": spec,
-                "utc": datetime.now(UTC).isoformat(timespec="seconds"),
-            }
-        ],
-    )
+    provenance = {
+        "object_id": object_id,
+        "tool_version": registration.tool_version,
+        "spec_hash": digest(spec),
+        "spec": spec,
+        "utc": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    insert_rows(connection, tables.provenance, [provenance])
     return object_id
 
 
@@ -220,21 +220,11 @@ def _all_cells(layout: Layout) -> Cells:
     return np.concatenate([none, *rows]), np.concatenate([none, *columns])
 
 
-def _check_same(connection: Connection, known: ObjectEntry, registration: ObjectRecord) -> None:
-    require_same_spec(connection, known, registration.spec)
-    if not same_layout(read_layout(connection, registration.name), registration.layout):
-        raise DatabaseError(
-            f"'{registration.name}' is registered already, on other cells or at other places",
-            fix="replace the registered one with --replace",
-            place=place_of(connection.engine.url),
-        )
-
-
 def _insert_object(
     connection: Connection, registration: ObjectRecord, known: ObjectEntry | None
 ) -> tuple[int, int]:
     """Return the numbers of array and object."""
-    array, style = registration.array, registration.style
+    array = registration.array
     window_rows, window_columns = array.window
     array_id = definition_number(
         connection,
@@ -264,17 +254,12 @@ def _insert_object(
         "number_of_faces": len(registration.polyhedron.faces),
         "array_id": array_id,
         "alphabet_id": alphabet_id,
-        "pitch_mm": style.pitch_mm,
-        "height_mm": style.height_mm,
-        "stroke_mm": style.stroke_mm,
-        "draft_rad": style.draft_rad,
-        "chamfer_mm": style.chamfer_mm,
+        **asdict(registration.style),
         "layout": registration.layout.kind,
         "layout_warnings": canonical(list(registration.layout.warnings)),
     }
     if known is not None:
         values["object_id"] = known.object_id
-    objects = tables.objects
     inserted = insert(objects).values(values).returning(objects.c.object_id)
     return array_id, connection.execute(inserted).scalar_one()
 

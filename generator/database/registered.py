@@ -43,18 +43,8 @@ def spec_hash(spec: Any) -> str:
     return digest(canonical(spec))
 
 
-__all__ = [
-    "Bend",
-    "Developable",
-    "ObjectEntry",
-    "Polyhedron",
-    "RegisteredArray",
-    "RegisteredFace",
-    "RegisteredObject",
-    "RegisteredPart",
-    "RegisteredStyle",
-    "RoundFace",
-]
+__all__ = ["Bend", "Developable", "ObjectEntry", "Polyhedron", "RegisteredArray", "RegisteredFace",
+           "RegisteredObject", "RegisteredPart", "RegisteredStyle", "RoundFace"]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ Each function yields tables with their rows in an order that foreign keys allow.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, Table, bindparam, func, insert, select
 
 from generator.database import tables
-from generator.layout.placement import FaceLayout, Layout
+from generator.layout.placement import Layout
 from generator.polyhedron.frame import edge_length, face_area, face_polygon
 from generator.polyhedron.winged import Polyhedron
 
@@ -66,33 +67,24 @@ def face_type(polygon: Sequence[NDArray[np.float64]]) -> str:
 
 def polyhedron_rows(object_id: int, polyhedron: Polyhedron) -> Iterator[tuple[Table, Rows]]:
     """Yield the thesis's vertices, faces, edges, and the tables that connect them."""
-    of_object = {"object_id": object_id}
-    yield (
-        tables.vertices,
-        [
-            {**of_object, "vertex_id": k, "x_vertex": x, "y_vertex": y, "z_vertex": z}
+    edges, faces = polyhedron.edges, polyhedron.faces
+    rows: dict[Table, Rows] = {
+        tables.vertices: [
+            {"vertex_id": k, "x_vertex": x, "y_vertex": y, "z_vertex": z}
             for k, (x, y, z) in enumerate(polyhedron.vertices.tolist())
         ],
-    )
-    yield (
-        tables.faces,
-        [
+        tables.faces: [
             {
-                **of_object,
                 "face_id": k,
                 "name": face.name,
                 "face_type": face_type(face_polygon(polyhedron, k)),
                 "number_of_edges": sum(map(len, face.loops)),
                 "face_area": face_area(polyhedron, k),
             }
-            for k, face in enumerate(polyhedron.faces)
+            for k, face in enumerate(faces)
         ],
-    )
-    yield (
-        tables.edges,
-        [
+        tables.edges: [
             {
-                **of_object,
                 "edge_id": k,
                 "face_id": edge.left,
                 "right_face_id": edge.right,
@@ -104,50 +96,57 @@ def polyhedron_rows(object_id: int, polyhedron: Polyhedron) -> Iterator[tuple[Ta
                 "right_next_id": edge.right_next,
                 "edge_length": edge_length(polyhedron, k),
             }
-            for k, edge in enumerate(polyhedron.edges)
+            for k, edge in enumerate(edges)
         ],
-    )
-    yield (
-        tables.faces_to_vertices,
-        [
-            {**of_object, "face_id": face_id, "loop": loop_id, "position": k, "vertex_id": vertex}
-            for face_id, face in enumerate(polyhedron.faces)
+        tables.faces_to_vertices: [
+            {"face_id": face_id, "loop": loop_id, "position": k, "vertex_id": vertex}
+            for face_id, face in enumerate(faces)
             for loop_id, loop in enumerate(face.loops)
             for k, vertex in enumerate(loop)
         ],
-    )
-    yield (
-        tables.edges_to_vertices,
-        [
-            {**of_object, "edge_id": k, "position": position, "vertex_id": vertex}
-            for k, edge in enumerate(polyhedron.edges)
+        tables.edges_to_vertices: [
+            {"edge_id": k, "position": position, "vertex_id": vertex}
+            for k, edge in enumerate(edges)
             for position, vertex in enumerate((edge.start, edge.end))
         ],
-    )
+    }
+    for table, of_table in rows.items():
+        yield table, [{"object_id": object_id, **row} for row in of_table]
 
 
 def layout_rows(object_id: int, array_id: int, layout: Layout) -> Iterator[tuple[Table, Rows]]:
     """Yield the placements of the faces, and the cells that they hold."""
-    yield (
-        tables.placements,
-        [
+    placements = [
+        {
+            "object_id": object_id,
+            "face_id": face.face,
+            "position": k,
+            **asdict(face.placement),
+            "places": face.places,
+            "blank": int(face.face in layout.blank_faces),
+        }
+        for k, face in enumerate(layout.faces)
+    ]
+    yield tables.placements, placements
+    for face in layout.faces:
+        symbols = np.stack([face.rows, face.columns, face.labels], axis=1).tolist()
+        cells = [
             {
+                "array_id": array_id,
+                "row": row,
+                "column": column,
                 "object_id": object_id,
                 "face_id": face.face,
                 "position": k,
-                "row": face.placement.row,
-                "column": face.placement.column,
-                "rotation_rad": face.placement.rotation_rad,
-                "x_mm": face.placement.x_mm,
-                "y_mm": face.placement.y_mm,
-                "places": face.places,
-                "blank": int(face.face in layout.blank_faces),
+                "label": label,
+                "x_mm": x,
+                "y_mm": y,
             }
-            for k, face in enumerate(layout.faces)
-        ],
-    )
-    for face in layout.faces:
-        yield tables.cells, _cell_rows(object_id, array_id, face)
+            for k, ((row, column, label), (x, y)) in enumerate(
+                zip(symbols, face.centres_mm.tolist(), strict=True)
+            )
+        ]
+        yield tables.cells, cells
 
 
 def definition_number(connection: Connection, table: Table, **values: Any) -> int:
@@ -166,27 +165,3 @@ def definition_of(connection: Connection, table: Table, of_object: Mapping[str, 
     (number,) = table.primary_key.columns
     found = connection.execute(select(table).where(number == of_object[number.name])).one()
     return {name: value for name, value in found._asdict().items() if name != number.name}
-
-
-def _cell_rows(object_id: int, array_id: int, face: FaceLayout) -> Rows:
-    symbols = zip(
-        face.rows.tolist(),
-        face.columns.tolist(),
-        face.labels.tolist(),
-        face.centres_mm.tolist(),
-        strict=True,
-    )
-    return [
-        {
-            "array_id": array_id,
-            "row": row,
-            "column": column,
-            "object_id": object_id,
-            "face_id": face.face,
-            "position": k,
-            "label": label,
-            "x_mm": x,
-            "y_mm": y,
-        }
-        for k, (row, column, label, (x, y)) in enumerate(symbols)
-    ]

@@ -25,6 +25,7 @@ when it is opened, by `migrations/vN.py`.
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 from sqlalchemy import (
@@ -45,6 +46,8 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 from sqlalchemy.types import UserDefinedType
+
+from generator.alphabet.outline import SymbolStyle
 
 metadata = MetaData()
 
@@ -107,6 +110,8 @@ objects = Table(
     CheckConstraint("pitch_mm > 0 AND stroke_mm > 0", name="symbols_have_size"),
     CheckConstraint("layout IN ('net', 'faces')", name="layout_known"),
 )
+
+STYLE = tuple(objects.c[field.name] for field in fields(SymbolStyle))  #: of an object's symbols
 
 vertices = Table(
     "vertices",
@@ -332,27 +337,6 @@ as_built = Table(
     CheckConstraint("touches > 0", name="print_was_touched"),
 )
 
-
-__all__ = [
-    "FORMAT",
-    "SCHEMA_VERSION",
-    "alphabets",
-    "arrays",
-    "as_built",
-    "cells",
-    "edges",
-    "edges_to_vertices",
-    "faces",
-    "faces_to_vertices",
-    "meta",
-    "metadata",
-    "objects",
-    "occupancy",
-    "parts",
-    "placements",
-    "provenance",
-    "vertices",
-]
 
 SCHEMA_VERSION = 3
 FORMAT = "encoded-objects"  #: `meta.format`: whose tables these are

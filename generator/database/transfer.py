@@ -145,21 +145,16 @@ def same_object(
 
 def _definitions(connection: Connection, entry: ObjectEntry) -> Sequence[Any]:
     """Return the digests of array and alphabet, and the style."""
-    objects = tables.objects.c
     return connection.execute(
         select(
             tables.arrays.c.definition_sha256,
             tables.alphabets.c.definition_sha256,
-            objects.pitch_mm,
-            objects.height_mm,
-            objects.stroke_mm,
-            objects.draft_rad,
-            objects.chamfer_mm,
+            *tables.STYLE,
         )
         .select_from(tables.objects)
         .join(tables.arrays)
         .join(tables.alphabets)
-        .where(objects.object_id == entry.object_id)
+        .where(tables.objects.c.object_id == entry.object_id)
     ).one()
 
 
@@ -189,14 +184,6 @@ def _holders(target: Connection, array_id: int, rows: Ints, columns: Ints) -> st
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
-    """Where objects come from."""
-
-    name: str  #: of the database, as people know it
-    utc: str  #: when they came, ISO 8601
-
-
-@dataclass(frozen=True, slots=True)
 class RefusedCopy:
     """An object that cannot be carried over."""
 
@@ -220,7 +207,7 @@ def copy_objects(
     *,
     names: Sequence[str] = (),
     renamed: Mapping[str, str] | None = None,
-    origin: Origin | None = None,
+    origin: Mapping[str, str] | None = None,
     skip_refused: bool = False,
     homes: tuple[URL, URL] | None = None,
 ) -> CopyReport:
@@ -235,7 +222,7 @@ def copy_objects(
     renamed
         New names of objects, by their names in `source`.
     origin
-        Noted with each object that is copied; without it, their own is kept.
+        `imported_from` and `imported_utc` of each object; without it, their own are kept.
     skip_refused
         Copy the others where some are refused.
     homes
@@ -275,7 +262,7 @@ def _copy_object(
     entry: ObjectEntry,
     name: str,
     arrays: dict[int, ArrayHere],
-    origin: Origin | None,
+    origin: Mapping[str, str] | None,
     homes: tuple[URL, URL],
 ) -> bool:
     """Copy one object, if it is new; check all of it before the first row is written."""
@@ -311,13 +298,12 @@ def _copy_object(
     for part in parts:
         part["file"] = part_file(homes[1], str(part_path(homes[0], part["file"])))
     insert_rows(target, tables.parts, [part | new for part in parts])
-    came = {} if origin is None else {"imported_from": origin.name, "imported_utc": origin.utc}
     prints = rows_of(source, tables.as_built, entry.object_id)
     for print_ in prints:
         del print_["as_built_id"]
     insert_rows(target, tables.as_built, [print_ | new for print_ in prints])
     provenance = rows_of(source, tables.provenance, entry.object_id)
-    insert_rows(target, tables.provenance, [row | new | came for row in provenance])
+    insert_rows(target, tables.provenance, [row | new | dict(origin or {}) for row in provenance])
     return True
 
 

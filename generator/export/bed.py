@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 Size = tuple[float, float]
 
+_GAP_MM = 5.0  # least distance between two parts
+
 
 @dataclass(frozen=True, slots=True)
 class BedPlace:
@@ -48,7 +50,6 @@ class _Skyline:
 def arrange_plates(
     sizes: Sequence[Size],
     bed_mm: Size,
-    gap_mm: float = 5.0,
     groups: Sequence[int] | None = None,
 ) -> tuple[Plate, ...]:
     """Arrange rectangles (width and depth, mm) on as many plates as needed, centred on the bed.
@@ -61,8 +62,8 @@ def arrange_plates(
     >>> [len(plate.places) for plate in arrange_plates([(60, 60)] * 6, (250, 210))]
     [6]
     """
-    room = (bed_mm[0] + gap_mm, bed_mm[1] + gap_mm)
-    grown = [(width + gap_mm, depth + gap_mm) for width, depth in sizes]
+    room = (bed_mm[0] + _GAP_MM, bed_mm[1] + _GAP_MM)
+    grown = [(width + _GAP_MM, depth + _GAP_MM) for width, depth in sizes]
     order = sorted(range(len(sizes)), key=lambda i: (-max(sizes[i]), -min(sizes[i]), i))
     kinds = [0] * len(sizes) if groups is None else list(groups)
     open_plates: list[_Skyline] = []

@@ -21,7 +21,7 @@ from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, next_la
 from generator.database.cells import occupancy
 from generator.database.lab import MOST_FILLED, LabArrays, lab_arrays, require_lab_key
 from generator.database.read import find_object, read_array
-from generator.database.registered import RegisteredArray
+from generator.database.registered import ObjectEntry, RegisteredArray
 from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
 from generator.pipeline.place import NO_CELLS, lay_out_object
@@ -112,7 +112,8 @@ def choose_array(
     GeneratorError
         No array is large enough, or an object cannot be made at all.
     """
-    other = None if replace_changed else _array_of_another_lab(specs, lab, connection)
+    known = _registered(specs, connection)
+    other = None if replace_changed else _array_of_another_lab(specs, lab, connection, known)
     named = [one for one in specs if one.profile != AUTO]
     if named:  # on the same array, or the specs would have been refused
         profile = named[0].profile
@@ -123,10 +124,10 @@ def choose_array(
         else:
             made = lab.of_profile(PROFILES[profile]).definition(), lab.key_of(PROFILES[profile])
         return ArrayChoice(plan_objects([_follow(one, profile, *made) for one in specs], solid))
-    pitches = _registered_pitches(specs, connection)
-    kept = other or _array_kept(specs, lab, connection)
+    kept = other or _array_kept(lab, known)
     if kept is not None:
         made = kept.definition, kept.lab_key
+        pitches = {name: entry.pitch_mm for name, entry in known.items()}
         new = next(iter(pitches.values()), None)  # of new objects: that of those registered
         found = [
             with_profile(one, kept.profile, AUTO, *made, pitches.get(one.name, new))
@@ -148,7 +149,11 @@ def choose_array(
         elif (needed := _cells(alone)) > room:
             short.append(f"{needed} cells are needed, and {size} has room for {room}")
         else:
-            notes = (_larger_note(candidate, array, short[-1]),) if short else ()
+            windows = ["x".join(map(str, w)) for w in (array.window, PROFILES[SMALLEST].window)]
+            window = f"window {windows[0]} in place of {windows[1]}"
+            notes = tuple(
+                f"profile {candidate.name} is taken ({window}): {why}" for why in short[-1:]
+            )
             choice = ArrayChoice(plans, notes, alone)
             return _choose_finer(choice, room, solid) if _blank(plans, alone) else choice
     raise LayoutError(
@@ -157,20 +162,19 @@ def choose_array(
     )
 
 
-def _larger_note(chosen: Profile, array: SymbolArray, why: str) -> str:
-    rows, columns = array.window
-    of_smallest = "x".join(map(str, PROFILES[SMALLEST].window))
-    window = f"window {rows}x{columns} in place of {of_smallest}"
-    return f"profile {chosen.name} is taken ({window}): {why}"
-
-
 def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> ArrayChoice:
     """Take finer symbols on the same array where they show faces that stay blank otherwise."""
     blank = left = _blank(coarse.plans, coarse.alone)
     found, specs = coarse, [plan.spec for plan in coarse.plans]
     for share in FINER_SHARES:
         try:
-            plans = plan_objects([_at_pitch(one, _share_mm(share, one)) for one in specs], solid)
+            finer = [
+                with_profile(
+                    one, one.profile, AUTO, one.encoding, one.array_key, _share_mm(share, one)
+                )
+                for one in specs
+            ]
+            plans = plan_objects(finer, solid)
             alone = _layouts(plans)
         except GeneratorError:  # the printer cannot make them
             break
@@ -196,45 +200,39 @@ def _candidates() -> Iterator[Profile]:
         yield replace(larger, name=f"large-{rows}x{columns}")
 
 
+def _registered(
+    specs: Sequence[ObjectSpec], connection: Connection | None
+) -> dict[str, ObjectEntry]:
+    """Return the objects that are registered already, by their names, in the order of specs."""
+    if connection is None:
+        return {}
+    found = (find_object(connection, one.name) for one in specs)
+    return {entry.name: entry for entry in found if entry is not None}
+
+
 def _array_of_another_lab(
-    specs: Sequence[ObjectSpec], lab: LabArrays, connection: Connection | None
+    specs: Sequence[ObjectSpec],
+    lab: LabArrays,
+    connection: Connection | None,
+    known: Mapping[str, ObjectEntry],
 ) -> RegisteredArray | None:
     """Return the one array of another lab that all objects are registered on, with its profile."""
-    numbers = set()
-    for one in specs:
-        known = None if connection is None else find_object(connection, one.name)
-        if known is None or one.profile not in (AUTO, known.profile):
-            return None
-        numbers.add(known.array_id)
+    numbers = {entry.array_id for entry in known.values()}
     if connection is None or len(numbers) != 1:
+        return None
+    if any(
+        one.name not in known or one.profile not in (AUTO, known[one.name].profile) for one in specs
+    ):
         return None
     array = read_array(connection, numbers.pop())
     keyed = _of_candidate(array.profile) or array.profile == "fine"
     return array if keyed and array.lab_key != lab.key else None
 
 
-def _registered_pitches(
-    specs: Sequence[ObjectSpec], connection: Connection | None
-) -> dict[str, float]:
-    """Return the pitch (mm) of each object that is registered already."""
-    if connection is None:
-        return {}
-    entries = (find_object(connection, one.name) for one in specs)
-    return {entry.name: entry.pitch_mm for entry in entries if entry is not None}
-
-
-def _array_kept(
-    specs: Sequence[ObjectSpec], lab: LabArrays, connection: Connection | None
-) -> RegisteredArray | None:
+def _array_kept(lab: LabArrays, known: Mapping[str, ObjectEntry]) -> RegisteredArray | None:
     """Return the array of the lab's own that one of the objects is registered on."""
-    if connection is None:
-        return None
-    for one in specs:
-        known = find_object(connection, one.name)
-        kept = lab.made.get(known.profile) if known else None
-        if kept is not None and _of_candidate(kept.profile):
-            return kept
-    return None
+    arrays = (lab.made.get(entry.profile) for entry in known.values())
+    return next((one for one in arrays if one is not None and _of_candidate(one.profile)), None)
 
 
 def _of_candidate(profile: str) -> bool:
@@ -244,10 +242,6 @@ def _of_candidate(profile: str) -> bool:
 
 def _share_mm(share: float, spec: ObjectSpec) -> float:
     return round(share * spec.sensor.symbol_pitch_mm, 2)
-
-
-def _at_pitch(spec: ObjectSpec, pitch_mm: float) -> ObjectSpec:
-    return with_profile(spec, spec.profile, AUTO, spec.encoding, spec.array_key, pitch_mm)
 
 
 def _follow(

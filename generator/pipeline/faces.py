@@ -26,7 +26,7 @@ from generator.layout.recognition_rate import LOW, Loops, RecognitionRate, face_
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import is_convex, signed_area
 from generator.polyhedron import Polyhedron, face_normal, face_polygon
-from generator.solid.inset import inset, regular
+from generator.solid.plate import inset, regular
 
 Size = tuple[float, float]  #: width and height in the face's frame, mm
 

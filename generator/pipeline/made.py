@@ -118,7 +118,7 @@ def describe_object(
         reused=reused,
         skipped=skipped,
         fit=fit,
-        lying=str(overhang_of(plan, layout)) if plan.spec.parts == "whole" else None,
+        lying=overhang_text(plan, layout) if plan.spec.parts == "whole" else None,
         touches=touches_needed(
             plan.array.order,
             plan.array.rows * plan.array.columns,
@@ -130,33 +130,8 @@ def describe_object(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Overhang:
-    """Of one body as it lies."""
-
-    bottom: str  #: name of the face on the bed; empty where an edge or corner is
-    faces: tuple[str, ...]  #: that lean over too much, the one on the bed without symbols left out
-    symbols: int  #: on these faces
-    upright: int  #: symbols on upright faces: their lower sides hang over by their height
-    resin: bool
-    round: bool  #: it cannot be made of panels
-
-    def __str__(self) -> str:
-        lies = f"{self.bottom} down" if self.bottom else "as the file has it"
-        if self.resin:
-            return f"{lies}, supports where no symbols are"
-        needed = "no supports needed below"
-        if self.faces:
-            counted = f"{self.symbols} symbols hang over" if self.symbols else "they hang over"
-            needed = f"supports needed under {', '.join(self.faces)} ({counted})"
-        if self.upright:
-            needed += f", {self.upright} symbols stand out sideways"
-        advice = "" if self.round else "; with  parts: panels  nothing hangs over"
-        return f"{lies}, {needed}{advice}"
-
-
-def overhang_of(plan: ObjectPlan, layout: Layout) -> Overhang:
-    """Return the overhangs of a whole body on the bed; z of the object frame is up."""
+def overhang_text(plan: ObjectPlan, layout: Layout) -> str:
+    """Return how a whole body lies on the bed, and its overhangs; z of the object frame is up."""
     polyhedron, limit = plan.polyhedron, math.sin(plan.printer.overhang_max_rad)
     counts = {face.face: len(face.labels) for face in layout.faces}
     lowest = float(polyhedron.vertices[:, 2].min())
@@ -175,7 +150,14 @@ def overhang_of(plan: ObjectPlan, layout: Layout) -> Overhang:
             symbols += count
         elif abs(up) <= limit:
             upright += count
-    return Overhang(
-        bottom, tuple(dict.fromkeys(faces)), symbols, upright,
-        resin=not plan.printer.nozzle_mm, round=bool(polyhedron.surfaces or polyhedron.blank),
-    )  # fmt: skip
+    lies = f"{bottom} down" if bottom else "as the file has it"
+    if not plan.printer.nozzle_mm:  # resin
+        return f"{lies}, supports where no symbols are"
+    needed = "no supports needed below"
+    if faces:
+        counted = f"{symbols} symbols hang over" if symbols else "they hang over"
+        needed = f"supports needed under {', '.join(dict.fromkeys(faces))} ({counted})"
+    if upright:  # their lower sides hang over by their height
+        needed += f", {upright} symbols stand out sideways"
+    has_round = bool(polyhedron.surfaces or polyhedron.blank)
+    return f"{lies}, {needed}" + ("" if has_round else "; with  parts: panels  nothing hangs over")

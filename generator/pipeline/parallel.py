@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed, wait
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from sqlalchemy import Engine
 
@@ -38,28 +38,14 @@ class Task(Generic[Result]):
         return self.work(*self.arguments)
 
 
-class Engines:
-    """The databases that this process has opened, by URL."""
+ENGINES: dict[str, Engine] = {}  #: the databases that this process has opened, by URL
 
-    _open: ClassVar[dict[str, Engine]] = {}
 
-    @classmethod
-    def keep(cls, url: str, engine: Engine) -> None:
-        """Let this process use a database that is open."""
-        cls._open[url] = engine
-
-    @classmethod
-    def open(cls, url: str) -> Engine:
-        """Return the open database, opened the first time it is asked for."""
-        if url not in cls._open:
-            cls._open[url] = open_database(url)
-        return cls._open[url]
-
-    @classmethod
-    def close(cls) -> None:
-        """Let all of them go."""
-        while cls._open:
-            cls._open.popitem()[1].dispose()
+def engine_of(url: str) -> Engine:
+    """Return an open database, opened the first time it is asked for."""
+    if url not in ENGINES:
+        ENGINES[url] = open_database(url)
+    return ENGINES[url]
 
 
 class Workers:
@@ -77,7 +63,8 @@ class Workers:
         return self
 
     def __exit__(self, *_: object) -> None:
-        Engines.close()
+        while ENGINES:
+            ENGINES.popitem()[1].dispose()
         if self._pool is not None:
             self._pool.shutdown(wait=True, cancel_futures=True)
 

@@ -27,10 +27,9 @@ from generator.polyhedron.development import Development, development
 from generator.polyhedron.front import Loop, covered_parts
 from generator.polyhedron.shapes import ROUND_SHAPES, SHAPES
 from generator.printers import Printer
-from generator.solid.mitre import symbol_clearance_mm
+from generator.solid.analytic import bend_problem
 from generator.solid.part import edge_numbers
-from generator.solid.plate import cut_corners, plain_panels, top_insets_mm
-from generator.solid.wrap import bend_problem
+from generator.solid.plate import cut_corners, plain_panels, symbol_clearance_mm, top_insets_mm
 from generator.spec import ObjectSpec, ShapeSpec
 from generator.spec.problem import error_location
 

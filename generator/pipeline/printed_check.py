@@ -20,8 +20,7 @@ from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.printed.check import PrintedCheck, check_parts, check_png
 from generator.printed.faults import PrintFaults
-from generator.printed.profiles import print_profile, profile_of_printer
-from generator.printed.slicer import find_slicer
+from generator.printed.slicer import find_slicer, print_profile, profile_of_printer
 from generator.solid import Part
 from generator.spec import ObjectSpec
 

@@ -24,7 +24,7 @@ from generator.export.formats import EXPORTERS
 from generator.export.set_files import can_draw
 from generator.pipeline.made import MadeObject, describe_object
 from generator.pipeline.make import MakeJob, make_at
-from generator.pipeline.parallel import Engines, Task, Workers
+from generator.pipeline.parallel import ENGINES, Task, Workers, engine_of
 from generator.pipeline.place import PlacedObject, occupancy_of, occupancy_with, place_object
 from generator.pipeline.plates import build_sheet_path, write_set
 from generator.pipeline.progress import Progress, part_of_progress
@@ -65,7 +65,7 @@ def make_set(
             if not placed.reused:
                 taken = occupancy_with(taken, placed.layout)
             tasks[number] = Task(f"making {name}", _make, (url, job, placed))
-    Engines.keep(url, engine)
+    ENGINES[url] = engine
     with Workers(processes) as workers:
         found = workers.done(list(tasks.values()), part_of_progress(progress, 0.1, 0.8))
         made |= dict(zip(tasks, found, strict=True))
@@ -92,7 +92,7 @@ def set_folder(to_make: Sequence[MakeJob], folder: Path | None) -> Path:
 
 def _make(url: str, job: MakeJob, placed: PlacedObject) -> MadeObject:
     """Make one object; runs in any process."""
-    return make_at(Engines.open(url), job, placed)
+    return make_at(engine_of(url), job, placed)
 
 
 def _intact_object(connection: Connection, job: MakeJob) -> MadeObject | None:
@@ -129,12 +129,6 @@ def _intact_object(connection: Connection, job: MakeJob) -> MadeObject | None:
         others += plates or [Path(f"{stem}.3mf"), Path(f"{stem}-prusaslicer.3mf")]
     if not all(other.is_file() for other in others):
         return None
-    return describe_object(
-        plan,
-        read_layout(connection, plan.spec.name),
-        len(parts),
-        (),
-        (*(state.path for state in states), *others),
-        reused=True,
-        skipped=True,
-    )
+    files = (*(state.path for state in states), *others)
+    layout = read_layout(connection, plan.spec.name)
+    return describe_object(plan, layout, len(parts), (), files, reused=True, skipped=True)

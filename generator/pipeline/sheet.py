@@ -13,7 +13,7 @@ from generator.export.bed import Plate
 from generator.export.drawing import draw_back, draw_front, draw_plate, draw_step, is_panel
 from generator.export.sheet import Figure, Section, sheet_html
 from generator.layout.placement import FaceLayout, Layout, object_code
-from generator.pipeline.made import overhang_of
+from generator.pipeline.made import overhang_text
 from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon
 from generator.polyhedron.assembly import AssemblyStep, assembly_order, distinct_faces
@@ -92,7 +92,7 @@ def lies_text(plan: ObjectPlan, layout: Layout) -> str:
     """Return how the parts of an object lie on the bed, and what supports they need."""
     if plan.spec.parts == "panels":
         return "every panel on its back, symbols up; no supports"
-    return str(overhang_of(plan, layout))
+    return overhang_text(plan, layout)
 
 
 def material_text(volume_mm3: float, *, resin: bool) -> str:
@@ -101,6 +101,15 @@ def material_text(volume_mm3: float, *, resin: bool) -> str:
     if resin:
         return f"resin, {cm3:.0f} ml in all"
     return f"PLA, {cm3:.0f} cm3 in all; {cm3 * PLA_G_CM3:.0f} g if solid"
+
+
+def cost_text(costs: Sequence[PlateCost | None]) -> str:
+    """Return what printing of plates takes; empty where that is not known of all."""
+    known = [cost for cost in costs if cost is not None]
+    if len(known) < len(costs):
+        return ""
+    minutes, grams = sum(cost.minutes for cost in known), sum(cost.filament_g for cost in known)
+    return f"{minutes // 60} h {minutes % 60} min, {grams:.0f} g"
 
 
 def _facts(
@@ -118,11 +127,8 @@ def _facts(
         rows.append(("colours", f"2: change the filament at {spec.wall_mm:g} mm"))
     solid_mm3 = sum(volume(part) for part in parts)
     rows.append(("material", material_text(solid_mm3, resin=not printer.nozzle_mm)))
-    costs = [plate.cost for plate in plates if plate.cost is not None]
-    if len(costs) == len(plates):
-        minutes = sum(cost.minutes for cost in costs)
-        grams = sum(cost.filament_g for cost in costs)
-        rows.append(("printing", f"{minutes // 60} h {minutes % 60} min, {grams:.0f} g of PLA"))
+    if printing := cost_text([plate.cost for plate in plates]):
+        rows.append(("printing", f"{printing} of PLA"))
     return tuple(rows)
 
 

@@ -15,13 +15,14 @@ from __future__ import annotations
 from generator.printed.deposit import Deposit, deposit
 from generator.printed.faults import NAMED, PrintFaults, print_faults
 from generator.printed.gcode import read_gcode
-from generator.printed.profiles import (
+from generator.printed.slicer import (
     PROFILES,
     PrintProfile,
+    SlicedPart,
     print_profile,
     profile_of_printer,
+    slice_part,
 )
-from generator.printed.slicer import SlicedPart, slice_part
 from generator.printed.surface import PrintedSurface
 from generator.printed.view import face_surface, is_seen
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.errors import PrintError
-from generator.printed.toolpath import LEVEL_MM, Toolpath
+from generator.printed.gcode import LEVEL_MM, Toolpath
 
 Floats = NDArray[np.float64]
 

@@ -1,9 +1,10 @@
-"""G-code file -> Toolpath: where a nozzle goes and how much plastic leaves it; mm, machine frame.
+"""G-code file -> Toolpath: where a nozzle goes and how much plastic leaves it.
 
-Reads G0-G3, G10/G11, G20/G21, G28, G90-G92, M82/M83, M200 in absolute and relative
-coordinates, of Marlin, Klipper and RepRapFirmware. As in Klipper and PrusaSlicer, G91 makes E
-relative too and M83 does so alone. M221, a machine's own correction of its extruder, is left out.
-A `.gcode.3mf` of Bambu Studio is opened, binary G-code is refused.
+G-code frame: mm, as the file has it, z up from the bed; z of a move is the nozzle's, which is the
+top of the bead that it leaves. Reads G0-G3, G10/G11, G20/G21, G28, G90-G92, M82/M83, M200 in
+absolute and relative coordinates, of Marlin, Klipper and RepRapFirmware. As in Klipper and
+PrusaSlicer, G91 makes E relative too and M83 does so alone. M221, a machine's own correction of its
+extruder, is left out. A `.gcode.3mf` of Bambu Studio is opened, binary G-code is refused.
 
 Comments give features, widths and heights: of PrusaSlicer and its kin (`;TYPE:External
 perimeter`, `;WIDTH:0.45`, `;HEIGHT:0.2`), Cura (`;TYPE:WALL-OUTER` alone), Bambu Studio and
@@ -18,12 +19,86 @@ import io
 import math
 import re
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from generator.errors import PrintError
-from generator.printed.toolpath import LEVEL_MM, ROLES, Floats, Toolpath, role_number
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+#: What a move is for; slicers' own words become these. The last four leave nothing on the part.
+ROLES = (
+    "unknown",
+    "outer wall",
+    "inner wall",
+    "overhang",
+    "top",
+    "solid",
+    "infill",
+    "bridge",
+    "gap fill",
+    "ironing",
+    "travel",
+    "skirt",
+    "support",
+    "custom",
+)
+_OF_PART = ROLES.index("travel")
+
+
+def role_number(name: str) -> int:
+    """Return the number by which `Toolpath.role` knows a role."""
+    return ROLES.index(name)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Toolpath:
+    """All moves of a file."""
+
+    name: str  #: of the file
+    dialect: str  #: prusaslicer, cura, bambu, orca or unknown
+    start_mm: Floats  #: (n, 3)
+    end_mm: Floats  #: (n, 3)
+    volume_mm3: Floats  #: (n,) plastic that leaves the nozzle, 0 on travels
+    height_mm: Floats  #: (n,) of the layer, or a bridge's own
+    width_mm: Floats  #: (n,) as the file announces it, nan where it does not
+    speed_mm_s: Floats  #: (n,)
+    role: Index  #: (n,) number in `ROLES`
+
+    def __len__(self) -> int:
+        return len(self.role)
+
+    @property
+    def of_part(self) -> NDArray[np.bool_]:
+        """(n,) whether a move leaves plastic that stays on the part."""
+        return (self.volume_mm3 > 0) & (self.role < _OF_PART)
+
+    @property
+    def length_mm(self) -> Floats:
+        """(n,) length of each move."""
+        length: Floats = np.linalg.norm(self.end_mm - self.start_mm, axis=1)
+        return length
+
+    def strokes(self) -> Index:
+        """Return the stroke that each move belongs to, (n,), -1 for those that leave nothing.
+
+        A stroke is a run of moves of one role at one height, without a travel between them.
+        """
+        laying = self.of_part
+        breaks = np.ones(len(self), np.bool_)
+        same = (self.role[1:] == self.role[:-1]) & laying[:-1]
+        same &= np.abs(self.end_mm[1:, 2] - self.end_mm[:-1, 2]) < LEVEL_MM
+        breaks[1:] = ~same
+        numbers = np.cumsum(breaks & laying) - 1
+        return np.where(laying, numbers, -1)
+
+
+LEVEL_MM = 1e-3  #: heights that differ by less are one layer
+
 
 CHORD_MM = 0.005
 _MOST = 100_000  # chords of one arc: a sound file has some hundreds
@@ -311,7 +386,7 @@ _HEAD = 4096  # characters of a file in which its slicer gives its name
 _WIDTHS_AGREE = (0.7, 1.5)
 
 
-def read_gcode(path: Path | str, *, filament_mm: float | None = None) -> Toolpath:
+def read_gcode(path: Path | str) -> Toolpath:
     """Read `.gcode`, `.gco`, `.g`, or the first plate of Bambu Studio's `.gcode.3mf`.
 
     The filament is as thick as the file says, else 1.75 mm. Raises `PrintError` (with file:line)
@@ -325,17 +400,17 @@ def read_gcode(path: Path | str, *, filament_mm: float | None = None) -> Toolpat
         raise PrintError(
             f"cannot read the G-code: {error.strerror}", fix="check the name", place=str(path)
         ) from None
-    return toolpath_of(_text(content, str(path)), str(path), filament_mm=filament_mm)
+    return toolpath_of(_text(content, str(path)), str(path))
 
 
-def toolpath_of(text: str, name: str = "G-code", *, filament_mm: float | None = None) -> Toolpath:
+def toolpath_of(text: str, name: str = "G-code") -> Toolpath:
     """Return the moves of G-code that was read; `name` stands in errors. See `read_gcode`."""
     machine = Machine(name)
     for number, line in enumerate(io.StringIO(text), 1):
         machine.line_number = number
         machine.line(line)
     head = next((found for line in text[:_HEAD].splitlines() if (found := dialect_of(line))), "")
-    return _toolpath(machine, head or "unknown", filament_mm)
+    return _toolpath(machine, head or "unknown")
 
 
 def _text(content: bytes, name: str) -> str:
@@ -357,10 +432,10 @@ def _text(content: bytes, name: str) -> str:
     return content.decode("utf-8", errors="replace")
 
 
-def _toolpath(machine: Machine, dialect: str, filament_mm: float | None) -> Toolpath:
+def _toolpath(machine: Machine, dialect: str) -> Toolpath:
     """Return the moves that a machine made."""
     rows = np.array(machine.rows, np.float64).reshape(-1, COLUMNS)
-    diameter = filament_mm or (machine.filament if machine.filament > 0 else FILAMENT_MM)
+    diameter = machine.filament if machine.filament > 0 else FILAMENT_MM
     area = math.pi * diameter**2 / 4
     volume = rows[:, 6] * np.where(rows[:, 11] > 0, 1.0, area)
     role = rows[:, 10].astype(np.int64)

@@ -28,8 +28,13 @@ from generator.alphabet.outline import outlines
 from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
 from generator.printed.deposit import deposit
 from generator.printed.faults import PrintFaults, print_faults
-from generator.printed.profiles import PrintProfile, print_profile, settings_of
-from generator.printed.slicer import slice_part, slicer_version
+from generator.printed.slicer import (
+    PrintProfile,
+    print_profile,
+    settings_of,
+    slice_part,
+    slicer_version,
+)
 from generator.printed.surface import (
     DEPTH_MM,
     FORMAT,
@@ -41,27 +46,23 @@ from generator.printed.surface import (
     write_surface,
 )
 from generator.printed.survey import (
-    DesignLattice,
     footprint_shift,
     over_face,
     symbol_designs,
 )
 from generator.printed.view import face_surface, is_seen
-from generator.solid.emboss import embossing_of, turn
-from generator.solid.part import Embossing
+from generator.solid.part import Embossing, embossing_of, turn
 
 #: A footprint of 10 mm2 has a thousand places then: its middle is known to some um.
-COARSE = DesignLattice(step_mm=0.1)
+_STEP_MM = 0.1
 
 
-def symbols_shift(
-    surface: PrintedSurface, embossing: Embossing, lattice: DesignLattice = COARSE
-) -> Floats:
+def symbols_shift(surface: PrintedSurface, embossing: Embossing) -> Floats:
     """Return how far symbols stand from where they were designed, (2,) mm, on average.
 
     Symbols of which nothing was printed do not count; without any symbol it is 0.
     """
-    points, designs = symbol_designs(embossing, lattice)
+    points, designs = symbol_designs(embossing, _STEP_MM)
     R = turn(embossing.rotation_rad)
     shifts = []
     for centre, label in zip(embossing.centres_mm, embossing.labels.tolist(), strict=True):

@@ -31,15 +31,6 @@ DEPTH_MM = 2.5  #: below the face that is looked at: deeper a touch does not rea
 MARGIN_MM = 1.0  #: around the face: strings and blobs hang over its edges
 
 
-@dataclass(frozen=True, slots=True)
-class Coverage:
-    """How much of a print a surface was made from."""
-
-    beads: int  #: of the whole print
-    within: int  #: of them, within the depth and the region
-    samples: int  #: places at which a bead's height was worked out
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PrintedSurface:
     """Heights of the highest plastic."""
@@ -48,8 +39,6 @@ class PrintedSurface:
     origin_mm: tuple[float, float]  #: x, y of heights[0, 0], grid frame
     step_mm: float
     T_surface_grid: Floats  #: (4, 4) a turn in the plane
-    T_part_surface: Floats  #: (4, 4)
-    coverage: Coverage
 
     @property
     def top_mm(self) -> float:

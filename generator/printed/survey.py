@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from generator.alphabet.outline import Ring, Tiers
 from generator.plane.polygon import distance, points_inside
 from generator.printed.surface import PrintedSurface
-from generator.solid.emboss import turn
-from generator.solid.part import Embossing
+from generator.solid.part import Embossing, turn
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -24,16 +23,20 @@ Mask = NDArray[np.bool_]
 _GOLDEN = (5**0.5 - 1) / 2
 
 
-@dataclass(frozen=True, slots=True)
-class DesignLattice:
-    """How finely symbols are compared, and what near their edges is left out."""
+STEP_MM = 0.05  #: between two places at which symbols are compared
+_BASE_CLEAR_MM = 0.3  # from a foot, where the face around it is measured
+_TOP_CLEAR_MM = 0.2  # from the edge of the top, where its height is measured
 
-    step_mm: float = 0.05  #: between two places
-    base_clear_mm: float = 0.3  #: from a foot, where the face around it is measured
-    top_clear_mm: float = 0.2  #: from the edge of the top, where its height is measured
-
-
-LATTICE = DesignLattice()
+# When a symbol survives, set by hand: symbols of 4.5 mm under the faults `bad` keep an overlap of
+# 0.76 and more, and touches of such prints were named right in another simulation
+# (docs/printed.md).
+SURVIVES, DOUBTFUL, LOST = "survives", "doubtful", "lost"
+_OVERLAP = 0.70  # least intersection over union of a symbol that survives
+_OVERLAP_LEAST = 0.50  # below, a stroke is missing or a gap is closed
+_AHEAD = 0.05  # of the overlap with the next symbol of the alphabet
+_HEIGHT = 0.70  # of the designed height; one layer of four is within it
+_HEIGHT_LEAST = 0.40
+_MOVED_MM = 0.5  # in x and y, by which a symbol is searched around its place
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,37 +51,33 @@ class SymbolDesign:
 
 
 def symbol_designs(
-    embossing: Embossing, lattice: DesignLattice
+    embossing: Embossing, step_mm: float = STEP_MM
 ) -> tuple[Floats, list[SymbolDesign]]:
     """Return the lattice of a cell, (m * m, 2), and every label's design on it."""
     reach = max(float(np.abs(ring).max()) for tiers in embossing.tiers for ring in tiers.rings[0])
-    half = embossing.pitch_mm / 2 if embossing.pitch_mm else reach + 2 * lattice.base_clear_mm
-    count = int(half / lattice.step_mm)
-    line = np.arange(-count, count + 1) * lattice.step_mm
+    half = embossing.pitch_mm / 2 if embossing.pitch_mm else reach + 2 * _BASE_CLEAR_MM
+    count = int(half / step_mm)
+    line = np.arange(-count, count + 1) * step_mm
     x, y = np.meshgrid(line, line)
     # Rows and columns are shifted by parts of a step, or all places along a straight edge would
     # fall on the same side of it.
-    shift = (np.arange(len(line)) * _GOLDEN % 1 - 0.5) * lattice.step_mm
+    shift = (np.arange(len(line)) * _GOLDEN % 1 - 0.5) * step_mm
     x, y = x + shift[:, None], y + shift
     points = np.stack([x.ravel(), y.ravel()], axis=1)
     side = (len(line), len(line))
-    return points, [_symbol_design(tiers, points, side, lattice) for tiers in embossing.tiers]
+    return points, [_symbol_design(tiers, points, side) for tiers in embossing.tiers]
 
 
-def _symbol_design(
-    tiers: Tiers, points: Floats, side: tuple[int, int], lattice: DesignLattice
-) -> SymbolDesign:
+def _symbol_design(tiers: Tiers, points: Floats, side: tuple[int, int]) -> SymbolDesign:
     high = tiers.z_mm[-1]
     foot, top = tiers.rings[0], tiers.rings[-1]
-    clear = distance(points, foot) > lattice.base_clear_mm
+    clear = distance(points, foot) > _BASE_CLEAR_MM
     heights = np.zeros(len(points))
     for level in np.linspace(0.0, high, 11):
         heights[points_inside(points, rings_at(tiers, float(level)))] = level
     return SymbolDesign(
         footprint=points_inside(points, rings_at(tiers, high / 2)).reshape(side),
-        top=(points_inside(points, top) & (distance(points, top) > lattice.top_clear_mm)).reshape(
-            side
-        ),
+        top=(points_inside(points, top) & (distance(points, top) > _TOP_CLEAR_MM)).reshape(side),
         around=(clear & ~points_inside(points, foot)).reshape(side),
         heights=heights.reshape(side),
         height_mm=high,
@@ -109,29 +108,6 @@ def footprint_shift(found: Floats, design: SymbolDesign, points: Floats) -> Floa
         return np.zeros(2)
     moved: Floats = points[printed].mean(axis=0) - points[design.footprint.ravel()].mean(axis=0)
     return moved
-
-
-SURVIVES, DOUBTFUL, LOST = "survives", "doubtful", "lost"
-
-
-@dataclass(frozen=True, slots=True)
-class SurveyLimits:
-    """When a symbol survives.
-
-    Set by hand: symbols of 4.5 mm under the faults `bad` keep an overlap of 0.76 and more, and
-    touches of such prints were named right in another simulation (docs/printed.md).
-    """
-
-    overlap: float = 0.70  #: least intersection over union of a symbol that survives
-    overlap_least: float = 0.50  #: below, a stroke is missing or a gap is closed
-    ahead: float = 0.05  #: of the overlap with the next symbol of the alphabet
-    height: float = 0.70  #: of the designed height; one layer of four is within it
-    height_least: float = 0.40
-    moved_mm: float = 0.5  #: in x and y, by which a symbol is looked for beside its place
-    lattice: DesignLattice = LATTICE  #: on which symbols are compared
-
-
-LIMITS = SurveyLimits()
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,10 +144,9 @@ def survey_face(
     *,
     part: str = "",
     face: str = "",
-    limits: SurveyLimits = LIMITS,
 ) -> list[SymbolTile]:
     """Return every symbol of a face as printed; surface in the frame of the embossing's facet."""
-    points, designs = symbol_designs(embossing, limits.lattice)
+    points, designs = symbol_designs(embossing)
     R = turn(embossing.rotation_rad)
     side = designs[0].footprint.shape if designs else (0, 0)
 
@@ -186,11 +161,11 @@ def survey_face(
         moved = np.zeros(2)
         for _ in range(2):  # the first shift changes what lies in the cell
             moved = moved + footprint_shift(found, design, points)
-            moved = moved.clip(-limits.moved_mm, limits.moved_mm)
+            moved = moved.clip(-_MOVED_MM, _MOVED_MM)
             found, base = over_face(sample(number, moved), design)
         printed = found > design.height_mm / 2
         rivals = [d for k, d in enumerate(designs) if k != label]
-        pixel = limits.lattice.step_mm**2
+        pixel = STEP_MM**2
         top = found[design.top]
         height = float(np.median(top)) if len(top) and np.isfinite(base) else 0.0
         check = SymbolCheck(
@@ -199,7 +174,7 @@ def survey_face(
             name=embossing.names[number],
             label=label,
             overlap=_overlap(printed, design.footprint),
-            rival_overlap=max((_best_overlap(printed, r, limits) for r in rivals), default=0.0),
+            rival_overlap=max((_best_overlap(printed, r) for r in rivals), default=0.0),
             area_mm2=float(design.footprint.sum()) * pixel,
             lost_mm2=float((design.footprint & ~printed).sum()) * pixel,
             widened_mm2=float((printed & ~design.footprint).sum()) * pixel,
@@ -208,17 +183,17 @@ def survey_face(
             moved_mm=(float(moved[0]), float(moved[1])),
             verdict="",
         )
-        tiles.append(SymbolTile(_judge(check, limits), design.heights, found))
+        tiles.append(SymbolTile(_judge(check), design.heights, found))
     return tiles
 
 
-def _judge(check: SymbolCheck, limits: SurveyLimits) -> SymbolCheck:
+def _judge(check: SymbolCheck) -> SymbolCheck:
     ahead = check.overlap - check.rival_overlap
     height = check.height_mm / check.designed_mm
     verdict = DOUBTFUL
-    if check.overlap >= limits.overlap and ahead >= limits.ahead and height >= limits.height:
+    if check.overlap >= _OVERLAP and ahead >= _AHEAD and height >= _HEIGHT:
         verdict = SURVIVES
-    elif check.overlap < limits.overlap_least or ahead <= 0 or height < limits.height_least:
+    elif check.overlap < _OVERLAP_LEAST or ahead <= 0 or height < _HEIGHT_LEAST:
         verdict = LOST
     return replace(check, verdict=verdict)
 
@@ -228,12 +203,12 @@ def _overlap(a: Mask, b: Mask) -> float:
     return float((a & b).sum()) / union if union else 0.0
 
 
-def _best_overlap(printed: Mask, design: SymbolDesign, limits: SurveyLimits) -> float:
+def _best_overlap(printed: Mask, design: SymbolDesign) -> float:
     """Return the overlap where the middles of both lie on each other, or nearly so."""
     near = printed & ~design.around
     if not near.any():
         return 0.0
-    most = round(limits.moved_mm / limits.lattice.step_mm)
+    most = round(_MOVED_MM / STEP_MM)
     at = [np.argwhere(mask).mean(axis=0) for mask in (near, design.footprint)]
     by = np.rint(at[1] - at[0]).astype(np.int64).clip(-most, most)
     return _overlap(np.roll(printed, by, axis=(0, 1)), design.footprint)

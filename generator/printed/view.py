@@ -19,11 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.errors import PrintError
-from generator.printed.beads import Beads
-from generator.printed.deposit import Deposit
-from generator.printed.surface import DEPTH_MM, MARGIN_MM, STEP_MM, Coverage, PrintedSurface
+from generator.printed.deposit import Beads, Deposit
+from generator.printed.surface import DEPTH_MM, MARGIN_MM, STEP_MM, PrintedSurface
 
+Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+_BLOCK = 1 << 20  # places computed at once: bounds the memory
+_UPRIGHT = 1e-9  # a bead whose run along t is less stands across the face
+_FLAT = 1e-9  # a bead whose rise is less of its length lies along the rows
+_SQUARE = 1e-6  # of a unit normal
 
 
 def expand_runs(first: Index, count: Index) -> tuple[Index, Index]:
@@ -45,16 +50,10 @@ def blocks(count: Index, size: int) -> list[Index]:
     return np.split(np.arange(len(count)), np.searchsorted(total, ends) + 1)
 
 
-Floats = NDArray[np.float64]
-
-_BLOCK = 1 << 20  # places worked out at once: bounds the memory
-_UPRIGHT = 1e-9  # a bead whose run along t is less stands across the face
-
-
 def heights_sideways(
-    beads: Beads, low_mm: Floats, shape: tuple[int, int], step_mm: float
-) -> tuple[NDArray[np.float32], int]:
-    """Return n of the outermost plastic over a grid of `shape` nz, nt, and the places computed.
+    beads: Beads, low_mm: Floats, shape: tuple[int, ...], step_mm: float
+) -> NDArray[np.float32]:
+    """Return n of the outermost plastic over a grid of `shape` nz, nt.
 
     Places of beads are (t, n); `low_mm`: t and z of the first place of the grid.
     """
@@ -77,7 +76,7 @@ def heights_sideways(
         t = column * step_mm + low_mm[0]
         n = _highest_of_strips(a[part][strip], b[part][strip], half[part][strip], t)
         np.maximum.at(heights.reshape(-1), row[part][strip] * nt + column, n.astype(np.float32))
-    return heights, int(count.sum())
+    return heights
 
 
 def _highest_of_strips(a: Floats, b: Floats, half: Floats, t: Floats) -> Floats:
@@ -98,30 +97,22 @@ def _highest_of_strips(a: Floats, b: Floats, half: Floats, t: Floats) -> Floats:
     return np.maximum(np.maximum(*ends), np.where(beside, side, -np.inf))
 
 
-_FLAT = 1e-9  # a bead whose rise is less of its length lies along the rows
-
-
 def heights_from_above(
-    beads: Beads, low_mm: Floats, shape: tuple[int, int], step_mm: float
-) -> tuple[NDArray[np.float32], int]:
-    """Return z of the highest plastic over a grid of `shape` ny, nx, and the places computed.
-
-    `low_mm`: x and y of the first place of the grid.
-    """
+    beads: Beads, low_mm: Floats, shape: tuple[int, ...], step_mm: float
+) -> NDArray[np.float32]:
+    """Return z of the highest plastic over a grid of `shape` ny, nx; `low_mm`: its first place."""
     heights = np.full(shape, -np.inf, dtype=np.float32)
     order = np.argsort(-beads.top_mm, kind="stable")
     tops = beads.top_mm[order]
-    worked = 0
     # Beads of one layer differ by rounding alone; a blob or a string makes a layer of its own.
     layers = np.flatnonzero(np.diff(np.round(tops / 0.01), prepend=np.inf))
     for begin, end in zip(layers, np.append(layers, len(tops))[1:], strict=True):
-        layer = beads.chosen(order[begin:end])
-        worked += _lay(heights, layer, low_mm, step_mm)
-    return heights, worked
+        _lay(heights, beads.chosen(order[begin:end]), low_mm, step_mm)
+    return heights
 
 
-def _lay(heights: NDArray[np.float32], beads: Beads, low: Floats, step: float) -> int:
-    """Raise the heights where beads of one layer are higher; return the places worked out."""
+def _lay(heights: NDArray[np.float32], beads: Beads, low: Floats, step: float) -> None:
+    """Raise the heights where beads of one layer are higher."""
     ny, nx = heights.shape
     a, b = beads.start_mm - low, beads.end_mm - low
     half = beads.width_mm / 2
@@ -129,7 +120,7 @@ def _lay(heights: NDArray[np.float32], beads: Beads, low: Floats, step: float) -
     row1 = np.floor((np.maximum(a[:, 1], b[:, 1]) + half) / step).clip(-1, ny - 1) + 1
     owner, row = expand_runs(row0, row1.astype(np.int64) - row0)
     if not len(owner):
-        return 0
+        return
     first, end = _columns(a, b, half, owner, row.astype(np.float64) * step)
     first = np.ceil(first / step).clip(0, nx).astype(np.int64)
     end = (np.floor(end / step).clip(-1, nx - 1) + 1).astype(np.int64)
@@ -138,7 +129,6 @@ def _lay(heights: NDArray[np.float32], beads: Beads, low: Floats, step: float) -
     np.cumsum(heights < beads.top_mm.max(), axis=1, out=free[:, 1:])
     shows = (end > first) & (free[row, end.clip(0, nx)] > free[row, first.clip(0, nx)])
     owner, row, first, count = owner[shows], row[shows], first[shows], (end - first)[shows]
-    worked = 0
     for part in blocks(count, _BLOCK):
         span, column = expand_runs(first[part], count[part])
         rows, owners = row[part][span], owner[part][span]
@@ -148,8 +138,6 @@ def _lay(heights: NDArray[np.float32], beads: Beads, low: Floats, step: float) -
         points = np.stack([column[lower] * step, rows[lower] * step], axis=1)
         z = _profile(beads, a, b, owners, points)
         np.maximum.at(heights.reshape(-1), place, z.astype(np.float32))
-        worked += len(place)
-    return worked
 
 
 def _columns(a: Floats, b: Floats, half: Floats, owner: Index, y: Floats) -> tuple[Floats, Floats]:
@@ -182,9 +170,6 @@ def _profile(beads: Beads, a: Floats, b: Floats, owner: Index, points: Floats) -
     return np.where(under >= 0, z, -np.inf)
 
 
-_SQUARE = 1e-6  # of a unit normal
-
-
 def is_seen(T_part_face: Floats) -> bool:
     """Whether a face lies level and looks up, or stands upright, as the part is printed."""
     z = float(T_part_face[2, 2])
@@ -192,12 +177,7 @@ def is_seen(T_part_face: Floats) -> bool:
 
 
 def face_surface(
-    printed: Deposit,
-    T_part_face: Floats,
-    *,
-    outline_mm: Floats | None = None,
-    step_mm: float = STEP_MM,
-    depth_mm: float = DEPTH_MM,
+    printed: Deposit, T_part_face: Floats, *, outline_mm: Floats | None = None
 ) -> PrintedSurface:
     """Return the surface over one face of the whole part.
 
@@ -221,50 +201,23 @@ def face_surface(
     T_part_grid[:3, 3] = T_part_face[:3, 3]
     T_surface_grid = np.linalg.inv(T_part_face) @ T_part_grid
     low, high = _region(printed, T_part_grid, T_surface_grid, outline_mm)
-    shape = tuple((np.ceil((high - low)[::-1] / step_mm).astype(np.int64) + 1).tolist())
-    beads = printed.beads
-    near = _in_grid(beads, T_part_grid, upright=not above)
+    shape = tuple((np.ceil((high - low)[::-1] / STEP_MM).astype(np.int64) + 1).tolist())
+    beads = _in_grid(printed.beads, T_part_grid, upright=not above)
+    half, a, b = beads.width_mm / 2, beads.start_mm, beads.end_mm
+    least, most = np.minimum(a, b) - half[:, None], np.maximum(a, b) + half[:, None]
     if above:
-        heights, samples, within = _from_above(near, low, high, shape, step_mm, depth_mm)
+        near = (beads.top_mm > -DEPTH_MM) & ((most >= low) & (least <= high)).all(axis=1)
+        heights = heights_from_above(beads.chosen(near), low, shape, STEP_MM)
         if printed.bow_mm:
-            y, x = (low[k] + T_part_grid[k, 3] + step_mm * np.arange(shape[1 - k]) for k in (1, 0))
+            y, x = (low[k] + T_part_grid[k, 3] + STEP_MM * np.arange(shape[1 - k]) for k in (1, 0))
             points = np.stack(np.meshgrid(x, y), axis=-1)
             heights += printed.bow_at(points).astype(np.float32)
     else:
-        heights, samples, within = _view_sideways(near, low, high, shape, step_mm, depth_mm)
-    heights[heights < -depth_mm] = -np.inf
-    return PrintedSurface(
-        heights=heights,
-        origin_mm=(float(low[0]), float(low[1])),
-        step_mm=step_mm,
-        T_surface_grid=T_surface_grid,
-        T_part_surface=T_part_face.copy(),
-        coverage=Coverage(len(beads), within, samples),
-    )
-
-
-def _from_above(
-    beads: Beads, low: Floats, high: Floats, shape: tuple[int, ...], step: float, depth: float
-) -> tuple[NDArray[np.float32], int, int]:
-    half = beads.width_mm[:, None] / 2
-    near = beads.top_mm > -depth
-    near &= (np.maximum(beads.start_mm, beads.end_mm) + half >= low).all(axis=1)
-    near &= (np.minimum(beads.start_mm, beads.end_mm) - half <= high).all(axis=1)
-    heights, samples = heights_from_above(beads.chosen(near), low, (shape[0], shape[1]), step)
-    return heights, samples, int(near.sum())
-
-
-def _view_sideways(
-    beads: Beads, low: Floats, high: Floats, shape: tuple[int, ...], step: float, depth: float
-) -> tuple[NDArray[np.float32], int, int]:
-    half = beads.width_mm / 2
-    a, b = beads.start_mm, beads.end_mm
-    near = np.maximum(a[:, 1], b[:, 1]) + half > -depth
-    near &= np.maximum(a[:, 0], b[:, 0]) + half >= low[0]
-    near &= np.minimum(a[:, 0], b[:, 0]) - half <= high[0]
-    near &= (beads.top_mm >= low[1]) & (beads.top_mm - beads.height_mm <= high[1])
-    heights, samples = heights_sideways(beads.chosen(near), low, (shape[0], shape[1]), step)
-    return heights, samples, int(near.sum())
+        near = (most[:, 1] > -DEPTH_MM) & (most[:, 0] >= low[0]) & (least[:, 0] <= high[0])
+        near &= (beads.top_mm >= low[1]) & (beads.top_mm - beads.height_mm <= high[1])
+        heights = heights_sideways(beads.chosen(near), low, shape, STEP_MM)
+    heights[heights < -DEPTH_MM] = -np.inf
+    return PrintedSurface(heights, (float(low[0]), float(low[1])), STEP_MM, T_surface_grid)
 
 
 def _in_grid(beads: Beads, T_part_grid: Floats, *, upright: bool) -> Beads:

@@ -1,14 +1,19 @@
 """Printable parts: bodies with embossed faces, their triangles and their proof."""
 
+from generator.solid.analytic import round_volume
 from generator.solid.closed import prove_closed
 from generator.solid.measure import box, volume
-from generator.solid.mitre import symbol_clearance_mm, top_inset_mm
 from generator.solid.panels import Panels, panels
 from generator.solid.part import Embossing, Facet, Part
-from generator.solid.plate import cut_corners, plain_panels, top_insets_mm
+from generator.solid.plate import (
+    cut_corners,
+    plain_panels,
+    symbol_clearance_mm,
+    top_inset_mm,
+    top_insets_mm,
+)
 from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes, triangles
 from generator.solid.whole import emboss_whole
-from generator.solid.wrap import round_volume
 
 __all__ = [
     "Embossing",

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from generator.alphabet.outline import Tiers, foot_half_mm
 from generator.errors import SolidError
 from generator.plane.polygon import boxes_inside, edges_cross, face_vector, points_inside
-from generator.solid.emboss import to_part, turn
-from generator.solid.part import Embossing, Part, in_frame
+from generator.solid.part import Embossing, Part, in_frame, to_part, turn
 
 Ring = NDArray[np.float64]
 

@@ -22,8 +22,7 @@ from generator.alphabet.figures import BAR, FIGURES, figures_of, needs_bar
 from generator.alphabet.outline import Tiers, engrave
 from generator.plane.polygon import boxes_inside
 from generator.printers import Printer
-from generator.solid.emboss import turn
-from generator.solid.part import Embossing
+from generator.solid.part import Embossing, turn
 
 Ring = NDArray[np.float64]
 

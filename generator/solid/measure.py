@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
 from generator.plane.polygon import signed_area, signed_volume
-from generator.solid.emboss import to_part, turn
-from generator.solid.part import Part
+from generator.solid.part import Part, to_part, turn
 
 Floats = NDArray[np.float64]
 

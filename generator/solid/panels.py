@@ -18,13 +18,10 @@ from generator.layout.placement import Layout
 from generator.plane.polygon import face_vector
 from generator.polyhedron.winged import Polyhedron
 from generator.printers import Printer
-from generator.solid.emboss import embossing_of
 from generator.solid.marks import BackMarks, EdgeMark, NameMark, marks_on
 from generator.solid.measure import box
-from generator.solid.mitre import ASSEMBLY_GAP_MM
-from generator.solid.part import Embossing, Part, edge_numbers, in_frame, plane_frame
-from generator.solid.plate import edge_loops, plain_panels
-from generator.solid.whole import move_part
+from generator.solid.part import Embossing, Part, edge_numbers, embossing_of, in_frame, plane_frame
+from generator.solid.plate import ASSEMBLY_GAP_MM, edge_loops, plain_panels
 
 _LISTED = 3  # kinds of missing numbers that a warning lists in full
 
@@ -100,7 +97,7 @@ def panels(
         part = replace(part, embossings=embossings + marks.embossings)
         low, high = box(part)
         middle = (low + high) / 2
-        parts.append(move_part(part, np.array([-middle[0], -middle[1], 0.0])))
+        parts.append(part.moved(np.array([-middle[0], -middle[1], 0.0])))
     warnings = [_no_room(missing)] if missing else []
     if nameless:
         warnings.append(f"no room for a name on the back of {', '.join(nameless)}: mark by hand")

@@ -4,18 +4,22 @@ A part is a plain polyhedral body plus embossings. An embossing repeats a few ou
 on one facet: 20,000 symbols are as small as the list of their centres, and exporters instance
 each outline. Part frame: mm, as the part lies on the printer's bed (z up); its box is centred on
 x and y and stands on z = 0. A point q of a symbol (its own axes, mm) lies at
-T_part_facet (R q + centre, z) with R the turn by rotation_rad and z the tier's height.
+T_part_facet (R q + centre, z) with R the turn by rotation_rad and z the tier's height. The x axis
+of symbols runs along the array's columns: it stands at minus the placement's rotation in the face.
+Thesis 5.5, 6.3.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
+from generator.errors import SolidError
+from generator.layout.placement import FaceLayout
 from generator.plane.polygon import plane_axes
 from generator.polyhedron.winged import Polyhedron
 
@@ -167,3 +171,69 @@ class Part:
         """Number of symbols; marks such as edge numbers do not count."""
         flat = sum(len(e.labels) for e in self.embossings if e.face is not None)
         return flat + sum(len(w.labels) for w in self.wrapped)
+
+    def moved(self, by_mm: NDArray[np.float64]) -> Part:
+        """Return the part shifted by (3,) mm in its own frame; in the object it stays in place."""
+        T_new_old = np.eye(4)
+        T_new_old[:3, 3] = by_mm
+        T_object_part = self.T_object_part.copy()
+        T_object_part[:3, 3] -= T_object_part[:3, :3] @ by_mm
+        return replace(
+            self,
+            vertices=self.vertices + by_mm,
+            embossings=tuple(
+                replace(one, T_part_facet=T_new_old @ one.T_part_facet) for one in self.embossings
+            ),
+            analytic=tuple(
+                replace(face, T_part_axis=T_new_old @ face.T_part_axis) for face in self.analytic
+            ),
+            T_object_part=T_object_part,
+        )
+
+
+def embossing_of(
+    layout: FaceLayout,
+    tiers: tuple[Tiers, ...],
+    facet: int,
+    T_part_face: NDArray[np.float64],
+    pitch_mm: float,
+) -> Embossing:
+    """Return the embossing of one face on a facet of the part; T_part_face (4, 4).
+
+    Raises `SolidError` if a label has no outline.
+    """
+    labels = layout.labels
+    if len(labels) and not (labels.min() >= 0 and labels.max() < len(tiers)):
+        raise SolidError(
+            f"symbol {int(labels.max())} on an alphabet of {len(tiers)} symbols",
+            fix="take an alphabet of the array's order",
+            place=f"face {layout.face + 1}",
+        )
+    cells = zip(layout.rows.tolist(), layout.columns.tolist(), strict=True)
+    return Embossing(
+        facet=facet,
+        face=layout.face,
+        T_part_facet=T_part_face,
+        rotation_rad=-layout.placement.rotation_rad,
+        centres_mm=layout.centres_mm,
+        labels=labels,
+        names=tuple(f"r{row}c{column}" for row, column in cells),
+        tiers=tiers,
+        pitch_mm=pitch_mm,
+    )
+
+
+def to_part(embossing: Embossing, points: NDArray[np.float64], z_mm: float) -> NDArray[np.float64]:
+    """Return (n, 3) part points of (n, 2) points in the facet frame at height `z_mm`."""
+    T = embossing.T_part_facet
+    flat: NDArray[np.float64] = points @ T[:3, :2].T + (T[:3, 3] + z_mm * T[:3, 2])
+    return flat
+
+
+def turn(angle_rad: float) -> NDArray[np.float64]:
+    """Return the (2, 2) rotation by an angle; exact at quarter turns."""
+    quarters = angle_rad / (np.pi / 2)
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    if abs(quarters - round(quarters)) < 1e-15:
+        c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[round(quarters) % 4]
+    return np.array([[c, -s], [s, c]], dtype=np.float64)

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from generator.alphabet.outline import Tiers, foot_half_mm
 from generator.errors import SolidError
 from generator.plane.polygon import boxes_inside, face_vector, signed_area, triangle_areas
-from generator.solid.emboss import to_part, turn
-from generator.solid.part import Embossing, Facet, Part, in_frame, plane_frame
+from generator.solid.part import Embossing, Facet, Part, in_frame, plane_frame, to_part, turn
 
 Ring = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
 from generator.layout.placement import Layout
 from generator.polyhedron.frame import face_frame
 from generator.polyhedron.winged import Polyhedron
-from generator.solid.emboss import embossing_of
+from generator.solid.analytic import analytic_faces
 from generator.solid.measure import box
-from generator.solid.part import Facet, Part
-from generator.solid.wrap.analytic import analytic_faces
-from generator.solid.wrap.wrapped import Body, wrapped_onto
+from generator.solid.part import Facet, Part, embossing_of
+from generator.solid.wrapped import Body, wrapped_onto
 
 
 def emboss_whole(
@@ -51,24 +47,4 @@ def emboss_whole(
         analytic=analytic_faces(polyhedron, bent, tiers, owned),
     )
     low, high = box(part)
-    return move_part(part, -np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))
-
-
-def move_part(part: Part, by_mm: NDArray[np.float64]) -> Part:
-    """Return the part shifted by (3,) mm in its own frame; it stays where it is in the object."""
-    T_new_old = np.eye(4)
-    T_new_old[:3, 3] = by_mm
-    T_object_part = part.T_object_part.copy()
-    T_object_part[:3, 3] -= T_object_part[:3, :3] @ by_mm
-    return replace(
-        part,
-        vertices=part.vertices + by_mm,
-        embossings=tuple(
-            replace(embossing, T_part_facet=T_new_old @ embossing.T_part_facet)
-            for embossing in part.embossings
-        ),
-        analytic=tuple(
-            replace(face, T_part_axis=T_new_old @ face.T_part_axis) for face in part.analytic
-        ),
-        T_object_part=T_object_part,
-    )
+    return part.moved(-np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))

@@ -63,7 +63,7 @@ def read_specs(
             continue
         problems += source.problems
         origin = _origin(path, source)
-        for written in _collect_trees(_objects(source, problems), problems):
+        for written in list(_objects(source, problems)):
             tree = written
             if sensor_type and isinstance(tree.value, dict):
                 tree = replace(tree, value={**tree.value, "sensor_type": sensor_type})
@@ -72,7 +72,9 @@ def read_specs(
                 if len(found) + settings.copies <= OBJECTS_MAX:
                     found += [replace(spec, origin=origin) for spec in resolve(settings, tree)]
                 else:
-                    problems.append(_too_many(tree))
+                    cause = f"more than {OBJECTS_MAX} objects in one run"
+                    mark = mark_of(tree, "copies, name")
+                    problems.append(Problem(cause, "make them in several runs", mark))
             except ValidationError as error:
                 problems += explain_errors(error, tree, ObjectSettings)
                 problems += _problems_of_read_blocks(error, tree)
@@ -169,15 +171,6 @@ def with_profile(
     )
 
 
-def _collect_trees(trees: Iterable[Tree], problems: list[Problem]) -> list[Tree]:
-    """Return the trees; a file that cannot be read adds its problems."""
-    try:
-        return list(trees)
-    except SpecError as error:
-        problems += error.problems
-        return []
-
-
 def _origin(path: Path | str | Tree, source: Tree) -> str:
     """Return the name of a set's files: its own, or that of its file."""
     value = source.value
@@ -263,9 +256,11 @@ def _merge(shared: Tree, own: Tree) -> Tree:
     if not isinstance(own.value, dict):
         return own
     values, value_marks, key_marks = dict(own.value), dict(own.values), dict(own.keys)
+    array = ("profile", "encoding")
+    names_array = any(own.value.get(key) is not None for key in array)
     for key in Defaults.model_fields:
         default = shared.value.get(key)
-        if default is None or (key in ("profile", "encoding") and _names_array(own)):
+        if default is None or (key in array and names_array):
             continue
         present = values.get(key)
         if key in SHARED_BLOCKS and isinstance(present, dict) and isinstance(default, dict):
@@ -278,16 +273,12 @@ def _merge(shared: Tree, own: Tree) -> Tree:
         else:
             continue
         for marks, source in ((value_marks, shared.values), (key_marks, shared.keys)):
-            marks |= {place: mark for place, mark in source.items() if _lies_within(place, taken)}
+            marks |= {
+                place: mark
+                for place, mark in source.items()
+                if any(place[: len(top)] == top for top in taken)
+            }
     return Tree(values, value_marks, key_marks, own.folder)
-
-
-def _lies_within(place: Place, taken: Sequence[Place]) -> bool:
-    return any(place[: len(top)] == top for top in taken)
-
-
-def _names_array(tree: Tree) -> bool:
-    return any(tree.value.get(key) is not None for key in ("profile", "encoding"))
 
 
 def _shared_problems(found: Sequence[ObjectSpec], database: str | None) -> list[Problem]:
@@ -327,11 +318,6 @@ def _shared_problems(found: Sequence[ObjectSpec], database: str | None) -> list[
     return problems
 
 
-def _too_many(tree: Tree) -> Problem:
-    cause = f"more than {OBJECTS_MAX} objects in one run"
-    return Problem(cause, "make them in several runs", mark_of(tree, "copies, name"))
-
-
 def _unique_problems(problems: Sequence[Problem]) -> list[Problem]:
     """Return each problem once, in the order of files and lines, at most `PROBLEMS_SHOWN`."""
     once: dict[tuple[str, str], Problem] = {}
@@ -340,7 +326,10 @@ def _unique_problems(problems: Sequence[Problem]) -> list[Problem]:
     files: dict[str, int] = {}
     for problem in once.values():
         files.setdefault(_file(problem), len(files))
-    ordered = sorted(once.values(), key=lambda p: (files[_file(p)], _position(p)))
+    ordered = sorted(
+        once.values(),
+        key=lambda p: (files[_file(p)], (p.mark.line, p.mark.column) if p.mark else (0, 0)),
+    )
     if len(ordered) > PROBLEMS_SHOWN:
         more = len(ordered) - PROBLEMS_SHOWN
         rest = Problem(f"and {more} more problems", "correct these first", file=_file(ordered[-1]))
@@ -350,10 +339,6 @@ def _unique_problems(problems: Sequence[Problem]) -> list[Problem]:
 
 def _file(problem: Problem) -> str:
     return problem.mark.source.name if problem.mark else problem.file
-
-
-def _position(problem: Problem) -> tuple[int, int]:
-    return (problem.mark.line, problem.mark.column) if problem.mark else (0, 0)
 
 
 def _without_none(value: Any) -> Any:

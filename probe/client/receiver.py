@@ -14,7 +14,7 @@ this, a damaged one only frames next to bytes that vanished without a trace.
 
 What is left: a corruption inside one packet that spares its number and time passes the check
 sum once in 65,536, and must then leave the six upper bits of every 10-bit reading zero. Of
-three million corrupted packets none was handed on (tests/campaigns/probe_corruption.py).
+three million corrupted packets none was handed on.
 Readings of 8 bits have no bits to spare: there it is a few of a million.
 
 Number (u16) and time (u32, us) are unwrapped to whole numbers without end. When the device
@@ -168,7 +168,7 @@ def _advance(last: FramePacket, packet: FramePacket, step_us: float) -> tuple[in
 
 
 class Receiver:
-    """The state of one conversation: splitter, order, what the device said of itself."""
+    """The state of one conversation: splitter, order, and the descriptions of the device."""
 
     def __init__(self) -> None:
         self.ident: IdentPacket | None = None

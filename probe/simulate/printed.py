@@ -27,8 +27,7 @@ from generator.printed.prints import (
     surface_keys,
     surface_path,
 )
-from generator.printed.profiles import DEFAULT
-from generator.printed.slicer import find_slicer, slicer_version
+from generator.printed.slicer import DEFAULT, find_slicer, slicer_version
 from generator.printed.surface import is_written, read_surface
 from probe.errors import SurfaceError
 from probe.simulate.registered import face_of, registered_object
@@ -49,10 +48,7 @@ class PrintOptions:
     def plan(self) -> PrintPlan:
         """Return these options as values.
 
-        Raises
-        ------
-        PrintError
-            An unknown profile or fault, or no PrusaSlicer.
+        Raises `PrintError` for an unknown profile or fault, or without PrusaSlicer.
         """
         plan = print_plan(self.profile, self.faults, self.seed)
         find_slicer()
@@ -155,12 +151,8 @@ def read_listing(file: str) -> PrintListing:
 def printed_scene(listing: str, database: str, object_name: str, face: str) -> Scene:
     """Return a face as it was printed.
 
-    Raises
-    ------
-    SurfaceError
-        The listing or the database cannot be read, or this face was not printed.
-    PrintError
-        The print is not where the listing says.
+    Raises `SurfaceError` if the listing or the database cannot be read, or this face was not
+    printed; `PrintError` if the print is not where the listing says.
     """
     prints = read_listing(listing)
     key = prints.keys.get((object_name, face))

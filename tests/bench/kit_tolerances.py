@@ -11,11 +11,12 @@ and turn of right answers, and errors inside the answer's own 95 % ellipsoid. `p
 
 from __future__ import annotations
 
-import argparse
 import math
+import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -29,6 +30,9 @@ from probe.simulate.world.levels import TYPICAL, Level
 from probe.simulate.world.sensor import LevelSensor, SensorInstance, sample_sensor
 from recognizer.touch.recognise import recognise
 from recognizer.validation.statistics import chi2_quantile
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
 
 SHAPES = {"Cube": {"cube": "80 mm"}, "Box": {"box": ["90 mm", "70 mm", "60 mm"]}}
 INSIDE = chi2_quantile(0.95)  #: chi square of three numbers at 95 %
@@ -123,10 +127,9 @@ def measure(
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = runner.arguments(__doc__, touches=80)
     parser.add_argument("--sensor-type", default="fsr-16")
-    parser.add_argument("--touches", type=int, default=80)
-    given = parser.parse_args()
+    given = runner.parse(parser)
     sensor = sensor_type_named(given.sensor_type)
     with tempfile.TemporaryDirectory() as folder:
         database = f"{folder}/lab.db"
@@ -135,12 +138,11 @@ def main() -> None:
             encode(spec | {"output": {"lab_key": "VA11-DATE-0000-0002"}}, database=database,
                    formats=())  # fmt: skip
         reader = Reader(open_lab(database), sensor)
-        print("| dimension | off by | right | wrong | rms mm / degrees | inside |")
-        print("| --- " * 6 + "|")
+        runner.table(("dimension", "off by", "right", "wrong", "rms mm / degrees", "inside"))
         for defect in defects(sensor):
             right, wrong, mm, deg, inside = measure(database, reader, defect, given.touches)
-            print(f"| {defect.what} | {defect.by} | {right} of {given.touches} | {wrong} "
-                  f"| {mm:.3f} / {deg:.2f} | {100 * inside:.0f} % |", flush=True)  # fmt: skip
+            runner.row(defect.what, defect.by, f"{right} of {given.touches}", wrong,
+                       f"{mm:.3f} / {deg:.2f}", f"{100 * inside:.0f} %")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ too little. Overhanging perimeters are told.
 
 from __future__ import annotations
 
-import argparse
 import io
 import math
 import subprocess
@@ -24,6 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import runner
 import trimesh
 from PIL import Image
 from sliced import repairs, sliced
@@ -58,9 +58,7 @@ class Plate:
 def make_kit(name: str, folder: Path) -> None:
     """Make a type's kit, verified, unless it is there."""
     if not (folder / "sheet.html").exists():
-        entry = "from probe.kit.command import main; main()"
-        subprocess.run([sys.executable, "-c", entry, name, "-o", str(folder), "--verify"],
-                       check=True, stdout=subprocess.DEVNULL)  # fmt: skip
+        runner.run("probe.kit", name, "-o", folder, "--verify")
 
 
 def plate_of(file: Path) -> Plate:
@@ -110,13 +108,11 @@ def resin_layers(file: Path) -> tuple[int, float]:
 
 def main() -> int:
     """Slice what is asked for and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = runner.arguments(__doc__, output=True)
     parser.add_argument("types", nargs="*", default=list(shipped_names()))
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    asked = parser.parse_args()
-    print("| type | plate | manifold | open edges | repaired | layers | overhang | support "
-          "| volume |")  # fmt: skip
-    print("| --- " * 9 + "|")
+    asked = runner.parse(parser)
+    runner.table(("type", "plate", "manifold", "open edges", "repaired", "layers", "overhang",
+                  "support", "volume"))  # fmt: skip
     bad = 0
     for name in asked.types:
         folder = asked.output / name
@@ -126,9 +122,8 @@ def main() -> int:
         for file in sorted(folder.glob("*.3mf")):
             plate = plate_of(file)
             bad += not plate.good
-            print(f"| {name} | {plate.name} | {'yes' if plate.manifold else 'no'} "
-                  f"| {plate.open_edges} | {repaired} | {plate.layers} | {plate.overhang} "
-                  f"| {plate.support} | {plate.volume:.3f} |", flush=True)  # fmt: skip
+            runner.row(name, plate.name, plate.manifold, plate.open_edges, repaired, plate.layers,
+                       plate.overhang, plate.support, plate.volume)  # fmt: skip
     print(f"{bad} at fault")
     return 1 if bad else 0
 

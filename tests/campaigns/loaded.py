@@ -29,7 +29,7 @@ from reference.kernel import inertia_of, solid_of
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
-from generator.export.robot import mjcf, urdf, usd
+from generator.export.robot import usd, xml_files
 from generator.export.robot.model import ReadModel
 from generator.pipeline import encode
 from generator.spec import read_specs
@@ -69,7 +69,7 @@ def read_sdf(program: Path, path: Path) -> ReadModel:
 
 def readers(program: Path) -> dict[str, Callable[[Any, Path], ReadModel]]:
     """Return what reads each format."""
-    return {".xml": mjcf.read, ".urdf": urdf.read, ".usda": usd.read,
+    return {".xml": xml_files.read_mjcf, ".urdf": xml_files.read_urdf, ".usda": usd.read,
             ".sdf": lambda _model, path: read_sdf(program, path)}  # fmt: skip
 
 

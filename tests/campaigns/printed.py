@@ -10,12 +10,11 @@ filament all the same.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
+import runner
 
 from generator.export.meshes import stl_chunks
 from generator.pipeline.files import parts_of
@@ -47,16 +46,14 @@ def panel(profile: str, pitch: str, size_mm: float, folder: Path) -> tuple[Objec
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__)
+    options = runner.arguments(__doc__)
     options.add_argument("-o", "--output", type=Path)
     options.add_argument("--size", type=float, default=60.0)
     options.add_argument("--pitches", default="", help="of profile large, in place of profiles")
-    asked = options.parse_args()
+    asked = runner.parse(options)
     panels = [("large", pitch) for pitch in asked.pitches.split(",")] if asked.pitches else SPECS
-    print("| profile | print | faults | symbols | overlap | worst | lost % | widened % | height mm "
-          "| moved mm | survive | lost |")  # fmt: skip
-    print("| --- " * 12 + "|")
-    spent: dict[str, list[float]] = {"slicing": [], "beads": [], "surface": [], "survey": []}
+    runner.table(("profile", "print", "faults", "symbols", "overlap", "worst", "lost %",
+                  "widened %", "height mm", "moved mm", "survive", "lost"))  # fmt: skip
     with tempfile.TemporaryDirectory() as name:
         for profile, pitch in panels:
             plan, part = panel(profile, pitch, asked.size, Path(name))
@@ -64,42 +61,30 @@ def main() -> None:
             stl.write_bytes(b"".join(stl_chunks(triangles(part))))
             embossing = next(e for e in part.embossings if e.face is not None)
             for machine in PRINTS:
-                began = time.perf_counter()
                 sliced = slice_part(stl, PROFILES[machine])
-                spent["slicing"].append(time.perf_counter() - began)
                 for faults in FAULTS:
-                    t0 = time.process_time()
                     made = deposit(sliced, print_faults(faults), np.random.default_rng(1))
-                    t1 = time.process_time()
                     surface = face_surface(made, embossing.T_part_facet)
-                    t2 = time.process_time()
                     tiles = survey_face(surface, embossing, part=part.name, face=part.name)
-                    t3 = time.process_time()
-                    spent["beads"].append(t1 - t0)
-                    spent["surface"].append(t2 - t1)
-                    spent["survey"].append(t3 - t2)
                     checks = [tile.check for tile in tiles]
                     area = np.mean([c.area_mm2 for c in checks])
-                    print(
-                        f"| {profile} {pitch}| {machine} | {faults} | {len(checks)} "
-                        f"| {np.mean([c.overlap for c in checks]):.3f} "
-                        f"| {min(c.overlap for c in checks):.3f} "
-                        f"| {100 * np.mean([c.lost_mm2 for c in checks]) / area:.1f} "
-                        f"| {100 * np.mean([c.widened_mm2 for c in checks]) / area:.1f} "
-                        f"| {np.mean([c.height_mm for c in checks]):.2f} "
-                        f"| {max(np.hypot(*c.moved_mm) for c in checks):.2f} "
-                        f"| {sum(c.verdict == SURVIVES for c in checks)} "
-                        f"| {sum(c.verdict == LOST for c in checks)} |",
-                        flush=True,
-                    )
+                    runner.row(
+                        f"{profile} {pitch}", machine, faults, len(checks),
+                        float(np.mean([c.overlap for c in checks])),
+                        min(c.overlap for c in checks),
+                        100 * float(np.mean([c.lost_mm2 for c in checks]) / area),
+                        100 * float(np.mean([c.widened_mm2 for c in checks]) / area),
+                        float(np.mean([c.height_mm for c in checks])),
+                        float(max(np.hypot(*c.moved_mm) for c in checks)),
+                        sum(c.verdict == SURVIVES for c in checks),
+                        sum(c.verdict == LOST for c in checks),
+                    )  # fmt: skip
                     if asked.output:
                         asked.output.mkdir(parents=True, exist_ok=True)
                         picture = asked.output / f"{profile}-{machine}-{faults}.png"
                         names = [glyph.name for glyph in plan.alphabet.glyphs]
                         title = f"{profile} on {machine}, faults {faults}"
                         picture.write_bytes(check_png(title, tiles, names))
-    for key, values in spent.items():
-        print(f"{key}: median {np.median(values):.2f} s, most {max(values):.2f} s")
 
 
 if __name__ == "__main__":

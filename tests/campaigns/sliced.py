@@ -7,20 +7,18 @@ for PrusaSlicer is sliced with the settings in it. A row tells, per plate, what 
 --info` and `admesh` say of the meshes (manifold, open edges, anything repaired), how many layers
 and how high, how many overhang perimeters and support segments the G-code holds, and the time
 that printing takes. The slicer's exit code is no check (it is 0 for a mesh with holes), so its
-words are read. Exit code 1 when a mesh is not manifold, needs a repair, or panels overhang. What
-stands in the file of rows is not sliced again.
+words are read. Exit code 1 when a mesh is not manifold, needs a repair, or panels overhang.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import re
 import subprocess
 import sys
 import tempfile
-from dataclasses import asdict, dataclass
 from pathlib import Path
+
+import runner
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
 REPAIRS = ("Edges fixed", "Facets removed", "Facets added", "Facets reversed", "Backwards edges",
@@ -28,22 +26,10 @@ REPAIRS = ("Edges fixed", "Facets removed", "Facets added", "Facets reversed", "
 SECONDS = 1800  #: for one plate
 
 
-@dataclass(frozen=True)
-class Sliced:
-    """One plate."""
-
-    spec: str
-    parts: str  #: panels or whole
-    plate: str
-    manifold: bool  #: every mesh on it
-    open_edges: int
-    repaired: int  #: by admesh, of all STL of the object
-    layers: int
-    layer_mm: float
-    overhang: int  #: perimeters
-    support: int  #: segments
-    hours: float
-    side_down: str  #: as the command says, of a whole body
+#: Of a plate; `repaired` by admesh, of all STL of the object; `overhang` perimeters, `support`
+#: segments, `hours` of printing; `side_down` as the command says of a whole body.
+COLUMNS = ("spec", "parts", "plate", "manifold", "open_edges", "repaired", "layers", "layer_mm",
+           "overhang", "support", "hours", "side_down")  # fmt: skip
 
 
 def made(spec: Path, parts: str, folder: Path) -> str:
@@ -105,52 +91,30 @@ def sliced(plate: Path) -> dict[str, object]:
     }
 
 
+def row_of(job: tuple[Path, str]) -> runner.Row:
+    """Make a spec and slice its plates."""
+    spec, parts = job
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        common = {"spec": spec.stem, "parts": parts, "side_down": made(spec, parts, folder)}
+        common["repaired"] = repairs(folder / "out")
+        plates = sorted((folder / "out").glob("**/*-prusaslicer.3mf"))
+        return {"plates": [common | {"plate": one.stem} | sliced(one) for one in plates]}
+
+
 def main() -> int:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--only", default="", metavar="REGEX", help="specs whose name matches")
-    options.add_argument("-o", type=Path, metavar="FILE", help="rows, a line a plate")
-    chosen = options.parse_args()
-    rows: list[Sliced] = []
-    if chosen.o and chosen.o.exists():
-        rows = [Sliced(**json.loads(line)) for line in chosen.o.read_text().splitlines()]
-    done = {(row.spec, row.parts) for row in rows}
-    print(f"{'plate':44} manifold open repaired layers  mm overhang support hours", flush=True)
-    for row in rows:
-        print(line(row))
-    for spec in sorted(SPECS.glob("*.yaml")):
-        for parts in ("panels", "whole"):
-            if (spec.stem, parts) in done or not re.search(chosen.only, spec.stem):
-                continue
-            with tempfile.TemporaryDirectory() as name:
-                folder = Path(name)
-                side = made(spec, parts, folder)
-                count = repairs(folder / "out")
-                new = [
-                    Sliced(spec=spec.stem, parts=parts, plate=plate.stem, repaired=count,
-                           side_down=side, **sliced(plate))
-                    for plate in sorted((folder / "out").glob("**/*-prusaslicer.3mf"))
-                ]  # fmt: skip
-            for row in new:
-                print(line(row), flush=True)
-            rows += new
-            if chosen.o:
-                with chosen.o.open("a") as lines:
-                    lines.writelines(json.dumps(asdict(row)) + "\n" for row in new)
-    bad = [row for row in rows if not row.manifold or row.open_edges or row.repaired]
-    bad += [row for row in rows if row.parts == "panels" and row.overhang]
-    print(f"{len(rows)} plates, {len(bad)} at fault; of panels "
-          f"{sum(row.overhang for row in rows if row.parts == 'panels')} overhang perimeters, of "
-          f"whole bodies {sum(row.overhang for row in rows if row.parts == 'whole')}")  # fmt: skip
+    """Slice what is asked for and print the table."""
+    parser = runner.arguments(__doc__, output=True)
+    parser.add_argument("--only", default="", metavar="REGEX", help="specs whose name matches")
+    asked = runner.parse(parser)
+    specs = [one for one in sorted(SPECS.glob("*.yaml")) if re.search(asked.only, one.stem)]
+    jobs = [(spec, parts) for spec in specs for parts in ("panels", "whole")]
+    rows = [plate for row in runner.resume(asked.output, jobs, row_of) for plate in row["plates"]]
+    runner.table(COLUMNS, ([row[name] for name in COLUMNS] for row in rows))
+    bad = [row for row in rows if not row["manifold"] or row["open_edges"] or row["repaired"]]
+    bad += [row for row in rows if row["parts"] == "panels" and row["overhang"]]
+    print(f"{len(rows)} plates, {len(bad)} at fault")
     return 1 if bad else 0
-
-
-def line(row: Sliced) -> str:
-    """Return one row of the table."""
-    name = f"{row.parts} {row.plate.removesuffix('-prusaslicer')} ({row.spec})"
-    return (
-        f"{name[:44]:44} {row.manifold!s:8} {row.open_edges:4} {row.repaired:8} {row.layers:6} "
-        f"{row.layer_mm:3g} {row.overhang:8} {row.support:7} {row.hours:5.2f}  {row.side_down}"
-    ).rstrip()
 
 
 if __name__ == "__main__":

@@ -1,38 +1,36 @@
 """Read back, by independent programs, what is made of fixtures and random polyhedra.
 
+    pip install lib3mf
     python tests/campaigns/verified.py --convex 300 --other 50 --seed 1 -j 2 -o verified.jsonl
 
-Random shapes are made as panels, every second one as a whole body too. Every part is written as
-STEP and STL and read back: STEP by the CAD kernel (one valid solid, volume against the closed
-form), STL by pymeshlab (closed, two-manifold, no triangle cuts another);
-panels are put together by `T_object_part` and may neither overlap nor come nearer than the gap.
-Shapes that the tool refuses (too small for the wall, say) are counted with their reason. Exit
-code 1 when a written part fails. What stands in the file of outcomes is not made again.
+Random shapes are made as panels, every second one as a whole body too. STEP is read by the CAD
+kernel (one valid solid, volume against the closed form), STL by pymeshlab (closed, two-manifold, no
+triangle cuts another), both 3MF of each plate by the library of the 3MF Consortium in strict mode;
+a GLB is welded by equal coordinates (no edge open or shared by more than two triangles); panels are
+put together by `T_object_part` and may neither overlap nor come nearer than the gap. Refused shapes
+are counted with their reason. Exit code 1 when a file fails.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
+import struct
 import sys
 import tempfile
-import time
 from collections import Counter
-from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+import runner
 
 from generator.errors import GeneratorError
 from generator.export.check import PanelFile, verify_fit, verify_step, verify_stl
-from generator.export.meshes import stl_chunks
+from generator.export.meshes import glb_bytes, stl_chunks
 from generator.export.step import step_chunks
-from generator.pipeline.files import parts_of
+from generator.export.threemf import print_files
+from generator.pipeline.files import parts_of, settings_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
-from generator.polyhedron import Polyhedron
 from generator.solid import prove_closed, triangles
 from generator.spec import ObjectSpec, read_specs
 
@@ -42,146 +40,139 @@ from random_shapes import random_convex, random_nonconvex
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of one shape, as one kind of parts."""
-
-    name: str
-    parts: int
-    symbols: int
-    step_error: float  #: largest relative volume error of a part, by the kernel
-    mesh_error: float
-    refused: str
-    failed: str
-    panels: int = 0  #: of an object made of panels
-    overlap_mm3: float = 0.0  #: that two of its panels both fill
-    gap_mm: float | None = None  #: smallest distance of two of its panels, where any are near
-
-
 def random_spec(kind: str, seed: int, number: int, folder: Path, parts: str = "panels") -> Path:
     """Write the spec of one random shape, made of panels or whole."""
     rng = np.random.default_rng([seed, number, kind == "convex"])
     shape = random_convex(rng) if kind == "convex" else random_nonconvex(rng)
     path = folder / f"{kind}-{number:03d}-{parts}.yaml"
-    path.write_text(spec_text(path.stem, shape, parts))
+    faces = [[list(loop) for loop in face.loops] for face in shape.faces]
+    faces = [loops[0] if len(loops) == 1 else loops for loops in faces]
+    path.write_text(
+        f"name: {path.stem}\nprofile: large\nprint: {{parts: {parts}}}\n"
+        f"shape:\n  polyhedron:\n    vertices: {shape.vertices.tolist()}\n    faces: {faces}\n"
+    )
     return path
 
 
-def spec_text(name: str, shape: Polyhedron, parts: str) -> str:
-    vertices = [[float(x) for x in vertex] for vertex in shape.vertices]
-    faces = [[list(loop) for loop in face.loops] for face in shape.faces]
-    faces = [loops[0] if len(loops) == 1 else loops for loops in faces]
-    return (
-        f"name: {name}\nprofile: large\nprint: {{parts: {parts}}}\n"
-        f"shape:\n  polyhedron:\n    vertices: {vertices}\n    faces: {faces}\n"
-    )
-
-
-def checked(path: Path) -> list[Outcome]:
-    """Make and read back every object of a spec file."""
+def checked(path: Path) -> runner.Row:
+    """Return what became of every object of a spec file."""
     try:
-        return [outcome(located) for located in read_specs([path])]
+        return {"objects": [outcome(spec) for spec in read_specs([path])]}
     except GeneratorError as error:
-        return [Outcome(path.stem, 0, 0, 0.0, 0.0, error.cause, "")]
+        return {"objects": [{"name": path.stem, "refused": error.cause}]}
 
 
-def outcome(located: ObjectSpec) -> Outcome:
-    name = located.name
+def outcome(spec: ObjectSpec) -> runner.Row:
+    """Make one object and read it back."""
+    row: runner.Row = {"name": spec.name}
     try:
-        plan = plan_object(located)
+        plan = plan_object(spec)
         layout = lay_out_object(plan, NO_CELLS)
         parts, _ = parts_of(plan, layout)
     except GeneratorError as error:
-        return Outcome(name, 0, 0, 0.0, 0.0, error.cause, "")
-    symbols = sum(len(face.labels) for face in layout.faces)
-    step_error = mesh_error = 0.0
-    fit = None
-    with tempfile.TemporaryDirectory() as folder:
-        panels = []
-        for part in parts:
-            step, stl = Path(folder) / "part.step", Path(folder) / f"{part.name}.stl"
-            panels.append(PanelFile(part.name, stl, part.T_object_part))
-            try:
+        return row | {"refused": error.cause}
+    row |= {"parts": len(parts), "symbols": sum(len(face.labels) for face in layout.faces)}
+    errors, panels = [(0.0, 0.0)], []
+    meshes = [triangles(part) for part in parts]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        try:
+            for part, mesh in zip(parts, meshes, strict=True):
+                step, stl = folder / "part.step", folder / f"{part.name}.stl"
+                panels.append(PanelFile(part.name, stl, part.T_object_part))
                 prove_closed(part)
                 step.write_bytes(b"".join(step_chunks(part)))
-                stl.write_bytes(b"".join(stl_chunks(triangles(part))))
-                step_read, stl_read = verify_step(part, step), verify_stl(part, stl)
-            except GeneratorError as error:
-                return Outcome(name, len(parts), symbols, step_error, mesh_error, "", str(error))
-            step_error = max(step_error, abs(step_read.volume_error))
-            mesh_error = max(mesh_error, abs(stl_read.volume_error))
-        try:
-            fit = verify_fit(panels, located.gap_mm) if len(panels) > 1 else None
+                stl.write_bytes(b"".join(stl_chunks(mesh)))
+                read = verify_step(part, step), verify_stl(part, stl)
+                errors.append((abs(read[0].volume_error), abs(read[1].volume_error)))
+            fit = verify_fit(panels, spec.gap_mm) if len(panels) > 1 else None
         except GeneratorError as error:
-            return Outcome(name, len(parts), symbols, step_error, mesh_error, "", str(error))
-    if fit is None:
-        return Outcome(name, len(parts), symbols, step_error, mesh_error, "", "")
-    return Outcome(
-        name, len(parts), symbols, step_error, mesh_error, "", "",
-        len(parts), fit.overlap_mm3, fit.gap_mm,
-    )  # fmt: skip
+            return row | {"failed": str(error)}
+        faults = mesh_faults(glb_bytes(spec.name, parts, meshes))
+        if any(faults):
+            return row | {"failed": f"GLB: flat, doubled, open: {faults}"}
+        for plate in print_files(spec.name, parts, plan.printer.bed_mm, settings_of(plan)):
+            for content in (plate.content, plate.prusaslicer):
+                if said := model_faults(content, folder):
+                    return row | {"failed": f"3MF: {said[0]}"}
+    row["step_error"], row["mesh_error"] = map(max, zip(*errors, strict=True))
+    if fit is not None:
+        row |= {"panels": len(parts), "overlap_mm3": fit.overlap_mm3, "gap_mm": fit.gap_mm}
+    return row
 
 
-def outcomes_of(
-    paths: list[Path], workers: int, kept: Path | None
-) -> Iterable[tuple[str, list[Outcome]]]:
-    """Give name and outcomes of every spec file, first those that stand in `kept`."""
-    known: set[str] = set()
-    if kept and kept.exists():
-        for line in kept.read_text().splitlines():
-            name, some = json.loads(line)
-            known.add(name)
-            yield name, [Outcome(**fields) for fields in some]
-    left = [path for path in paths if path.stem not in known]
-    with ProcessPoolExecutor(workers) as pool:
-        for path, some in zip(left, pool.map(checked, left), strict=True):
-            if kept:
-                with kept.open("a") as lines:
-                    lines.write(json.dumps([path.stem, [asdict(each) for each in some]]) + "\n")
-            yield path.stem, some
+def mesh_faults(glb: bytes) -> tuple[int, int, int]:
+    """Return flat triangles, edges used twice in one direction, and open edges of a GLB."""
+    (length,) = struct.unpack_from("<I", glb, 12)
+    described, data = json.loads(glb[20 : 20 + length]), glb[28 + length :]
+
+    def values(number: int, kind: str) -> np.ndarray:
+        accessor = described["accessors"][number]
+        begin = described["bufferViews"][accessor["bufferView"]]["byteOffset"]
+        return np.frombuffer(data, kind, accessor["count"] * (3 if kind == "<f4" else 1), begin)
+
+    points, corners, first = [], [], 0
+    for mesh in described["meshes"]:
+        for primitive in mesh["primitives"]:
+            own = values(primitive["attributes"]["POSITION"], "<f4").reshape(-1, 3)
+            corners.append(values(primitive["indices"], "<u4").reshape(-1, 3) + first)
+        points.append(own)
+        first += len(own)
+    unique, number = np.unique(np.concatenate(points), axis=0, return_inverse=True)
+    faces = number.ravel()[np.concatenate(corners)].astype(np.int64)
+    flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    start, end = faces[~flat].ravel(), np.roll(faces[~flat], -1, axis=1).ravel()
+    there, back = start * len(unique) + end, end * len(unique) + start
+    return int(flat.sum()), len(there) - len(np.unique(there)), int((~np.isin(there, back)).sum())
+
+
+def model_faults(content: bytes, folder: Path) -> list[str]:
+    """Return what lib3mf says against a 3MF in strict mode."""
+    import lib3mf
+
+    path = folder / "plate.3mf"
+    path.write_bytes(content)
+    reader = lib3mf.get_wrapper().CreateModel().QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    try:
+        reader.ReadFromFile(str(path))
+    except lib3mf.ELib3MFException as error:
+        return [str(error)]
+    return [str(reader.GetWarning(k)) for k in range(reader.GetWarningCount())]
 
 
 def main() -> int:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--convex", type=int, default=300)
-    options.add_argument("--other", type=int, default=50)
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("-j", type=int, default=2)
-    options.add_argument("--no-fixtures", action="store_true")
-    options.add_argument("-o", type=Path, metavar="FILE", help="outcomes, a line a spec file")
-    chosen = options.parse_args()
-    began = time.monotonic()
+    """Make what is asked for and print the figures."""
+    parser = runner.arguments(__doc__, output=True, seed=1, jobs=2)
+    parser.add_argument("--convex", type=int, default=300)
+    parser.add_argument("--other", type=int, default=50)
+    asked = runner.parse(parser)
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        paths = [] if chosen.no_fixtures else sorted((FIXTURES / "specs").glob("*.yaml"))
-        for kind, count in (("other", chosen.other), ("convex", chosen.convex)):
+        paths = sorted((FIXTURES / "specs").glob("*.yaml"))
+        for kind, count in (("other", asked.other), ("convex", asked.convex)):
             for number in range(count):
-                paths.append(random_spec(kind, chosen.seed, number, folder))
+                paths.append(random_spec(kind, asked.seed, number, Path(name)))
                 if number % 2:
-                    paths.append(random_spec(kind, chosen.seed, number, folder, "whole"))
-        outcomes: list[Outcome] = []
-        for done, (_, some) in enumerate(outcomes_of(paths, chosen.j, chosen.o), 1):
-            outcomes += some
-            if sys.stderr.isatty() or done % 50 == 0:
-                print(f"{done}/{len(paths)} {time.monotonic() - began:.0f} s", file=sys.stderr)
-    made = [o for o in outcomes if o.parts and not o.failed]
-    failed = [o for o in outcomes if o.failed]
-    refused = Counter(" ".join(o.refused.split()[:7]) for o in outcomes if o.refused)
-    print(f"{len(outcomes)} objects: {len(made)} made and verified "
-          f"({sum(o.parts for o in made)} parts, {sum(o.symbols for o in made)} symbols), "
+                    paths.append(random_spec(kind, asked.seed, number, Path(name), "whole"))
+        rows = runner.resume(asked.output, paths, checked, asked.jobs)
+    objects = [one for row in rows for one in row["objects"]]
+    made = [one for one in objects if "step_error" in one]
+    failed = [one for one in objects if "failed" in one]
+    refused = Counter(" ".join(o["refused"].split()[:7]) for o in objects if "refused" in o)
+    print(f"{len(objects)} objects: {len(made)} made and verified "
+          f"({sum(o['parts'] for o in made)} parts, {sum(o['symbols'] for o in made)} symbols), "
           f"{len(failed)} failed, {sum(refused.values())} refused")  # fmt: skip
-    step = max((o.step_error for o in made), default=0.0)
-    mesh = max((o.mesh_error for o in made), default=0.0)
+    step, mesh = (max((o[key] for o in made), default=0) for key in ("step_error", "mesh_error"))
     print(f"largest relative volume error: STEP {step:.1e}, STL {mesh:.1e}")
-    fitted = [o for o in made if o.panels]
-    gaps = [o.gap_mm for o in fitted if o.gap_mm is not None]
-    print(f"{len(fitted)} objects of {sum(o.panels for o in fitted)} panels put together: overlap "
-          f"{sum(o.overlap_mm3 for o in fitted):.6f} mm3, smallest gap "
+    fitted = [o for o in made if "panels" in o]
+    gaps = [o["gap_mm"] for o in fitted if o["gap_mm"] is not None]
+    print(f"{len(fitted)} objects of {sum(o['panels'] for o in fitted)} panels put together: "
+          f"overlap {sum(o['overlap_mm3'] for o in fitted):.6f} mm3, smallest gap "
           f"{min(gaps, default=np.inf):.6f} mm")  # fmt: skip
     for reason, count in refused.most_common():
         print(f"  refused {count}: {reason} ...")
-    for o in failed:
-        print(f"  FAILED {o.name}: {o.failed}")
+    for one in failed:
+        print(f"  FAILED {one['name']}: {one['failed']}")
     return 1 if failed else 0
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from generator.export.colours import BODY_RGB
 from generator.export.meshes import glb_bytes
-from generator.export.step import assembly_chunks, step_chunks
+from generator.export.step import assembly_chunks
 from generator.layout.placement import Layout
 from generator.polyhedron.shapes import SHAPES
 from generator.printers import printer_named
@@ -95,15 +95,6 @@ def test_panels_stand_where_they_belong_with_names_and_colours(parts, tmp_path):
         at = properties.CentreOfMass()
         assert (at.X(), at.Y(), at.Z()) == pytest.approx(middle.tolist(), abs=1e-6)
         assert [round(255 * value) for value in rgb] == list(BODY_RGB)
-
-
-def test_parts_in_an_assembly_are_written_as_alone(parts):
-    alone = b"".join(step_chunks(parts[0])).decode()
-    together = b"".join(assembly_chunks("A", parts)).decode()
-    assert together == b"".join(assembly_chunks("A", parts)).decode()
-    for kind in ("ADVANCED_FACE('F1", "MANIFOLD_SOLID_BREP('W"):
-        assert alone.count(kind) * (1 if "F1" in kind else len(parts)) == together.count(kind)
-    assert together.count("NEXT_ASSEMBLY_USAGE_OCCURRENCE") == len(parts)
 
 
 @pytest.mark.parametrize(

@@ -11,54 +11,32 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.cube_panels import cube_panels, embossed
 
-from encoded_objects.base.errors import MissingExtraError
-from generator.alphabet.known import alphabet_named
-from generator.alphabet.outline import SymbolStyle, outlines
-from generator.array.profiles import profile
 from generator.errors import SolidError
 from generator.export.check import STEP_VOLUME, verify_step, verify_stl
 from generator.export.colours import SYMBOL_RGB
 from generator.export.meshes import glb_bytes, stl_chunks
 from generator.export.step import step_chunks
 from generator.export.threemf import print_files
-from generator.layout.layout import lay_out
-from generator.polyhedron.shapes import cube, octahedron
-from generator.polyhedron.winged import Polyhedron
-from generator.printers import printer_named
+from generator.polyhedron.shapes import octahedron
 from generator.solid.measure import volume
-from generator.solid.panels import panels
 from generator.solid.part import Part
 from generator.solid.triangulate import triangles
-from generator.solid.whole import emboss_whole
 
 BED = (250.0, 210.0)
-
-
-def parts_of(polyhedron: Polyhedron, *, in_panels: bool, chamfer_mm: float = 0.0) -> list[Part]:
-    """Return the parts of an object with symbols of dense-4 (one of them has a hole)."""
-    tiers = outlines(alphabet_named("dense-4"), SymbolStyle(chamfer_mm=chamfer_mm))
-    half = max(float(np.abs(ring).max()) for symbol in tiers for ring in symbol.rings[0])
-    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in polyhedron.faces]
-    nothing = np.zeros(0, np.int64)
-    layout = lay_out(polyhedron, profile().array(), 7.0, half, clearances, (nothing, nothing))
-    if in_panels:
-        return list(
-            panels(polyhedron, layout, tiers, 3.0, printer_named("fdm-0.4"), name="Cube").parts
-        )
-    return [emboss_whole(polyhedron, layout, tiers, "Body 'ü'")]
 
 
 @pytest.fixture(scope="module")
 def panel() -> Part:
     """A panel with symbols in front and engraved numbers behind."""
-    return parts_of(cube(36.0), in_panels=True)[0]
+    return cube_panels(36.0)[0]
 
 
 @pytest.fixture(scope="module")
 def slanted() -> Part:
     """A whole octahedron: every face slanted, chamfered symbols, a name to be escaped."""
-    return parts_of(octahedron(45.0), in_panels=False, chamfer_mm=0.2)[0]
+    return embossed(octahedron(45.0), whole=True, chamfer_mm=0.2, name="Body 'ü'")[0]
 
 
 @pytest.fixture(params=["panel", "slanted"])
@@ -72,11 +50,7 @@ def engraved(part: Part) -> Part:
 
     def turned(embossing):
         tiers = tuple(
-            replace(
-                symbol,
-                z_mm=tuple(-z / 4 for z in symbol.z_mm),
-            )
-            for symbol in embossing.tiers
+            replace(symbol, z_mm=tuple(-z / 4 for z in symbol.z_mm)) for symbol in embossing.tiers
         )
         return replace(embossing, tiers=tiers)
 
@@ -187,18 +161,6 @@ def test_a_broken_file_is_named_with_its_reason(
     assert capfd.readouterr().out == ""
 
 
-def test_missing_extras_say_how_to_install_them(
-    panel: Part, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import sys
-
-    for module, verify in (("OCP.BRepCheck", verify_step), ("pymeshlab", verify_stl)):
-        monkeypatch.setitem(sys.modules, module, None)
-        with pytest.raises(MissingExtraError) as caught:
-            verify(panel, tmp_path / "a.part")
-        assert "pip install 'encoded-objects[cad,mesh]'" in caught.value.fix
-
-
 @pytest.mark.parametrize("grouping", ["components", "volumes"])
 def test_3mf_passes_the_strict_reader(panel: Part, grouping: str, tmp_path: Path) -> None:
     import lib3mf
@@ -237,11 +199,6 @@ def test_3mf_passes_the_strict_reader(panel: Part, grouping: str, tmp_path: Path
         assert 0 <= y[0] < y[1] <= BED[1]
         assert z == pytest.approx((0.0, 4.0), abs=1e-5)
     assert boxes[0][0][1] + 5 <= boxes[1][0][0] + 1e-4
-
-
-def test_3mf_uses_as_many_plates_as_needed(panel: Part) -> None:
-    files = print_files("Panels", [panel] * 3, (80.0, 40.0))
-    assert [len(file.plate.places) for file in files] == [2, 1]
 
 
 def test_glb_has_a_node_for_each_face(slanted: Part, panel: Part) -> None:

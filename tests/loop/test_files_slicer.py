@@ -12,17 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.cube_panels import cube_panels
 
-from generator.alphabet.known import alphabet_named
-from generator.alphabet.outline import SymbolStyle, outlines
-from generator.array.profiles import profile
 from generator.export.meshes import stl_chunks
 from generator.export.threemf import print_files
-from generator.layout.layout import lay_out
-from generator.polyhedron.shapes import cube
-from generator.printers import printer_named
 from generator.solid.measure import volume
-from generator.solid.panels import panels
 from generator.solid.part import Part
 from generator.solid.triangulate import triangles
 
@@ -37,13 +31,7 @@ def slicer() -> str:
 
 @pytest.fixture(scope="module")
 def parts() -> tuple[Part, ...]:
-    tiers = outlines(alphabet_named("dense-4"), SymbolStyle())
-    half = max(float(np.abs(ring).max()) for symbol in tiers for ring in symbol.rings[0])
-    body = cube(40.0)
-    nothing = np.zeros(0, np.int64)
-    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in body.faces]
-    layout = lay_out(body, profile().array(), 7.0, half, clearances, (nothing, nothing))
-    return panels(body, layout, tiers, 3.0, printer_named("fdm-0.4"), name="Cube").parts
+    return cube_panels(40.0)
 
 
 def run(*command: str) -> str:

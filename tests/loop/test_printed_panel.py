@@ -12,13 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from reference.cube_panels import cube_panels
 
-from generator.alphabet.known import alphabet_named
-from generator.alphabet.outline import SymbolStyle, outlines
-from generator.array.profiles import profile
 from generator.export.meshes import stl_chunks
-from generator.layout.layout import lay_out
-from generator.polyhedron.shapes import cube
 from generator.printed import (
     PROFILES,
     Deposit,
@@ -30,9 +26,7 @@ from generator.printed import (
     slice_part,
 )
 from generator.printed.survey import SURVIVES, survey_face
-from generator.printers import printer_named
 from generator.solid.measure import symbol_volume
-from generator.solid.panels import panels
 from generator.solid.part import Part
 from generator.solid.triangulate import triangles
 
@@ -41,13 +35,7 @@ PROFILE = PROFILES["fdm-0.4-0.2"]
 
 @pytest.fixture(scope="module")
 def part() -> Part:
-    tiers = outlines(alphabet_named("dense-4"), SymbolStyle())
-    half = max(float(np.abs(ring).max()) for symbol in tiers for ring in symbol.rings[0])
-    body = cube(24.0)
-    nothing = np.zeros(0, np.int64)
-    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in body.faces]
-    layout = lay_out(body, profile().array(), 7.0, half, clearances, (nothing, nothing))
-    return panels(body, layout, tiers, 3.0, printer_named("fdm-0.4"), name="Cube").parts[0]
+    return cube_panels(24.0)[0]
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +96,9 @@ def test_the_extruded_volume_is_that_of_the_whole_part_without_its_sparse_infill
     length = np.hypot(*(beads.end_mm - beads.start_mm).T)
     path = sliced.toolpath
     extruded = path.volume_mm3[path.of_part].sum()
-    assert (beads.section_mm2 * length).sum() == pytest.approx(extruded, rel=0.02)
+    w, h = beads.width_mm, beads.height_mm
+    section = h * (w - h * (1 - np.pi / 4))
+    assert (section * length).sum() == pytest.approx(extruded, rel=0.02)
 
 
 def test_heights_are_those_of_the_mesh_away_from_its_walls(

@@ -153,18 +153,6 @@ def test_a_slow_consumer_loses_the_oldest_and_knows(probe):
         assert (statistics.lost, statistics.failed) == (0, 0)
 
 
-def test_a_second_client_is_refused_and_does_no_harm(probe):
-    with Client(probe.url) as client:
-        until(client, lambda f: f.seq > 5)
-        with pytest.raises(PortError, match="in use by another programme"):
-            Client(probe.url)
-        seen = list(islice(client.frames(PATIENCE_S), 50))
-        assert np.diff([f.seq for f in seen]).tolist() == [1] * 49
-        assert client.statistics().failed == 0
-    with Client(probe.url) as client:
-        until(client, lambda f: True)
-
-
 def test_the_wrong_baud_rate_is_told(probe):
     with (
         Client(f"serial://{probe.device}?baud=500000", answer_s=1.5) as client,

@@ -7,9 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from generator.errors import PrintError
-from generator.printed.beads import beads_of
-from generator.printed.gcode import toolpath_of
-from generator.printed.toolpath import Toolpath
+from generator.printed.deposit import beads_of
+from generator.printed.gcode import Toolpath, toolpath_of
 
 numbers = st.one_of(
     st.floats(-1e4, 1e4).map(lambda v: f"{v:.5f}"),

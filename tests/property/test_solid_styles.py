@@ -24,8 +24,8 @@ from generator.polyhedron.shapes import prism, pyramid
 from generator.printers import PRINTERS
 from generator.solid import emboss_whole, panels, prove_closed, triangles, volume
 from generator.solid.closed import edges_once
-from generator.solid.emboss import turn
-from generator.solid.inset import inset, regular
+from generator.solid.part import turn
+from generator.solid.plate import inset, regular
 
 ALPHABET = st.sampled_from(list(ALPHABETS.values()))
 STYLE = st.builds(

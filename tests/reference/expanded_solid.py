@@ -8,7 +8,7 @@ import pytest
 from generator.plane.polygon import face_vector, signed_volume
 from generator.solid import volume
 from generator.solid.closed import edges_once
-from generator.solid.emboss import to_part, turn
+from generator.solid.part import to_part, turn
 
 
 def expand_part(part):

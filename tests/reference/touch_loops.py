@@ -6,7 +6,7 @@ Names and arguments are those of the module that calls the loop.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -16,10 +16,13 @@ from recognizer.touch.symbols.fit import Fit, Lattices, covariances
 from recognizer.touch.symbols.image import NormalizedImage, bounded_gain, normalize_image
 from recognizer.touch.symbols.kernels import (
     ABOVE,
+    DAMPING,
     DEEPEST_GAIN,
+    EASIER,
     FAR,
     FIRST_NOISE,
     GRAZED,
+    HARDER,
     HIDDEN,
     LARGEST_STEP,
     LEAST_DIAGONAL,
@@ -28,14 +31,13 @@ from recognizer.touch.symbols.kernels import (
     QUIET,
     SETTLED,
     SHALLOWER,
+    UNKNOWNS,
 )
 from recognizer.touch.symbols.linearize import (
     _cells_under,
     _fit_form,
     _width,
     _with_bare_face,
-    ascend,
-    damped_step,
     force_jacobian,
     log_densities,
     log_densities_of_none,
@@ -114,14 +116,26 @@ def refine_lattices(image, pose, gain, *, steps, labels_at=None):
     whole[:, : pose.shape[1]] = pose
     least, most, limits = (np.array(one) for one in (LEAST_DIAGONAL, LARGEST_STEP, image.limits))
 
-    def moved(at, damping):
-        step = np.clip(damped_step(at, damping, least), -most, most)
-        pose, gain = at.pose + step[:, :POSE], at.gain + step[:, POSE:]
+    best, damping = _evaluate(image, whole, gain, labels_at), np.full(len(pose), DAMPING)
+    for _ in range(steps):
+        diagonal = np.einsum("bii->bi", best.normal) * damping[:, None] + least
+        system = best.normal + diagonal[:, :, None] * np.eye(UNKNOWNS)
+        step = np.clip(np.linalg.solve(system, best.right[..., None])[..., 0], -most, most)
+        pose, gain = best.pose + step[:, :POSE], best.gain + step[:, POSE:]
         pose[:, 3:] = np.clip(pose[:, 3:], -limits, limits)
-        gain[:, 1] = np.clip(gain[:, 1], SHALLOWER * at.gain[:, 1], DEEPEST_GAIN)
-        return _evaluate(image, pose, bounded_gain(gain), labels_at)
-
-    return ascend(_evaluate(image, whole, gain, labels_at), moved, steps, settled=SETTLED)
+        gain[:, 1] = np.clip(gain[:, 1], SHALLOWER * best.gain[:, 1], DEEPEST_GAIN)
+        tried = _evaluate(image, pose, bounded_gain(gain), labels_at)
+        better = tried.value > best.value
+        done = (np.abs(tried.value - best.value) < SETTLED).all()
+        picked = {}
+        for item in fields(Lattices):
+            new, old = getattr(tried, item.name), getattr(best, item.name)
+            picked[item.name] = np.where(better.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+        best = Lattices(**picked)
+        damping = np.where(better, damping / EASIER, np.minimum(damping * HARDER, 1e6))
+        if done:
+            break
+    return best
 
 
 def _evaluate(image, pose, gain, labels_at):

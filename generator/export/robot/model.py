@@ -14,7 +14,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +24,8 @@ from generator.layout.placement import Layout
 from generator.polyhedron import Polyhedron, face_frame
 from generator.solid import Mesh, Part, body_mesh, emboss_whole, symbol_meshes
 from generator.solid.convex import DEPTH_MM, ConvexPieces, convex_pieces
-from generator.solid.emboss import to_part, turn
 from generator.solid.measure import inertia_of
-from generator.solid.part import transform
+from generator.solid.part import to_part, transform, turn
 from generator.solid.triangulate import closed_template
 
 Floats = NDArray[np.float64]
@@ -267,13 +265,6 @@ def roll_pitch_yaw(R: Floats) -> tuple[float, float, float]:
 def pose(T: Floats) -> str:
     """Return x y z roll pitch yaw of a pose (4, 4)."""
     return numbers([*T[:3, 3], *roll_pitch_yaw(T[:3, :3])])
-
-
-def document(root: ElementTree.Element) -> bytes:
-    """Return an XML file, indented."""
-    ElementTree.indent(root)
-    text = ElementTree.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

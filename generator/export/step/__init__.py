@@ -39,8 +39,7 @@ from generator.export.step.entities import (
     write_units,
 )
 from generator.export.step.symbol import KINDS, outline_points, symbol_entities, symbol_template
-from generator.solid.emboss import turn
-from generator.solid.part import Embossing, Part
+from generator.solid.part import Embossing, Part, turn
 from generator.solid.triangulate import Mesh
 
 _GZIP_LEVEL = 6

@@ -19,6 +19,7 @@ from generator.solid.part import Part
 
 PLACES = 10  #: decimals of a coordinate in mm
 _UNIT_PLACES = 13  #: decimals of a component of a unit vector
+_BLOCK = 240_000  # references written at once; a multiple of `_PER_LINE`
 _PER_LINE = 12  #: references in one line of a long list
 FOOTER = b"ENDSEC;\nEND-ISO-10303-21;\n"
 _TIME_STAMP = "1970-01-01T00:00:00"
@@ -101,10 +102,10 @@ def reference_list(references: Iterable[str]) -> str:
     return ",\n".join(lines)
 
 
-def numbers_listed(numbers: NDArray[np.int64], width: int, block: int = 240_000) -> Iterator[bytes]:
+def numbers_listed(numbers: NDArray[np.int64], width: int) -> Iterator[bytes]:
     """Yield the references to `numbers`, all of `width` digits, as `reference_list` would."""
-    for start in range(0, len(numbers), block):
-        some = numbers[start : start + block]
+    for start in range(0, len(numbers), _BLOCK):
+        some = numbers[start : start + _BLOCK]
         text = np.full((len(some), width + 3), ord("\n"), np.uint8)
         text[:, 0] = ord("#")
         text[:, 1:-2] = whole_numbers(some, width)

@@ -42,7 +42,8 @@ LEAST_PRESS = 0.2  #: weight of a tactel where the plane presses little or not a
 FULL_PRESS = 0.5  #: of the mean depth, from which a tactel counts whole
 LEAST_GAIN = 0.12  #: of the largest: below it a tactel says nothing of symbols
 
-# Damped least squares over x, y (mm), theta (rad); stroke excess (tenths of a mm), cross-talk,
+# Damped least squares (K. Levenberg, Quart. Appl. Math. 2 (1944) 164; D. W. Marquardt, J. SIAM 11
+# (1963) 431) over x, y (mm), theta (rad); stroke excess (tenths of a mm), cross-talk,
 # exponent - 1, scale - 1; logarithm of the force scale, depth and its slopes (heights).
 POSE, GAIN = 7, 4  #: unknowns of a lattice, and of its gain
 UNKNOWNS = POSE + GAIN

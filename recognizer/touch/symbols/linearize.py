@@ -3,32 +3,26 @@
 Poses (b, 7) and gains (b, 4) of b lattices + image (n tactels) + labels of the cells -> the
 log-likelihood of each, the forces that the symbols give, and how they change with pose and gain.
 The image is psi(f / g) = T_label(R(theta) s + (x, y) - cell), g the force on a plateau (`image`),
-s a sensor point. Damped least squares (Levenberg, Marquardt) for many starts at once: K. Levenberg,
-Quart. Appl. Math. 2 (1944) 164; D. W. Marquardt, J. SIAM 11 (1963) 431. Lattice and sensor frame
-in mm.
+s a sensor point. Lattice and sensor frame in mm.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from typing import Any, Protocol, TypeVar
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.symbols.image import Image, NormalizedImage, normalize_image
 from recognizer.touch.symbols.kernels import (
-    DAMPING,
     DISPLACED_MM,
-    EASIER,
     FAR,
     FIRST_NOISE,
     FORCE_SCALE_SD,
     FORM_SD,
     GRAZED,
-    HARDER,
     LOUD,
     MOST_NATS,
     POSE,
@@ -42,8 +36,6 @@ Ints = NDArray[np.int64]
 
 #: Which symbols cells show: (b, n, 2) cells of b lattices -> (b, n) labels, -1 for none.
 LabelsAt = Callable[[Ints], Ints]
-
-MOST_DAMPING = 1e6  #: beyond which a step is nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,63 +227,3 @@ def log_densities(
     away = (felt.psi[..., None] - values) / (unit[..., None] * widths)
     each = -np.minimum(0.5 * away * away, MOST_NATS) - np.log(widths)
     return np.asarray(felt.trust[:, None] * each, np.float64)
-
-
-class Point(Protocol):
-    """b starts: a dataclass whose fields are arrays (b, ...)."""
-
-    @property
-    def value(self) -> Array:
-        """(b,) objective to maximise."""
-
-    @property
-    def normal(self) -> Array:
-        """(b, k, k) normal matrices."""
-
-    @property
-    def right(self) -> Array:
-        """(b, k) right-hand sides."""
-
-
-P = TypeVar("P", bound=Point)
-
-
-def ascend(
-    start: P,
-    moved: Callable[[P, Array], P],
-    steps: int,
-    *,
-    settled: float = 0.0,
-    harder: float = HARDER,
-) -> P:
-    """Return the best points within `steps` damped steps; `settled` ends when values change less.
-
-    `moved` takes points and damping (b,) to the points a step further; `harder` multiplies the
-    damping after a step that does not help.
-    """
-    best, damping = start, np.full(len(start.value), DAMPING)
-    for _ in range(steps):
-        tried = moved(best, damping)
-        better = tried.value > best.value
-        done = bool((np.abs(tried.value - best.value) < settled).all())
-        best = _select_points(better, tried, best)
-        damping = np.where(better, damping / EASIER, np.minimum(damping * harder, MOST_DAMPING))
-        if done:
-            break
-    return best
-
-
-def damped_step(at: Point, damping: Array, least: Array | float) -> Array:
-    """Return the step (b, k) at points; `least` is added to the diagonals in any case."""
-    diagonal = np.einsum("bii->bi", at.normal) * damping[:, None] + least
-    system = at.normal + diagonal[:, :, None] * np.eye(diagonal.shape[1])
-    return np.asarray(np.linalg.solve(system, at.right[..., None])[..., 0])
-
-
-def _select_points(better: NDArray[np.bool_], one: Any, other: Any) -> Any:
-    """Return the points of one where they are better, else those of the other."""
-    picked = {}
-    for item in fields(one):
-        new, old = getattr(one, item.name), getattr(other, item.name)
-        picked[item.name] = np.where(better.reshape(-1, *[1] * (new.ndim - 1)), new, old)
-    return type(one)(**picked)

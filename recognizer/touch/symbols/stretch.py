@@ -11,26 +11,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.symbols.image import Image, bounded_gain
 from recognizer.touch.symbols.kernels import (
+    DAMPING,
     DEEPEST_GAIN,
+    EASIER,
     FORM_MOST,
+    HARDER,
     LARGEST_STEP,
     LEAST_DIAGONAL,
     POSE,
     SHALLOWER,
+    UNKNOWNS,
 )
-from recognizer.touch.symbols.linearize import (
-    LabelsAt,
-    ascend,
-    damped_step,
-    linearize_image,
-    prior_precision,
-)
+from recognizer.touch.symbols.linearize import LabelsAt, linearize_image, prior_precision
 from recognizer.touch.symbols.template import STROKE_UNIT_MM
 
 Array = NDArray[np.float64]
@@ -52,16 +51,13 @@ class Stretch:
     covariance: Array  #: (4, 4) of strain and wider_mm, as the image tells it
 
 
-@dataclass(frozen=True, slots=True)
-class _StretchedLattice:
-    """One lattice, as a stack of one, for `ascend`."""
-
-    pose: Array  # (1, 7)
-    gain: Array  # (1, 4)
-    stretch: Array  # (1, 2) a and c of G
-    value: Array  # (1,)
-    normal: Array  # (1, 13, 13)
-    right: Array  # (1, 13)
+class _StretchedLattice(NamedTuple):
+    pose: Array  # (7,)
+    gain: Array  # (4,)
+    stretch: Array  # (2,) a and c of G
+    value: float
+    normal: Array  # (13, 13)
+    right: Array  # (13,)
 
 
 def fit_stretch(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> Stretch:
@@ -71,29 +67,35 @@ def fit_stretch(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> 
     least = np.array([*LEAST_DIAGONAL, *SHEAR_LEAST])
     most = np.array([*LARGEST_STEP, *SHEAR_STEP])
     limits = np.array([WIDEST, *FORM_MOST[1:], LARGEST])
-
-    def moved(at: _StretchedLattice, damping: Array) -> _StretchedLattice:
-        step = np.clip(damped_step(at, damping, least), -most, most)
-        pose, gain = at.pose + step[:, :POSE], at.gain + step[:, POSE : POSE + 4]
-        pose[:, 3:] = np.clip(pose[:, 3:], -limits, limits)
-        gain[:, 1] = np.clip(gain[:, 1], SHALLOWER * at.gain[:, 1], DEEPEST_GAIN)
-        gain = bounded_gain(gain)
-        stretch = np.clip(at.stretch + step[:, POSE + 4 :], -LARGEST, LARGEST)
-        return _evaluate(image, precision, pose, gain, stretch, labels_at)
-
-    start = _evaluate(image, precision, pose[None], gain[None], np.zeros((1, 2)), labels_at)
-    found = ascend(start, moved, STEPS, settled=SETTLED)
-    return _stretch_of(found, STROKE_UNIT_MM)
+    best = _evaluate(image, precision, pose, gain, np.zeros(2), labels_at)
+    damping = DAMPING
+    for _ in range(STEPS):
+        system = best.normal + np.diag(np.diagonal(best.normal) * damping + least)
+        step = np.clip(np.linalg.solve(system, best.right), -most, most)
+        pose, gain = best.pose + step[:POSE], best.gain + step[POSE:UNKNOWNS]
+        pose[3:] = np.clip(pose[3:], -limits, limits)
+        gain[1] = np.clip(gain[1], SHALLOWER * best.gain[1], DEEPEST_GAIN)
+        gain = bounded_gain(gain[None])[0]
+        stretch = np.clip(best.stretch + step[UNKNOWNS:], -LARGEST, LARGEST)
+        tried = _evaluate(image, precision, pose, gain, stretch, labels_at)
+        settled = abs(tried.value - best.value) < SETTLED
+        if tried.value > best.value:
+            best, damping = tried, damping / EASIER
+        else:
+            damping *= HARDER
+        if settled:
+            break
+    return _stretch_of(best)
 
 
 def _evaluate(
     image: Image, precision: Array, pose: Array, gain: Array, stretch: Array, labels_at: LabelsAt
 ) -> _StretchedLattice:
     points = image.points_mm
-    (a, c), turn = stretch[0], float(pose[0, 2])
+    (a, c), turn = stretch, float(pose[2])
     stretched = replace(image, points_mm=points @ np.array([[1 + a, c], [c, 1 - a]]))
-    at = linearize_image(stretched, pose, gain, labels_at, precision)
-    cos, sin, scale = math.cos(turn), math.sin(turn), 1 + float(pose[0, 6])
+    at = linearize_image(stretched, pose[None], gain[None], labels_at, precision)
+    cos, sin, scale = math.cos(turn), math.sin(turn), 1 + float(pose[6])
     across, up = at.jacobian[0, :, 0], at.jacobian[0, :, 1]  # by x and y of the lattice
     along_x = (across * cos + up * sin) * scale  # and of the sensor
     along_y = (up * cos - across * sin) * scale
@@ -103,31 +105,26 @@ def _evaluate(
     )
     weighted = (jacobian * at.sure[0, :, None]).T
     known, precision = np.append(at.known[0], [0.0, 0.0]), np.append(precision, [0.0, 0.0])
-    return _StretchedLattice(
-        pose=pose,
-        gain=gain,
-        stretch=stretch,
-        value=at.value,
-        normal=(weighted @ jacobian + np.diag(precision))[None],
-        right=(weighted @ at.left[0] - known * precision)[None],
-    )
+    normal = weighted @ jacobian + np.diag(precision)
+    right = weighted @ at.left[0] - known * precision
+    return _StretchedLattice(pose, gain, stretch, float(at.value[0]), normal, right)
 
 
-def _stretch_of(found: _StretchedLattice, unit_mm: float) -> Stretch:
+def _stretch_of(found: _StretchedLattice) -> Stretch:
     """Return strain and width of a lattice; the strain turns with the lattice, not the sensor."""
-    (a, c), turn = found.stretch[0], float(found.pose[0, 2])
+    (a, c), turn = found.stretch, float(found.pose[2])
     cos, sin = math.cos(turn), math.sin(turn)
     R = np.array([[cos, -sin], [sin, cos]])
-    F = R @ np.linalg.inv(np.array([[1 + a, c], [c, 1 - a]]) * (1 + found.pose[0, 6])) @ R.T
+    F = R @ np.linalg.inv(np.array([[1 + a, c], [c, 1 - a]]) * (1 + found.pose[6])) @ R.T
     E = (F @ F - np.eye(2)) / 2
     # d E = -R (de 1 + [[da, dc], [dc, -da]]) R', to first order
     modes = [R @ mode @ R.T for mode in (np.eye(2), np.diag([1.0, -1.0]), np.eye(2)[::-1])]
     by = np.zeros((4, 4))
     by[:3, :3] = -np.array([[M[0, 0], M[1, 1], M[0, 1]] for M in modes]).T
-    by[3, 3] = unit_mm
-    unit = 1.0 / np.sqrt(np.diag(found.normal[0]))
-    whole = np.linalg.inv(found.normal[0] * np.outer(unit, unit)) * np.outer(unit, unit)
-    told = [POSE - 1, POSE + 4, POSE + 5, 3]  # scale, the two of G, width
-    covariance = by @ whole[np.ix_(told, told)] @ by.T
-    wider = unit_mm * float(found.pose[0, 3])
+    by[3, 3] = STROKE_UNIT_MM
+    unit = 1.0 / np.sqrt(np.diag(found.normal))
+    whole = np.linalg.inv(found.normal * np.outer(unit, unit)) * np.outer(unit, unit)
+    which = [POSE - 1, UNKNOWNS, UNKNOWNS + 1, 3]  # scale, the two of G, width
+    covariance = by @ whole[np.ix_(which, which)] @ by.T
+    wider = STROKE_UNIT_MM * float(found.pose[3])
     return Stretch(np.array([E[0, 0], E[1, 1], E[0, 1]]), wider, covariance)

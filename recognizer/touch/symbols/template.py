@@ -104,18 +104,19 @@ def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> R
     )
     rimmed = np.zeros((len(axis) + 2, len(axis) + 2, alphabet.order, 6), np.float32)
     values = rimmed[1:-1, 1:-1]
+
+    def heard(response: Array, share: float) -> Array:
+        return _with_cross_talk(response, share, sensor, step)
+
     for label in range(alphabet.order):
-        middle = _with_cross_talk(usual[label], CROSS_TALK, sensor, step)
-        values[..., label, 0] = psi(middle)
-        values[..., label, 1] = np.gradient(values[..., label, 0], step, axis=1)
-        values[..., label, 2] = np.gradient(values[..., label, 0], step, axis=0)
-        values[..., label, 3] = psi(_with_cross_talk(wide[label], CROSS_TALK, sensor, step)) - psi(
-            middle
-        )
-        values[..., label, 4] = psi(
-            _with_cross_talk(usual[label], 2 * CROSS_TALK, sensor, step)
-        ) - psi(usual[label])
-        values[..., label, 5] = (psi(middle**high) - psi(middle**low)) / (high - low)
+        middle = heard(usual[label], CROSS_TALK)
+        own = values[..., label, :]
+        own[..., 0] = psi(middle)
+        own[..., 1] = np.gradient(own[..., 0], step, axis=1)
+        own[..., 2] = np.gradient(own[..., 0], step, axis=0)
+        own[..., 3] = psi(heard(wide[label], CROSS_TALK)) - psi(middle)
+        own[..., 4] = psi(heard(usual[label], 2 * CROSS_TALK)) - psi(usual[label])
+        own[..., 5] = (psi(middle**high) - psi(middle**low)) / (high - low)
     ink = float(usual.sum() * step**2 / style.pitch_mm**2) / alphabet.order
     rimmed.setflags(write=False)
     return ResponseTemplate(style.pitch_mm, alphabet.order, steps * step, rimmed, ink, step)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -91,24 +90,6 @@ def test_the_sheet_of_an_object_explains_every_mark(made):
         ET.fromstring(drawing)
 
 
-def test_the_sheet_of_a_set_names_codes_plates_and_sheets(made):
-    page = page_of(made, "course")
-    rows = re.findall(r'<td>([\w-]+)</td><td><b class="mark">(\w+)</b></td><td>([\d, ]+)</td>'
-                      r'<td><a href="([^"]+)"', page)  # fmt: skip
-    assert [row[0] for row in rows] == ["Block-1", "Block-2", "Whole"]
-    assert len({row[1] for row in rows}) == 3
-    folder = next(f for f in made.set_files if f.name == "course-build.html").parent
-    assert all((folder / row[3]).is_file() for row in rows)
-    facts = dict(re.findall(r"<tr><th>(\w+)</th><td>(.*?)</td></tr>", page))
-    assert facts["layers"] == "0.2 mm, the first 0.2 mm"
-    lies = re.findall(r"<th>lies</th><td>(.*?)</td>", page)
-    assert lies[0] == "Block-1, Block-2: every panel on its back, symbols up; no supports"
-    assert lies[1].startswith("Whole: F1 down, supports needed under F1")
-    cm3 = [int(re.search(r"PLA, (\d+) cm3", page_of(made, name))[1])
-           for name in ("Block-1", "Block-2", "Whole")]  # fmt: skip
-    assert abs(int(re.match(r"PLA, (\d+) cm3 in all", facts["material"])[1]) - sum(cm3)) <= 2
-
-
 def test_the_last_line_says_what_to_print(made):
     line = next_step(made)
     assert "print course-plate-1.3mf" in line or "print course-plate-1.3mf ... " in line
@@ -122,13 +103,3 @@ def test_the_last_line_says_what_to_print(made):
         whole.lying,
     )
     assert made.objects[0].lying is None
-
-
-def test_the_same_set_makes_the_same_sheets(made, tmp_path):
-    (tmp_path / "course.yaml").write_text(SET)
-    specs = read_specs([tmp_path / "course.yaml"])
-    again = encode(specs, folder=tmp_path / "out", database=f"sqlite:///{tmp_path}/l.db",
-                   lab_key="0123-4567-89AB-CDER", formats=("3mf",), jobs=1)  # fmt: skip
-    for one, other in zip(made.files, again.files, strict=True):
-        if one.suffix == ".html":
-            assert Path(one).read_bytes() == Path(other).read_bytes()

@@ -51,14 +51,6 @@ def test_an_error_leaves_no_file_and_no_folder(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_leaving_without_commit_keeps_the_old_file(tmp_path: Path) -> None:
-    (tmp_path / "a.stl").write_bytes(b"old")
-    with Staging(tmp_path) as staging:
-        staging.write("a.stl", b"new")
-    assert [path.name for path in tmp_path.iterdir()] == ["a.stl"]
-    assert (tmp_path / "a.stl").read_bytes() == b"old"
-
-
 def test_two_stagings_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
     with Staging(tmp_path) as one, Staging(tmp_path) as two:
         one.write("a", b"1")

@@ -22,9 +22,9 @@ def boxes(plate: Plate, sizes: list[Size]) -> list[tuple[float, float, float, fl
     return out
 
 
-@given(st.lists(st.tuples(sides, sides), max_size=25), st.sampled_from([0.0, 2.5, 5.0]))
-def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size], gap: float) -> None:
-    plates = arrange_plates(sizes, BED, gap)
+@given(st.lists(st.tuples(sides, sides), max_size=25))
+def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size]) -> None:
+    plates = arrange_plates(sizes, BED)
     assert sorted(p.part for plate in plates for p in plate.places) == list(range(len(sizes)))
     for plate in plates:
         assert plate.fits
@@ -36,12 +36,7 @@ def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size], gap: f
             assert back <= BED[1] + 1e-6
         for a, b in combinations(found, 2):
             apart = max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3])
-            assert apart >= gap - 1e-6
-
-
-def test_six_cube_panels_share_a_plate_and_twenty_need_two() -> None:
-    assert [len(plate.places) for plate in arrange_plates([(60.0, 60.0)] * 6, BED)] == [6]
-    assert [len(plate.places) for plate in arrange_plates([(60.0, 60.0)] * 20, BED)] == [9, 9, 2]
+            assert apart >= 5.0 - 1e-6
 
 
 def test_the_exact_size_of_the_bed_fits_also_turned() -> None:
@@ -60,5 +55,14 @@ def test_a_part_larger_than_the_bed_lies_alone_and_says_so() -> None:
     assert plates[1].places[0].turned
 
 
-def test_no_parts_no_plates() -> None:
-    assert arrange_plates([], BED) == ()
+def test_a_group_lies_on_one_plate_where_one_can_hold_it() -> None:
+    sizes = [(60.0, 60.0)] * 18  # six to a cube; nine fit a bed
+    plates = arrange_plates(sizes, (205, 205), groups=[k // 6 for k in range(18)])
+    assert [sorted(p.part for p in plate.places) for plate in plates] == [
+        list(range(6)), list(range(6, 12)), list(range(12, 18)),
+    ]  # fmt: skip
+    assert len(arrange_plates(sizes, (205, 205))) == 2
+    mixed = arrange_plates([*sizes[:6], *[(60.0, 60.0)] * 3], (205, 205), groups=[0] * 6 + [1] * 3)
+    assert [len(plate.places) for plate in mixed] == [9]
+    split = arrange_plates(sizes[:10], (205, 205), groups=[0] * 10)
+    assert [len(plate.places) for plate in split] == [9, 1]

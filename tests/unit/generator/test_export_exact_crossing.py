@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from generator.export.exact_crossing import cut_triangles, perhaps_folded, triangles_cross
+from generator.export.check import cut_triangles, perhaps_folded, triangles_cross
 from generator.polyhedron.shapes import dodecahedron
 
 BASE = ((0, 0, 0), (8, 0, 0), (0, 8, 0))

@@ -26,12 +26,6 @@ def the_map() -> np.ndarray:
     return seen
 
 
-def test_a_free_middle_is_taken() -> None:
-    (place,) = places_of(the_map(), STEP, [wanted_at(1, 200.0, 200.0, 20.0)])
-    assert place is not None
-    assert np.hypot(place[0] - 200, place[1] - 200) <= STEP
-
-
 def test_hidden_faces_have_no_name() -> None:
     wanted = [wanted_at(2, 24.0, 24.0, 20.0), wanted_at(3, 200.0, 200.0, 20.0)]
     assert places_of(the_map(), STEP, wanted) == [None, None]

@@ -18,10 +18,9 @@ from generator.export.fixed_text import (
     reference_field,
     stamp,
     template_of,
-    whole_numbers,
     with_references,
 )
-from generator.export.step.entities import Entities, numbers_listed, reference_list, step_string
+from generator.export.step.entities import step_string
 
 lengths = st.floats(-1e6, 1e6, allow_nan=False)
 
@@ -46,13 +45,6 @@ def test_decimals_by_hand() -> None:
     assert texts == ["    0.0", "    0.0", "    0.0", "   12.5", "  -12.5", " 1000.0", "   -0.5"]
 
 
-@given(st.lists(st.integers(0, 10**9 - 1), min_size=1, max_size=20))
-def test_whole_numbers(values: list[int]) -> None:
-    for width in range(len(str(max(values))), 14):
-        rows = whole_numbers(np.array(values), width)
-        assert [row.tobytes().decode("ascii") for row in rows] == [f"{v:0{width}d}" for v in values]
-
-
 def test_a_template_is_stamped_with_numbers_decimals_and_names() -> None:
     text = f"#{NUMBER * 3}=P('',{DECIMAL * 6});#{NUMBER * 3}=N({NAMES[0] * 5},#{NUMBER * 3});\n"
     template = template_of(text, [0, 1, 0], 3)
@@ -64,34 +56,6 @@ def test_a_template_is_stamped_with_numbers_decimals_and_names() -> None:
     assert bytes(out).decode("ascii") == (
         "#100=P('',  1.50);#101=N('ab' ,#100);\n#107=P('',-20.25);#108=N('abc',#107);\n"
     )
-
-
-def test_step_strings_are_ascii_and_keep_quotes() -> None:
-    assert step_string("F1/r12c34") == "F1/r12c34"
-    assert step_string("it's") == "it''s"
-    assert step_string("a\\b") == "a\\\\b"
-    assert step_string("ä\n") == "\\X2\\00E4\\X0\\\\X2\\000A\\X0\\"
-    assert step_string("𝔸") == "\\X4\\0001D538\\X0\\"
-
-
-def test_entities_share_directions_and_keep_one_width() -> None:
-    entities = Entities(at_most=500_000)
-    x = np.array([1.0, 0.0, 0.0])
-    assert entities.vector(x) == entities.vector(x.copy())
-    assert entities.direction(-x) != entities.direction(x)
-    text = entities.taken().decode("ascii")
-    assert text.count("DIRECTION('',(1.,0.,0.))") == 1
-    assert "(-1.,0.,0.)" in text
-    assert entities.taken() == b""
-    first = entities.reserve(500_000 - 3)
-    assert len(str(first)) == len(str(entities.next)) == entities.width
-
-
-def test_long_lists_break_into_lines() -> None:
-    numbers = np.arange(10000, 10030)
-    joined = b"".join(numbers_listed(numbers, 5, block=12)).decode("ascii")
-    assert joined == reference_list(f"#{number}" for number in numbers.tolist())
-    assert joined.count("\n") == 2
 
 
 @given(st.lists(st.integers(0, 4), max_size=30), st.integers(5, 8))

@@ -25,25 +25,10 @@ def said(objects, capsys, set_files=()):
     return capsys.readouterr().out
 
 
-def test_copies_are_said_once(capsys):
-    text = said([copy(1), copy(2), copy(3), copy(1, "Roof", 322)], capsys)
-    assert "Cube-1 ... Cube-3: 3 alike, each made; 6 faces, 384 symbols, 6 parts" in text
-    assert "out/Cube-1/ ... Cube-3/  2 step (Cube-1-F1.step, ...)" in text
-    assert "Cube-2" not in text
-    assert "Roof-1: made; 6 faces, 322 symbols" in text
-
-
 def test_copies_that_differ_are_said_each(capsys):
     text = said([copy(1), copy(2, symbols=380)], capsys)
     assert "Cube-1: made; 6 faces, 384 symbols" in text
     assert "Cube-2: made; 6 faces, 380 symbols" in text
-
-
-def test_plates_of_a_set_are_counted(capsys):
-    plates = tuple(Path("out") / f"Set-plate-{n}.3mf" for n in range(1, 7))
-    text = said([copy(1)], capsys, (Path("out/Set-packing.csv"), *plates))
-    assert "out/  Set-packing.csv, 6 3mf (Set-plate-1.3mf, ...)" in text
-    assert "as they lie, backs down, symbols up, no supports, 100 % scale" in text
 
 
 def test_faces_of_which_the_same_is_to_be_said_share_a_line(capsys):

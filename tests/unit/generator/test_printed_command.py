@@ -18,7 +18,7 @@ from generator.errors import PrintError
 from generator.pipeline import printed_check
 from generator.printed import slicer
 from generator.printed.check import PrintedCheck
-from generator.printed.profiles import PrintProfile
+from generator.printed.slicer import PrintProfile
 from generator.printed.survey import SymbolCheck, SymbolTile
 
 
@@ -89,28 +89,6 @@ def test_json(asked: list[object], capsys: pytest.CaptureFixture[str]) -> None:
     assert (first["face"], first["symbol"], first["count"], first["survives"]) == ("F1", "0", 2, 2)
     assert second["worst_overlap"] == 0.2
     assert (second["survives"], second["doubtful"], second["lost"]) == (0, 1, 1)
-
-
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
-        (["--printed-check", "--print-profile", "fdm-9"], "unknown print profile 'fdm-9'"),
-        (["--printed-check", "--print-faults", "much"], "unknown fault 'much'"),
-        (["--print-profile", "fdm-0.4-0.2"], "--printed-check"),
-    ],
-)
-def test_what_is_wrong_with_the_call(
-    asked: list[object], capsys: pytest.CaptureFixture[str], options: list[str], says: str
-) -> None:
-    assert run(["c.yaml", *options]) == 2
-    assert says in capsys.readouterr().err
-    assert not asked
-
-
-def test_resin_lays_no_beads(asked: list[object], capsys: pytest.CaptureFixture[str]) -> None:
-    Path("c.yaml").write_text("name: C\nshape: {cube: 30 mm}\nprint: {printer: resin}\n")
-    assert run(["c.yaml", "--printed-check"]) == 2
-    assert "lays no beads" in capsys.readouterr().err
 
 
 def test_without_a_slicer_one_clear_line_and_exit_code_2(

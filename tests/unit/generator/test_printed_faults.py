@@ -11,9 +11,8 @@ import pytest
 from generator.errors import PrintError
 from generator.printed.deposit import deposit, seam_blobs, strings
 from generator.printed.faults import NAMED, PrintFaults, faulty_path, print_faults
-from generator.printed.gcode import toolpath_of
+from generator.printed.gcode import Toolpath, toolpath_of
 from generator.printed.slicer import SlicedPart
-from generator.printed.toolpath import Toolpath
 
 #: Two layers, each a square of 10 mm and a line of 5 mm in its middle.
 TEXT = "M83\nF3000\n" + "".join(
@@ -30,12 +29,6 @@ def path() -> Toolpath:
 
 def rng() -> np.random.Generator:
     return np.random.default_rng(5)
-
-
-def test_a_perfect_machine_changes_nothing(path: Toolpath) -> None:
-    same = faulty_path(path, PrintFaults(), rng())
-    assert (same.end_mm == path.end_mm).all()
-    assert (same.volume_mm3 == path.volume_mm3).all()
 
 
 def test_scale_and_skew_act_about_the_datum(path: Toolpath) -> None:
@@ -91,12 +84,6 @@ def test_flow_has_the_mean_and_the_spread_that_are_asked() -> None:
     assert share.mean() == pytest.approx(1.1, abs=0.01)
     assert share.std() == pytest.approx(0.055, abs=0.008)
     assert np.abs(np.diff(share)).mean() < 1.5 * share.std()  # it drifts, it does not jump
-
-
-def test_the_same_seed_prints_the_same_again(path: Toolpath) -> None:
-    a, b = (faulty_path(path, NAMED["bad"], rng()) for _ in range(2))
-    assert (a.end_mm == b.end_mm).all()
-    assert (a.volume_mm3 == b.volume_mm3).all()
 
 
 def test_blobs_stand_where_loops_begin(path: Toolpath) -> None:

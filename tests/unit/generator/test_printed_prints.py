@@ -26,7 +26,6 @@ from generator.printed.prints import (
 from generator.printed.slicer import SlicedPart
 from generator.printed.surface import (
     UNIT_MM,
-    Coverage,
     PrintedSurface,
     is_written,
     read_surface,
@@ -43,7 +42,7 @@ def rough_surface(rng: np.random.Generator) -> PrintedSurface:
     T = np.eye(4)
     T[:2, :2] = [[0.0, -1.0], [1.0, 0.0]]
     T[:2, 3] = (3.0, -1.0)
-    return PrintedSurface(heights, (-0.5, 0.25), 0.05, T, np.eye(4), Coverage(0, 0, 0))
+    return PrintedSurface(heights, (-0.5, 0.25), 0.05, T)
 
 
 def test_a_surface_reads_as_it_was_to_half_a_unit(tmp_path: Path) -> None:
@@ -71,15 +70,6 @@ def test_a_print_that_stands_aside_is_moved_back(tmp_path: Path) -> None:
     assert np.isfinite(asked).any()
     assert held.heights_mm(points) == pytest.approx(asked, abs=UNIT_MM)
     assert held.moved_mm == (0.3, -0.2)
-
-
-def test_without_plastic_nothing_is_read(tmp_path: Path) -> None:
-    bare = replace(rough_surface(np.random.default_rng(2)),
-                   heights=np.full((3, 3), -np.inf, np.float32))  # fmt: skip
-    write_surface(bare, tmp_path / "a")
-    held = read_surface(tmp_path / "a")
-    assert np.isneginf(held.top_mm)
-    assert np.isneginf(held.heights_mm(np.zeros((1, 2)))).all()
 
 
 def test_what_is_damaged_or_of_another_format_is_no_surface(tmp_path: Path) -> None:

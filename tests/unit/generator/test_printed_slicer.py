@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from generator.errors import PrintError
-from generator.printed import profiles, slicer
-from generator.printed.profiles import (
+from generator.printed import slicer
+from generator.printed.slicer import (
     PROFILES,
     PrintProfile,
     print_profile,
@@ -43,15 +43,6 @@ def test_every_profile_lays_the_layers_that_its_name_says() -> None:
         assert float(settings["filament_diameter"].split(",")[0]) == 1.75
 
 
-def test_without_the_vendors_file_nozzle_and_layer_are_enough(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(profiles, "VENDOR_FOLDERS", ())
-    settings = settings_of(PROFILES["fdm-0.6-0.3"])
-    assert settings["nozzle_diameter"] == "0.6"
-    assert settings["layer_height"] == "0.3"
-
-
 def test_vendor_settings_are_inherited(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "PrusaResearch.ini").write_text(
         "[print:*a*]\nlayer_height = 0.1\nperimeters = 3\n[print:*b*]\nperimeters = 2\n"
@@ -59,7 +50,7 @@ def test_vendor_settings_are_inherited(monkeypatch: pytest.MonkeyPatch, tmp_path
         "[filament:Prusament PLA]\ntemperature = 215\n[printer:P]\nnozzle_diameter = 0.4\n"
         "gcode = G1 X = Y\n"
     )
-    monkeypatch.setattr(profiles, "VENDOR_FOLDERS", (tmp_path,))
+    monkeypatch.setattr(slicer, "VENDOR_FOLDERS", (tmp_path,))
     found = settings_of(PrintProfile("mine", 0.4, 0.1, "mine", "P"))
     assert found == {
         "layer_height": "0.1", "perimeters": "2", "fill_density": "15%", "temperature": "215",
@@ -170,12 +161,3 @@ def test_a_slicer_that_refuses_is_quoted(program: Path, tmp_path: Path) -> None:
     write_program(program, "exit 0\n")  # says nothing and writes nothing
     with pytest.raises(PrintError, match="refuses: exit code 0"):
         slicer.slice_part(part, PROFILES["fdm-0.4-0.2"])
-
-
-def test_a_missing_slicer_is_one_line_with_a_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(slicer.shutil, "which", lambda _name: None)
-    with pytest.raises(PrintError, match="not installed") as caught:
-        slicer.find_slicer()
-    assert "apt-get install prusa-slicer" in caught.value.fix
-    assert caught.value.exit_code == 2
-    assert "\n" not in str(caught.value)

@@ -11,10 +11,9 @@ from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.plane.polygon import points_inside
 from generator.printed.prints import symbols_shift
-from generator.printed.surface import Coverage, PrintedSurface
+from generator.printed.surface import PrintedSurface
 from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, SymbolTile, rings_at, survey_face
-from generator.solid.emboss import turn
-from generator.solid.part import Embossing
+from generator.solid.part import Embossing, turn
 
 TIERS = outlines(alphabet_named("dense-4"), SymbolStyle())
 CENTRES = np.array([[5.0, 5.0], [12.0, 5.0], [5.0, 12.0], [12.0, 12.0]])
@@ -43,10 +42,7 @@ def surface(
         for z in (0.0, 0.25, 0.4, 0.475, 0.49, 0.5, 0.502, 0.51, 0.525, 0.6, 0.8, 1.0):
             within = points_inside(at[near] @ turn(rotation), rings_at(TIERS[label], z))
             heights[near] = np.where(within, high * z, heights[near])
-    T = np.eye(4)
-    T[2, 3] = 3.0
-    return PrintedSurface((heights + base).astype(np.float32), (0.0, 0.0), 0.05, np.eye(4), T,
-                          Coverage(0, 0, 0))  # fmt: skip
+    return PrintedSurface((heights + base).astype(np.float32), (0.0, 0.0), 0.05, np.eye(4))
 
 
 def survey(of: PrintedSurface, rotation: float = 0.0) -> list[SymbolTile]:
@@ -102,11 +98,6 @@ def test_no_symbol_is_lost() -> None:
     assert [check.verdict for check in checks] == [SURVIVES, LOST, LOST, SURVIVES]
     assert checks[1].overlap == 0
     assert checks[1].height_mm == 0
-
-
-def test_no_plastic_at_all() -> None:
-    nothing = surface([0, 1, 2, 3], base=-np.inf)
-    assert {tile.check.verdict for tile in survey(nothing)} == {LOST}
 
 
 def test_a_string_across_the_cell_moves_nothing() -> None:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import io
-import re
-import zipfile
 from pathlib import Path
 
 import pytest
 
 from generator.errors import GeneratorError
-from generator.export.bed import arrange_plates
-from generator.export.threemf import slicer_settings
 from generator.pipeline.plan import plan_object
 from generator.printers import PRINTERS, known_printers, printer_named
 from generator.spec import ObjectSpec, SpecError, read_specs
@@ -105,53 +100,3 @@ def test_layers_that_do_not_divide_what_was_asked_for_are_told(tmp_path) -> None
     )
     path.write_text(CUBE + "symbols: {height: 1.2 mm}\nprint: {wall: 3.5 mm, printer: resin}\n")
     assert plan_object(read_specs([path])[0]).notes == ()
-
-
-def test_settings_say_layers_bed_and_where_the_colour_changes() -> None:
-    settings = slicer_settings(printer_named("ender-3"), supports=False, colour_change_mm=3.0)
-    assert settings is not None
-    said = settings.entries()
-    assert (said["layer_height"], said["first_layer_height"]) == ("0.2", "0.2")
-    assert said["bed_shape"] == "0x0,220x0,220x220,0x220"
-    assert said["support_material"] == "0"
-    change = settings.files()["Metadata/Prusa_Slicer_custom_gcode_per_print_z.xml"]
-    assert re.search(r'print_z="3.2" .* gcode="M600"', change)
-    plain = slicer_settings(printer_named("ender-3"), supports=True)
-    assert plain is not None
-    assert len(plain.files()) == 1
-    assert plain.entries()["support_material"] == "1"
-    assert slicer_settings(printer_named("resin"), supports=False) is None
-
-
-def test_a_group_lies_on_one_plate_where_one_can_hold_it() -> None:
-    sizes = [(60.0, 60.0)] * 18  # six to a cube; nine fit a bed
-    plates = arrange_plates(sizes, (205, 205), groups=[k // 6 for k in range(18)])
-    assert [sorted(p.part for p in plate.places) for plate in plates] == [
-        list(range(6)), list(range(6, 12)), list(range(12, 18)),
-    ]  # fmt: skip
-    assert len(arrange_plates(sizes, (205, 205))) == 2
-    mixed = arrange_plates([*sizes[:6], *[(60.0, 60.0)] * 3], (205, 205), groups=[0] * 6 + [1] * 3)
-    assert [len(plate.places) for plate in mixed] == [9]
-    split = arrange_plates(sizes[:10], (205, 205), groups=[0] * 10)
-    assert [len(plate.places) for plate in split] == [9, 1]
-
-
-def test_a_file_for_prusaslicer_holds_its_settings(tmp_path) -> None:
-    from encoded_objects import encode
-
-    spec = {
-        "name": "C",
-        "shape": {"cube": "40 mm"},
-        "print": {"printer": "prusa-mk4", "colours": 2},
-    }
-    made = encode(spec, folder=tmp_path, database=f"sqlite:///{tmp_path}/l.db", formats=("3mf",))
-    file = next(f for f in made.files if f.name == "C-prusaslicer.3mf")
-    with zipfile.ZipFile(io.BytesIO(file.read_bytes())) as package:
-        config = package.read("Metadata/Slic3r_PE.config").decode()
-        objects = package.read("Metadata/Slic3r_PE_model.config").decode()
-        assert "Metadata/Prusa_Slicer_custom_gcode_per_print_z.xml" in package.namelist()
-    assert "\n; layer_height = 0.2\n" in config
-    assert objects.count('<metadata type="object" key="layer_height" value="0.2"/>') == 6
-    plain = next(f for f in made.files if f.name == "C.3mf")
-    with zipfile.ZipFile(plain) as package:
-        assert not any("Metadata" in name for name in package.namelist())

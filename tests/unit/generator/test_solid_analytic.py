@@ -12,8 +12,7 @@ from generator.polyhedron.development import development
 from generator.polyhedron.shapes import cone, cylinder
 from generator.polyhedron.winged import Face
 from generator.solid import emboss_whole, round_volume, volume
-from generator.solid.wrap import analytic_faces
-from generator.solid.wrap.analytic import BEND_ERROR_MM, RoundSurfaceMap, bend_lines
+from generator.solid.analytic import BEND_ERROR_MM, RoundSurfaceMap, analytic_faces, bend_lines
 from tests.unit.generator.test_solid_wrap import STYLE, TIERS, layout_on
 
 SOLIDS = {
@@ -82,16 +81,6 @@ def test_symbols_on_the_face_stand_where_those_of_the_mesh_do():
             for edge in tier[0]:
                 corner = edge[0] @ T[:3, :3].T + T[:3, 3]
                 assert np.linalg.norm(vertices - corner, axis=1).min() < 0.03  # chord error
-
-
-def test_walls_have_one_degree_below_and_above():
-    solid, _ = SOLIDS["pointed"]
-    part = emboss_whole(solid, layout_on(solid, [(40.0, 66.0)], [2]), TIERS, "part")
-    (symbol,) = part.analytic[0].symbols
-    below, above = symbol.rings
-    degrees = [[len(edge) for edge in ring] for ring in below]
-    assert degrees == [[len(edge) for edge in ring] for ring in above]
-    assert max(max(ring) for ring in degrees) > 2  # near the tip a parabola does not do
 
 
 def test_a_rim_on_several_faces_keeps_its_facets():

@@ -27,8 +27,8 @@ from generator.solid import (
     volume,
 )
 from generator.solid.closed import edges_once
-from generator.solid.emboss import turn
 from generator.solid.measure import symbol_volume
+from generator.solid.part import turn
 
 FDM = PRINTERS["fdm-0.4"]
 
@@ -175,29 +175,6 @@ def test_mesh_owners_and_separate_bodies_add_up():
     assert mesh.facets[owned].tolist() == facets
 
 
-def test_marks_stay_on_a_body_without_symbols():
-    tiers, half, order = symbols()
-    solid = SOLIDS["cube"]
-    part = panels(solid, filled(solid, 7.0, half + 1.4, order=order), tiers, 3.0, FDM).parts[0]
-    marks = [embossing for embossing in part.embossings if embossing.face is None]
-    groove = sum(
-        symbol_volume(embossing.tiers[label])
-        for embossing in marks
-        for label in embossing.labels.tolist()
-    )
-    assert groove < 0
-    plain = emboss_whole(solid, Layout("faces", 7.0, ()), tiers, "cube")
-    assert len(plain.embossings) == 0
-    assert_one_solid(
-        body_mesh(part),
-        volume(part)
-        - sum(
-            symbol_volume(part.embossings[0].tiers[label])
-            for label in part.embossings[0].labels.tolist()
-        ),
-    )
-
-
 def test_symbols_beyond_an_edge_or_on_each_other_are_found():
     tiers, half, order = symbols()
     solid = SOLIDS["cube"]
@@ -234,27 +211,3 @@ def test_an_open_body_is_found():
     )
     with pytest.raises(SolidError, match="not closed"):
         prove_closed(opened)
-
-
-def test_same_input_gives_the_same_numbers():
-    tiers, half, order = symbols("dense-8", pitch_mm=10.0, stroke_mm=2.0)
-    solid = SOLIDS["ell"]
-    layout = filled(solid, 10.0, half + 1.4, turned=0.4, order=order)
-    first, second = (panels(solid, layout, tiers, 3.0, FDM) for _ in range(2))
-    for one, other in zip(first.parts, second.parts, strict=True):
-        a, b = triangles(one), triangles(other)
-        assert a.vertices.tobytes() == b.vertices.tobytes()
-        assert a.triangles.tobytes() == b.triangles.tobytes()
-
-
-def test_placed_parts_cover_the_object():
-    tiers, half, order = symbols()
-    solid = SOLIDS["ell"]
-    layout = filled(solid, 7.0, half + 1.4, order=order)
-    for part, face in zip(panels(solid, layout, tiers, 3.0, FDM).parts, layout.faces, strict=True):
-        corners = part.vertices[[v for loop in part.facets[0].loops for v in loop]]
-        placed = corners @ part.T_object_part[:3, :3].T + part.T_object_part[:3, 3]
-        loops = solid.faces[face.face].loops
-        wanted = solid.vertices[[v for loop in loops for v in loop]]
-        # The top keeps its corners, but for what the mitre cuts off at right angles.
-        assert np.abs(placed - wanted).max() <= 0.3 + 1e-9

@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 import pytest
-from reference.drawn_fsr import Spread, draw_fsr
+from reference.drawn_fsr import Spread, draw_fsr, read_sequence
 
 from probe.calibration import (
     calibrate_image,
@@ -16,9 +16,8 @@ from probe.calibration import (
     read_calibration,
     write_calibration,
 )
-from probe.circuit import Electronics, read_sequence
+from probe.circuit import Electronics
 from probe.errors import CalibrationError
-from probe.frame import frame_from
 
 NONE = np.zeros((16, 16))
 BOARD = Electronics()
@@ -103,19 +102,6 @@ def test_a_failed_writing_keeps_the_old_file(made, tmp_path, monkeypatch):
         write_calibration(made, path)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
-
-
-def test_frames_and_plain_counts_are_read_alike(made):
-    counts = recorded_counts()
-    frame = frame_from(counts, t_ns=0, seq=0)
-    np.testing.assert_array_equal(
-        calibrate_image(frame, made).values, calibrate_image(counts, made).values
-    )
-    raw = calibrate_image(frame)
-    assert raw.unit == "counts"
-    np.testing.assert_array_equal(raw.values, counts)
-    with pytest.raises(CalibrationError, match="calibration of bench-1"):
-        calibrate_image(np.zeros((8, 8)), made)
 
 
 def test_bad_and_saturated_tactels_tell_no_force(made):

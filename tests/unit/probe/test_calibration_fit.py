@@ -4,19 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference.drawn_fsr import DATASHEET, MEASURED, Spread, draw_fsr
+from reference.drawn_fsr import DATASHEET, MEASURED, Spread, draw_fsr, read_sequence
 
 from probe.calibration import (
     Condition,
     calibrate_image,
     calibration_from,
     even_load,
-    expected_counts,
     known_load,
 )
 from probe.calibration.fit import FittedLaw, fit_laws, law_s, shrink_laws
 from probe.calibration.load import average_frames
-from probe.circuit import Electronics, Noise, fsr_of, read_counts, read_sequence
+from probe.circuit import Electronics, Noise, fsr_of
 from probe.errors import CalibrationError
 
 BOARD = Electronics()
@@ -118,29 +117,6 @@ def test_a_preloaded_tactel_has_a_negative_break_force():
     )
 
 
-def test_without_a_board_counts_stand_for_the_conductance():
-    force = np.array([0.1, 0.3, 1.0, 3.0])
-    rng = np.random.default_rng(0)
-    loads = [
-        known_load(np.rint(4 + 90 * f**0.9 + rng.normal(size=(50, 16, 16))), NONE + f)
-        for f in force
-    ]
-    rest = np.rint(4 + rng.normal(size=(50, 16, 16))).clip(0)
-    calibration = calibration_from(rest, loads, sensor="mat")
-    read = calibrate_image(NONE + 4 + 90, calibration)
-    np.testing.assert_allclose(read.values, 1.0, rtol=0.05)
-    np.testing.assert_allclose(expected_counts(NONE + 1, calibration), 94, rtol=0.05)
-
-
-def test_an_even_load_spreads_over_its_footprint():
-    cover = np.zeros((16, 16))
-    cover[4:8, 4:8] = 1
-    load = even_load(np.zeros((20, 16, 16)), 8.0, cover)
-    assert load.forces_n[5, 5] == 0.5
-    assert load.forces_n.sum() == 8.0
-    assert load.name == "8 N"
-
-
 STILL = replace(BOARD, noise=Noise(0.3, 0, 0.05, 0, 0))  # a contact that does not flutter
 
 
@@ -162,17 +138,6 @@ def test_loads_that_do_not_determine_the_laws_are_named():
     refused("no tactel responds", fsr=dead)
 
 
-def test_a_load_on_a_corner_alone_says_which_tactels_it_missed():
-    forces = NONE.copy()
-    forces[:, :15] = 1.0
-    loads = [
-        known_load(recorded(fsr_of(), f * forces, i, STILL, 20), f * forces)
-        for i, f in enumerate(LEVELS)
-    ]
-    with pytest.raises(CalibrationError, match=r"16 tactels \[\(0, 15\), \(1, 15\)"):
-        calibration_from(recorded(fsr_of(), NONE, 9, STILL, 20), loads, sensor="S1", board=STILL)
-
-
 def test_frames_that_are_none_are_refused():
     for bad in (np.zeros((3, 16, 16)), np.zeros((16, 16)), np.full((30, 16, 16), np.nan)):
         with pytest.raises(CalibrationError, match="shape"):
@@ -186,19 +151,6 @@ def test_frames_that_are_none_are_refused():
     other = [known_load(np.zeros((20, 8, 8)), np.ones((8, 8)))]
     with pytest.raises(CalibrationError, match="one sensor"):
         calibration_from(frames, other, sensor="S1")
-
-
-def test_the_reading_expected_of_a_force_is_the_reading_that_comes():
-    fsr = draw_fsr(np.random.default_rng(8), Spread(dead=0.05, stuck=0.01, preloaded=0.02))
-    calibration = calibration_of(fsr, np.geomspace(0.1, 2.5, 6))
-    forces = NONE + 1.0
-    board = replace(BOARD, noise=Noise(0, 0, 0.05, 0, 0))
-    came = read_counts(forces, board, fsr, None, np.random.default_rng(0))[0]
-    sound = ~(calibration.condition == Condition.STUCK).any(axis=0)
-    error = (expected_counts(forces, calibration) - came)[:, sound]
-    assert sound.sum() > 10
-    assert np.abs(error).max() < 12
-    assert np.sqrt((error**2).mean()) < 3
 
 
 def test_tactels_that_are_alike_help_each_other_where_loads_are_few():

@@ -1,6 +1,5 @@
 """`probe-sensor` in one process: what each command prints and writes, and how it is misused."""
 
-import csv
 import io
 import json
 import subprocess
@@ -9,9 +8,10 @@ import sys
 import numpy as np
 import pytest
 from recorded import record
+from reference.drawn_fsr import read_sequence
 
 from probe.calibration import calibration_from, even_load, write_calibration
-from probe.circuit import Electronics, fsr_of, read_sequence
+from probe.circuit import Electronics, fsr_of
 from probe.command import run
 from probe.command.calibrated import board_from, loads_given
 from probe.errors import CalibrationError, CircuitError
@@ -178,22 +178,6 @@ def test_a_calibration_of_another_sensor_is_refused(asked, bench, tmp_path):
     assert not (tmp_path / "a.npy").exists()
 
 
-def test_replay_writes_every_frame_in_its_time(asked, bench):
-    path = bench / "noise.h5"
-    held = list(Recording(path).frames())
-    for speed in ("0", "2"):
-        code, out, _ = asked("replay", path, "--speed", speed)
-        rows = list(csv.reader(out.splitlines()))
-        assert code == 0
-        assert len(rows) == 31
-        assert rows[0][:3] == ["seq", "t_ns", "r0c0"]
-        assert [int(value) for value in rows[7][2:258]] == held[6].counts.ravel().tolist()
-    code, out, _ = asked("replay", path, "--speed", "0", "--json")
-    frames = [json.loads(line) for line in out.splitlines()]
-    assert [frame["seq"] for frame in frames] == [frame.seq for frame in held]
-    assert (np.array(frames[-1]["counts"]) == held[-1].counts).all()
-
-
 def test_export_in_newtons(asked, bench, tmp_path):
     out = tmp_path / "a.npy"
     words = ["export", bench / "load100.h5", "--npy", out, "--calibration", bench / "bench.json"]
@@ -307,11 +291,6 @@ def test_touch_i_is_the_same_among_any_number_of_touches(asked, tmp_path):
     assert not (many[0] == many[1]).all()
 
 
-def test_a_scan_chooses_its_places(asked, tmp_path):
-    for words in (("--scan", "spiral"), ("--scan", "raster", "--x", "1")):
-        assert error_of(asked("simulate", "washer", *words))[0] == 2
-
-
 def test_boards_from_text():
     assert board_from("none") is None
     assert board_from("simulated") == Electronics()
@@ -323,23 +302,6 @@ def test_boards_from_text():
         assert refused.value.fix
 
 
-def test_lists_of_loads(tmp_path):
-    (tmp_path / "share.csv").write_text("\n".join(",".join("1" * 16) for _ in range(16)))
-    path = tmp_path / "list.csv"
-    path.write_text("\ufeffrecording,newtons,footprint\na.h5,0,\nb.h5,12.5,share.csv\n")
-    rest, load = loads_given([str(path)])
-    assert (rest.newtons, rest.footprint) == (0, None)
-    assert (load.recording, load.newtons, load.footprint.sum()) == (tmp_path / "b.h5", 12.5, 256)
-    for text in ("recording,force\na.h5,1\n", "recording,newtons\na.h5,-1\n",
-                 "recording,newtons\na.h5,nan\n", "recording,newtons,footprint\na.h5,1,list.csv\n",
-                 "recording,newtons,footprint\na.h5,1,gone.csv\n"):  # fmt: skip
-        path.write_text(text)
-        with pytest.raises(CalibrationError) as refused:
-            loads_given([str(path)])
-        assert refused.value.fix
-        assert str(tmp_path) in refused.value.place
-
-
 def test_the_median_filter_takes_single_tactels_away():
     image = np.zeros((16, 16))
     image[5, 5] = 900
@@ -347,3 +309,18 @@ def test_the_median_filter_takes_single_tactels_away():
     image[:, 8:] = 100
     assert (median_filter(image)[:, 8:] == 100).all()
     assert (median_filter(image)[:, :8] == 0).all()
+
+
+def test_lists_of_loads(tmp_path):
+    (tmp_path / "share.csv").write_text("\n".join(",".join("1" * 16) for _ in range(16)))
+    path = tmp_path / "list.csv"
+    path.write_text("\ufeffrecording,newtons,footprint\na.h5,0,\nb.h5,12.5,share.csv\n")
+    rest, load = loads_given([str(path)])
+    assert (rest.newtons, rest.footprint) == (0, None)
+    assert (load.recording, load.newtons, load.footprint.sum()) == (tmp_path / "b.h5", 12.5, 256)
+    for row in ("recording,force\na.h5,1", "recording,newtons\na.h5,nan",
+                "recording,newtons,footprint\na.h5,1,list.csv"):  # fmt: skip
+        path.write_text(row + "\n")
+        with pytest.raises(CalibrationError, match="; ") as refused:
+            loads_given([str(path)])
+        assert str(tmp_path) in refused.value.place

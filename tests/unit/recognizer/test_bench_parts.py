@@ -18,8 +18,7 @@ from hostile_recordings import write_zeros
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import RegisteredPart
 from probe.calibration.guide import LONGEST
-from probe.circuit import Electronics, fsr_of, read_counts
-from probe.errors import CalibrationError, RecordingError
+from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
@@ -35,22 +34,33 @@ from recognizer.bench.files import (
     list_files,
     part_to_send,
 )
-from recognizer.bench.frames import page_guide
+from recognizer.bench.frames import FrameHandler, page_guide
 from recognizer.bench.message import FILTERS, FrameMessage, filter_image, mosaic_message
-from recognizer.bench.reading import AGAIN_S, RESTLESS_S, ReadTrigger
+from recognizer.bench.reading import (
+    AGAIN_S,
+    RESTLESS_S,
+    PendingFrame,
+    ReadTrigger,
+    RecognitionThread,
+)
 from recognizer.bench.simulated import parse_simulation
 from recognizer.bench.touch_log import TouchLog
 from recognizer.scan.mosaic.canvas import GlobalImage
+from recognizer.sensor.wiring import wiring_named
 from recognizer.touch.lab import Lab
 from recognizer.touch.recognition import EDGE, NO_LOAD, Cause, refusal
 
 
-def recorded(path, counts, step_ns=10_000_000):
+def pressed(value, seq=0):
+    image = np.full((16, 16), 3)
+    image[4:9, 4:9] += value
+    return frame_from(image, t_ns=seq * 10_000_000, seq=seq)
+
+
+def recorded(path, counts):
     with Recorder(path, sensor="bench/0") as recorder:
         for i, value in enumerate(counts):
-            image = np.full((16, 16), 3)
-            image[4:9, 4:9] += value
-            recorder.append(frame_from(image, t_ns=i * step_ns, seq=i))
+            recorder.append(pressed(value, i))
     return path
 
 
@@ -129,17 +139,6 @@ def test_recordings_that_cannot_be_played_are_not_read(tmp_path, monkeypatch):
     ):
         with pytest.raises(BenchError, match=r"a.h5: a recording of 2,000,001 frames of 16 x 16"):
             attempt()
-    assert list((tmp_path / "kept").iterdir()) == []
-
-
-def test_recordings_are_no_longer_read_when_the_server_ends(tmp_path):
-    path = write_zeros(tmp_path / "a.h5", 10_000)
-    looks = iter([False, False, True])
-    with pytest.raises(BusyError, match="open-bench ends"):
-        ReplayFeed(Recording(path), lambda: next(looks))
-    uploads = Uploads(tmp_path / "kept", lambda: True)
-    with pytest.raises(BusyError, match="open-bench ends"):
-        taken_in(uploads, "a.h5", path.read_bytes())
     assert list((tmp_path / "kept").iterdir()) == []
 
 
@@ -300,21 +299,6 @@ def test_touches_are_named_deleted_and_told_as_a_table():
         log.rename(2, "x" * 81)
 
 
-def test_pages_are_told_when_an_older_touch_changes():
-    board = Broker()
-    log = TouchLog(board)
-    for value in (1, 2):
-        log.begin(frame_of(value), 1e3)
-        log.read(frame_of(value))
-    assert newest(board, "touches") is None
-    log.rename(2, "the newest")  # told as what it is
-    assert (newest(board, "touches"), newest(board)["name"]) == (None, "the newest")
-    log.rename(1, "older")
-    assert (newest(board, "touches")["changes"], newest(board)["number"]) == (1, 2)
-    log.delete(1)
-    assert newest(board, "touches")["changes"] == 2
-
-
 def test_the_oldest_touches_are_forgotten(monkeypatch):
     monkeypatch.setattr("recognizer.bench.touch_log.KEPT", 3)
     log = TouchLog(Broker())
@@ -359,7 +343,7 @@ def test_a_mosaic_is_packed_thinned_and_tells_what_was_not_felt():
     values = np.linspace(0, 10, 700 * 30).reshape(700, 30)
     count = np.ones(values.shape, np.int64)
     count[0, 0] = 0
-    image = GlobalImage(values, values, values, count, 0.4, (1.0, 2.0))
+    image = GlobalImage(values, count, 0.4, (1.0, 2.0))
     data = mosaic_message(image, 3)
     _, _, _, _, rows, columns, touches, step, x, y, top = struct.unpack("<cBBBIIIffff", data[:32])
     assert (rows, columns, touches) == (350, 15, 3)
@@ -368,7 +352,7 @@ def test_a_mosaic_is_packed_thinned_and_tells_what_was_not_felt():
     assert cells[0, 0] == 0
     assert cells[0, 1] == 1
     assert np.allclose((cells[1:] - 1.0) * top / 254, values[2::2, ::2], atol=top / 254)
-    empty = GlobalImage(*[np.zeros((0, 0))] * 3, np.zeros((0, 0), np.int64), 0.4, (0.0, 0.0))
+    empty = GlobalImage(np.zeros((0, 0)), np.zeros((0, 0), np.int64), 0.4, (0.0, 0.0))
     assert len(mosaic_message(empty, 0)) == 32
 
 
@@ -439,34 +423,6 @@ def test_an_empty_recording_and_one_whose_clock_jumps(tmp_path):
 # -- calibration
 
 
-def fed(guide, newtons, rng, state):
-    """Read one step of a guide from a simulated board."""
-    guide.read()
-    board, fsr, forces = Electronics(), fsr_of(16, 16), np.full((16, 16), newtons / 256)
-    while guide.as_json()["reading"]:
-        counts, state[0] = read_counts(forces, board, fsr, state[0], rng)
-        state[1] += 1
-        guide.guide.take([frame_from(counts, t_ns=state[1] * 10_000_000, seq=state[1])])
-
-
-def test_a_guide_leads_to_a_calibration():
-    guide = page_guide("bench/0", [80, 200, 600], 0.3, Electronics())
-    rng, state = np.random.default_rng(0), [None, 0]
-    with pytest.raises(BusyError):
-        guide.calibration()
-    for newtons in (0, 80, 200, 600):
-        assert guide.as_json()["newtons"] == newtons
-        fed(guide, newtons, rng, state)
-    assert guide.as_json()["done"]
-    assert "felt by 256 of 256" in guide.as_json()["felt"][-1]
-    assert not guide.calibration().bad.any()
-    guide.guide.again()
-    assert guide.as_json()["step"] == 3
-    fed(guide, 600, rng, state)
-    with pytest.raises(BusyError):
-        guide.read()
-
-
 def begun(seconds):
     guide = page_guide("bench/0", [80], seconds, None)
     guide.read()
@@ -497,14 +453,7 @@ def test_a_load_is_read_anew_where_the_board_starts_again():
     assert guide.guide.felt[0].startswith("31 frames")
 
 
-def test_loads_that_tell_nothing_are_refused_with_what_is_missing():
-    guide = page_guide("bench/0", [40], 0.2, Electronics())
-    rng, state = np.random.default_rng(0), [None, 0]
-    for newtons in (0, 40):
-        fed(guide, newtons, rng, state)
-    with pytest.raises(CalibrationError) as refused:
-        guide.calibration()
-    assert refused.value.fix
+def test_loads_that_are_none_are_refused():
     for bad in ([], [0.0], [float("nan")], [1e9], [1.0] * 99):
         with pytest.raises(BenchError):
             page_guide("bench/0", bad, 0.2, None)
@@ -513,18 +462,58 @@ def test_loads_that_tell_nothing_are_refused_with_what_is_missing():
 # -- the simulated probe
 
 
-@pytest.mark.parametrize(
-    "url",
-    ["sim:touch?firmware=avr", "touch:?rate=0", "touch:?rate=nan", "touch:?x=1", "touch:?hold=a"],
-)
-def test_a_simulated_probe_that_cannot_be_had(url):
-    with pytest.raises(BenchError):
-        parse_simulation(url)
-
-
 def test_a_simulated_probe_as_asked():
+    for url in ("sim:touch?firmware=avr", "touch:?rate=0", "touch:?rate=nan", "touch:?x=1",
+                "touch:?hold=a"):  # fmt: skip
+        with pytest.raises(BenchError):
+            parse_simulation(url)
     manner = parse_simulation("touch:?rate=50&hold=1&noise=quiet&seed=3")
     assert (manner.rate, manner.hold_s, manner.noise, manner.seed) == (50, 1, "quiet", 3)
+
+
+# -- frames on their way
+
+
+@pytest.fixture
+def thread():
+    """A thread that reads nothing: there is no database."""
+    thread = RecognitionThread("", SensorType(), Broker())
+    yield thread
+    thread.close()
+
+
+def test_a_load_that_is_still_on_when_the_calibration_ends_is_no_touch(thread):
+    def look(value, *, load=False):
+        thread._read(PendingFrame(pressed(value), None, 0.0, load))
+        return [one["contact"] for one in thread.touches.all()]
+
+    assert look(900, load=True) == []
+    assert look(900) == []  # the calibration is made, the load still on
+    assert look(800) == []
+    assert look(0) == []
+    assert look(900) == [True]
+    assert look(0) == []  # it was not read
+
+
+def test_a_touch_of_a_recording_tells_when_in_it(thread):
+    thread._read(PendingFrame(pressed(900), None, 5.0, False, "mine.h5", 1.25))
+    (record,) = thread.touches.all()
+    assert (record["recording"], record["at_s"]) == ("mine.h5", 1.25)
+
+
+def test_images_are_flipped_for_all_but_the_recording(thread, tmp_path):
+    notes = []
+    handler = FrameHandler(SensorType(), Broker(), thread, notes.append)
+    image = np.zeros((16, 16), int)
+    image[2, 3] = 500
+    handler.wiring = wiring_named("columns")
+    handler.start_recording(tmp_path, "bench/0", "sim:")
+    handler.take([frame_from(image, t_ns=0, seq=0)])
+    assert handler.newest()[1][2, 12] == 500
+    handler.leave()
+    (path,) = tmp_path.glob("*.h5")
+    assert next(iter(Recording(path).frames())).counts[2, 3] == 500
+    assert handler.wiring.changes == ("columns",)  # the mounting stays as it is
 
 
 # -- what nobody looks at

@@ -9,12 +9,13 @@ import h5py
 import numpy as np
 import pytest
 from PIL import Image
+from reference.drawn_fsr import read_sequence
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.calibration import calibration_from, even_load, write_calibration
-from probe.circuit import Electronics, fsr_of, read_counts, read_sequence
+from probe.circuit import Electronics, fsr_of, read_counts
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import frame_from
@@ -166,21 +167,6 @@ def test_nothing_to_recognise(asked, lab):
     rest = json.loads(asked(lab / "rest.h5", "--every", "--json")[1])
     assert {entry["reason"] for entry in rest} == {"no contact"}
     assert len(rest) == 9
-
-
-def test_what_is_not_recognised_says_why_and_what_to_do(asked, lab):
-    half = np.zeros((16, 16))
-    half[:, :7] = 180  # a bare face up to its edge
-    path = recorded(lab / "bare.h5", [half] * 6)
-    code, out, _ = asked(path)
-    assert code == 1
-    assert out.startswith("0: not recognised: ")
-    assert "; " in out
-    entry = json.loads(asked(path, "--json")[1])[0]
-    assert entry["object"] is entry["face"] is entry["index"] is entry["T_face_probe"] is None
-    assert (entry["reason"], entry["reason_code"]) == ("not an encoded surface", "not_encoded")
-    assert "not an encoded surface: no strokes are felt, readings vary by 113 %" in out
-    assert entry["evidence"]["variation"] == pytest.approx(math.sqrt(9 / 7))
 
 
 @pytest.fixture(scope="module")

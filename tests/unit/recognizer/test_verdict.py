@@ -8,6 +8,8 @@ import pytest
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW
 from recognizer.touch.verdict import (
+    CONTRADICTION,
+    STRONG_CONTRADICTION,
     Evidence,
     is_encoded,
     least_explained,
@@ -135,6 +137,12 @@ def test_one_touch_alone_is_one_that_agrees():
     assert reject_reason(replace(few, agreeing=2), TEN, LIMITS) == ""
     assert reject_reason(replace(GOOD, agreeing=0), TEN, LIMITS) == ""
     assert [reject_margin(margin, 3.0) for margin in (3.0, 2.99)] == ["", AMBIGUOUS]
+
+
+def test_evidence_of_cells_alone_is_that_of_an_image_without_fault():
+    """As a scan has it; cells contradict by 8 nats, strongly by 16."""
+    assert Evidence(20.0, 12, 0) == Evidence(20.0, 12, 0, 0, 0, 1.0, 0.0, math.inf, 1, 1)
+    assert (CONTRADICTION, STRONG_CONTRADICTION) == (8.0, 16.0)
 
 
 def test_chance_and_what_an_image_must_explain():

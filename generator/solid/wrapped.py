@@ -27,8 +27,7 @@ from generator.layout.placement import FaceLayout
 from generator.plane.polygon import points_inside, signed_area
 from generator.polyhedron.development import Development, development
 from generator.polyhedron.winged import Developable, Polyhedron
-from generator.solid.emboss import turn
-from generator.solid.part import Facet, WrappedSymbols
+from generator.solid.part import Facet, WrappedSymbols, turn
 
 Points = NDArray[np.float64]
 

@@ -19,13 +19,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.alphabet.outline import Tiers
+from generator.alphabet.outline import SymbolStyle, Tiers
+from generator.alphabet.printable import gap_inside_mm
 from generator.layout.placement import FaceLayout
 from generator.polyhedron.check import directed_edges
 from generator.polyhedron.development import Development, development
 from generator.polyhedron.winged import Developable, Polyhedron
-from generator.solid.emboss import turn
-from generator.solid.part import AnalyticFace, BentSymbol, Part, Points, Rim, transform
+from generator.printers import Printer
+from generator.solid.part import AnalyticFace, BentSymbol, Part, Points, Rim, transform, turn
 
 _LEAST_FACETS = 3  # fewer facets do not tell an axis
 _ON_CIRCLE = 1e-6  # vertices off their circle by less, as a share of the size, lie on it
@@ -312,3 +313,52 @@ def _with_symbols(
         )
         shapes.append(BentSymbol(f"r{row}c{column}", tiers[label].z_mm, rings))
     return replace(face, symbols=tuple(shapes))
+
+
+def least_facet_width(development: Development, height_mm: float) -> float:
+    """Return the least width of a facet at a height, as a share of its width on the surface.
+
+    Over 1 on a convex face, under 1 in a hole; 0 or less where facets vanish below that height.
+    """
+    d = development
+    shares = []
+    for points in (d.low, d.high):
+        across = np.diff(points, axis=0)
+        width = np.hypot(across[:, 0], across[:, 1])
+        grown = np.linalg.norm(np.diff(d.bends, axis=0), axis=1) * height_mm
+        with np.errstate(divide="ignore"):
+            share = np.where(width > 0.0, grown / np.where(width > 0.0, width, 1.0), np.inf)
+        shares.append(share.max())
+    outward = _widens_outwards(d)
+    return 1.0 if outward else 1.0 - float(max(shares))
+
+
+def bend_problem(
+    development: Development, tiers: tuple[Tiers, ...], style: SymbolStyle, printer: Printer
+) -> str:
+    """Return why a printer loses symbols on a face, "" where it does not."""
+    share = least_facet_width(development, style.height_mm)
+    if share <= 0.0:
+        return f"symbols of {style.height_mm:g} mm meet in its middle"
+    stroke = share * style.stroke_mm
+    if stroke < printer.stroke_min_mm * (1 - 1e-9):
+        return (
+            f"its bend narrows strokes to {stroke:.2g} mm, {printer.name} needs "
+            f"{printer.stroke_min_mm:g} mm"
+        )
+    gap = share * min(gap_inside_mm(shape) for shape in tiers)
+    least = printer.gap_inside_mm
+    if gap < least * (1 - 1e-9):
+        return (
+            f"its bend narrows gaps in a symbol to {gap:.3g} mm, {printer.name} needs {least:g} "
+            "mm; a larger pitch helps"
+        )
+    return ""
+
+
+def _widens_outwards(development: Development) -> bool:
+    """Whether the facets widen as they rise."""
+    d = development
+    T = d.T_object_flat[0]
+    across = T[:3, :2] @ (d.low[1] - d.low[0])
+    return bool((d.bends[1] - d.bends[0]) @ across >= 0.0)
