@@ -62,10 +62,21 @@ def magnify_image(image: TactileImage, doublings: int = 2) -> TactileImage:
     values, weights = image.values, image.defined.astype(np.float64)
     values = values * weights
     for _ in range(doublings):
-        values, weights = _double_sampling(values), _double_sampling(weights)
+        values, weights = double_sampling(values), double_sampling(weights)
     defined = weights > 0.5
     filled = np.where(defined, values / np.where(defined, weights, 1.0), 0.0)
     return TactileImage(filled, defined, image.step_mm / 2**doublings, image.corner_mm)
+
+
+def double_sampling(values: Array) -> Array:
+    """Return samples (2 h - 1, 2 w - 1): between two the mean of both."""
+    for axis in (0, 1):
+        rows = np.moveaxis(values, axis, 0)
+        finer = np.empty((2 * len(rows) - 1, *rows.shape[1:]))
+        finer[::2] = rows
+        finer[1::2] = (rows[1:] + rows[:-1]) / 2
+        values = np.moveaxis(finer, 0, axis)
+    return values
 
 
 def sobel(image: TactileImage) -> tuple[Array, Array]:
@@ -79,16 +90,6 @@ def sobel(image: TactileImage) -> tuple[Array, Array]:
     x = across[:-2] + 2 * across[1:-1] + across[2:]
     y = -(down[:, :-2] + 2 * down[:, 1:-1] + down[:, 2:])
     return x / (8 * image.step_mm), y / (8 * image.step_mm)
-
-
-def _double_sampling(values: Array) -> Array:
-    for axis in (0, 1):
-        rows = np.moveaxis(values, axis, 0)
-        finer = np.empty((2 * len(rows) - 1, *rows.shape[1:]))
-        finer[::2] = rows
-        finer[1::2] = (rows[1:] + rows[:-1]) / 2
-        values = np.moveaxis(finer, 0, axis)
-    return values
 
 
 def _replace_values(image: TactileImage, values: Array) -> TactileImage:
