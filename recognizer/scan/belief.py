@@ -58,7 +58,7 @@ from recognizer.touch.hypothesis import (
     log_likelihood,
 )
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.next_touch import EarlierTouch, propose_next
+from recognizer.touch.next_touch import propose_next
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at, read_touch
 from recognizer.touch.recognition import (
@@ -171,7 +171,7 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
     own = not agrees and bool(joined.rivals)
     rivals: Sequence[PlaceHypothesis] = joined.rivals if own else joined.found
     away = relative_pose(joined.touch_poses.poses[-1], joined.touch_poses.poses[:-1])
-    earlier = [EarlierTouch(p, one.signal) for p, one in zip(away, scan.touches, strict=True)]
+    earlier = [(pose, one.signal) for pose, one in zip(away, scan.touches, strict=True)]
     step = propose_next(reader, touch.signal, answer, rivals, earlier)
     return replace(
         scan,
