@@ -168,7 +168,7 @@ def _advance(last: FramePacket, packet: FramePacket, step_us: float) -> tuple[in
 
 
 class Receiver:
-    """The state of one conversation: splitter, order, what the device said of itself."""
+    """The state of one conversation: splitter, order, and the descriptions of the device."""
 
     def __init__(self) -> None:
         self.ident: IdentPacket | None = None

@@ -80,7 +80,6 @@ def _surface(
     heat: Normalize,
     seen_from_deg: tuple[float, float],
 ) -> None:
-    """Draw tactels as a surface through their readings."""
     centres = sensor.centres_mm()
     patches = (values[1:, 1:] + values[:-1, :-1] + values[1:, :-1] + values[:-1, 1:]) / 4
     colours = ScalarMappable(heat, HEAT).to_rgba(patches)
