@@ -59,6 +59,16 @@ def test_an_edge_of_a_plate_is_no_stroke(small):
     assert gap_share(half) < GAPS
 
 
+def test_gaps_tactel_by_tactel():
+    signal = signal_of(np.random.default_rng(5).gamma(0.7, 60.0, (16, 16)) + 8)
+    wide = np.pad(signal.forces, 2, mode="edge")
+    pressed = 0.15 * np.sort(signal.forces, axis=None)[-12:].mean()
+    near = np.array([np.quantile(wide[r : r + 5, c : c + 5], 0.85) for r, c in np.ndindex(16, 16)])
+    adjacent = near > pressed
+    weak = adjacent & (signal.forces.ravel() < 0.35 * near)
+    assert gap_share(signal) == pytest.approx(weak.sum() / adjacent.sum())
+
+
 def touch_of(tactels):
     counts = np.full(256, 8.0)
     counts[np.linspace(0, 255, tactels).round().astype(int)] = 200.0
