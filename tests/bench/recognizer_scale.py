@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 from sqlalchemy import create_engine
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from campaigns import runner
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import SymbolStyle, alphabet_named
