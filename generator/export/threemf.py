@@ -22,6 +22,7 @@ import struct
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -60,57 +61,11 @@ _RELATIONSHIPS = (
 _TO_TRIANGLES, _TO_END = "</vertices><triangles>\n", "</triangles></mesh></object>\n"
 
 
-@dataclass(frozen=True, slots=True)
-class SlicerSettings:
-    """How one plate is printed in filament; lengths in mm."""
+class SlicerSettings(NamedTuple):
+    """How one plate is printed in filament, by the slicer's own names."""
 
-    nozzle_mm: float
-    layer_mm: float
-    first_layer_mm: float
-    bed_mm: Size
-    supports: bool = False  #: a whole body hangs over
-    colour_change_mm: float = 0.0  #: height at which the filament is changed; 0: nowhere
-
-    def entries(self) -> dict[str, str]:
-        """Return the settings under the slicer's own names."""
-        width, depth = (f"{side:g}" for side in self.bed_mm)
-        return {
-            "printer_technology": "FFF",
-            "printer_settings_id": "encoded-objects",
-            "bed_shape": f"0x0,{width}x0,{width}x{depth},0x{depth}",
-            "nozzle_diameter": f"{self.nozzle_mm:g}",
-            "filament_diameter": "1.75",
-            "filament_density": "1.24",
-            "filament_type": "PLA",
-            "first_layer_temperature": "215",
-            "temperature": "210",
-            "first_layer_bed_temperature": "60",
-            "bed_temperature": "60",
-            "layer_height": f"{self.layer_mm:g}",
-            "first_layer_height": f"{self.first_layer_mm:g}",
-            "fill_density": "15%",
-            "support_material": str(int(self.supports)),
-        }
-
-    @property
-    def of_object(self) -> dict[str, str]:
-        """What an object says itself, over any print settings."""
-        return {"layer_height": f"{self.layer_mm:g}", "support_material": str(int(self.supports))}
-
-    def files(self) -> dict[str, str]:
-        """Return what is added to a package."""
-        lines = [f"; {name} = {value}\n" for name, value in self.entries().items()]
-        found = {_SETTINGS: "; made by encoded-objects\n\n" + "".join(lines)}
-        if self.colour_change_mm > 0:
-            # The slicer changes before the layer that ends at or above this height.
-            z = f"{self.colour_change_mm + self.layer_mm:.6g}"
-            found[_COLOUR_CHANGE] = (
-                '<?xml version="1.0" encoding="utf-8"?>\n<custom_gcodes_per_print_z>\n'
-                f'<code print_z="{z}" type="0" extruder="1" color="{hexadecimal(SYMBOL_RGB)}" '
-                'extra="" gcode="M600"/>\n<mode value="SingleExtruder"/>\n'
-                "</custom_gcodes_per_print_z>\n"
-            )
-        return found
+    of_object: dict[str, str]  #: of each object, over any print settings
+    files: dict[str, str]  #: that are added to a package
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,18 +80,44 @@ class PrintFile:
 def slicer_settings(
     printer: Printer, *, supports: bool, colour_change_mm: float = 0.0
 ) -> SlicerSettings | None:
-    """Return the settings of a plate, or None for a printer without a nozzle."""
+    """Return the settings of a plate, or None for a printer without a nozzle.
+
+    The filament is changed at a height of `colour_change_mm`; 0: nowhere.
+    """
     if not printer.nozzle_mm:
         return None
+    width, depth = (f"{side:g}" for side in printer.bed_mm)
+    own = {"layer_height": f"{printer.layer_mm:g}", "support_material": str(int(supports))}
+    entries = {
+        "printer_technology": "FFF",
+        "printer_settings_id": "encoded-objects",
+        "bed_shape": f"0x0,{width}x0,{width}x{depth},0x{depth}",
+        "nozzle_diameter": f"{printer.nozzle_mm:g}",
+        "filament_diameter": "1.75",
+        "filament_density": "1.24",
+        "filament_type": "PLA",
+        "first_layer_temperature": "215",
+        "temperature": "210",
+        "first_layer_bed_temperature": "60",
+        "bed_temperature": "60",
+        "layer_height": own["layer_height"],
+        "first_layer_height": f"{printer.first_layer_mm:g}",
+        "fill_density": "15%",
+        "support_material": own["support_material"],
+    }
+    lines = [f"; {name} = {value}\n" for name, value in entries.items()]
+    files = {_SETTINGS: "; made by encoded-objects\n\n" + "".join(lines)}
     change = printer.printed_mm(colour_change_mm) if colour_change_mm else 0.0
-    return SlicerSettings(
-        printer.nozzle_mm,
-        printer.layer_mm,
-        printer.first_layer_mm,
-        printer.bed_mm,
-        supports,
-        change,
-    )
+    if change > 0:
+        # The slicer changes before the layer that ends at or above this height.
+        files[_COLOUR_CHANGE] = (
+            '<?xml version="1.0" encoding="utf-8"?>\n<custom_gcodes_per_print_z>\n'
+            f'<code print_z="{change + printer.layer_mm:.6g}" type="0" extruder="1" '
+            f'color="{hexadecimal(SYMBOL_RGB)}" '
+            'extra="" gcode="M600"/>\n<mode value="SingleExtruder"/>\n'
+            "</custom_gcodes_per_print_z>\n"
+        )
+    return SlicerSettings(own, files)
 
 
 def write_plates(exported: ExportedObject) -> Files:
@@ -295,7 +276,7 @@ def _plate_packages(
         model.add(f"</resources>\n<build>\n{''.join(model.items)}</build>\n</model>\n")
     more = {_CONFIG: _volume_settings(parts, plate, settings)}
     if settings is not None:
-        more |= settings.files()
+        more |= settings.files
     return _package(components.pieces), _package(volumes.pieces, more)
 
 
