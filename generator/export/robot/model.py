@@ -26,7 +26,7 @@ from generator.solid import Mesh, Part, body_mesh, emboss_whole, symbol_meshes
 from generator.solid.convex import DEPTH_MM, ConvexPieces, convex_pieces
 from generator.solid.measure import inertia_of
 from generator.solid.part import to_part, transform, turn
-from generator.solid.triangulate import closed_template
+from generator.solid.triangulate import template_of
 
 Floats = NDArray[np.float64]
 M = 1e-3  #: metres in a millimetre
@@ -161,7 +161,7 @@ def _placed_symbols(name: str, parts: Sequence[Part]) -> Iterator[PlacedMesh]:
             centres = to_part(embossing, embossing.centres_mm, 0.0)
             for label, centre in zip(embossing.labels.tolist(), centres, strict=True):
                 if label not in pieces:
-                    solid = closed_template(embossing.tiers[label])
+                    solid = template_of(embossing.tiers[label], closed=True)
                     found = convex_pieces(solid.points, solid.own)
                     pieces[label] = _piece_meshes(f"{name}-symbol-{label}", found)
                 T_part_symbol[:3, 3] = centre
