@@ -222,7 +222,6 @@ def _best_eye(normals: Points) -> Points:
 
 
 def _scale_to_fit(view: View, room: tuple[int, int]) -> float:
-    """Return the pixels for a mm at which a view fills the room."""
     width, height = (view.high - view.low)[:2].tolist()
     return float(min(room[0] / width, room[1] / height))
 

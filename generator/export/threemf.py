@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
@@ -33,6 +33,7 @@ from generator.export.bed import BedPlace, Plate, Size, arrange_plates
 from generator.export.colours import BODY_RGB, SYMBOL_RGB, hexadecimal
 from generator.export.fixed_text import number_lines
 from generator.export.formats import ExportedObject, Files
+from generator.export.meshes import join_meshes
 from generator.printers import Printer
 from generator.solid.part import Part
 from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes
@@ -64,8 +65,8 @@ _TO_TRIANGLES, _TO_END = "</vertices><triangles>\n", "</triangles></mesh></objec
 class SlicerSettings(NamedTuple):
     """How one plate is printed in filament, by the slicer's own names."""
 
-    of_object: dict[str, str]  #: of each object, over any print settings
-    files: dict[str, str]  #: that are added to a package
+    of_object: tuple[tuple[str, str], ...]  #: of each object, over any print settings
+    files: tuple[tuple[str, str], ...]  #: name and text of those added to a package
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +118,7 @@ def slicer_settings(
             'extra="" gcode="M600"/>\n<mode value="SingleExtruder"/>\n'
             "</custom_gcodes_per_print_z>\n"
         )
-    return SlicerSettings(own, files)
+    return SlicerSettings(tuple(own.items()), tuple(files.items()))
 
 
 def write_plates(exported: ExportedObject) -> Files:
@@ -163,22 +164,17 @@ class _BedMesh:
     triangles: NDArray[np.int64]  #: (M, 3)
 
     def vertex_text(self) -> DeflatedText:
-        """Return the elements of its vertices."""
-        return deflate_text(self._vertex_lines())
+        words = ('<vertex x="', '" y="', '" z="', '"/>\n')
+        blocks = range(0, len(self.vertices), _BLOCK)
+        rows = (self.vertices[start : start + _BLOCK] for start in blocks)
+        return deflate_text(number_lines(words, some, PLACES) for some in rows)
 
     def triangle_text(self, first: int = 0, properties: str = "") -> DeflatedText:
         """Return the elements of its triangles, whose vertices are numbered from `first`."""
-        return deflate_text(self._triangle_lines(first, properties))
-
-    def _vertex_lines(self) -> Iterator[bytes]:
-        for start in range(0, len(self.vertices), _BLOCK):
-            some = self.vertices[start : start + _BLOCK]
-            yield number_lines(('<vertex x="', '" y="', '" z="', '"/>\n'), some, PLACES)
-
-    def _triangle_lines(self, first: int, properties: str) -> Iterator[bytes]:
         words = ('<triangle v1="', '" v2="', '" v3="', f'"{properties}/>\n')
-        for start in range(0, len(self.triangles), _BLOCK):
-            yield number_lines(words, self.triangles[start : start + _BLOCK] + first, 0)
+        blocks = range(0, len(self.triangles), _BLOCK)
+        rows = (self.triangles[start : start + _BLOCK] + first for start in blocks)
+        return deflate_text(number_lines(words, some, 0) for some in rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,22 +189,21 @@ class _BedPart:
 
     @property
     def meshes(self) -> tuple[_BedMesh, ...]:
-        """Body and symbols."""
         return (self.body,) if self.symbols is None else (self.body, self.symbols)
 
 
 def _bed_part(part: Part | tuple[str, Mesh]) -> _BedPart:
-    """Return the meshes of a part."""
-    symbols: list[Mesh] = []
+    symbols: list[tuple[NDArray[np.float64], NDArray[np.int64]]] = []
     if isinstance(part, Part):
         name, body = part.name, body_mesh(part)
-        symbols = [mesh for mesh in symbol_meshes(part) if len(mesh.triangles)]
+        stands = symbol_meshes(part)
+        symbols = [(one.vertices, one.triangles) for one in stands if len(one.triangles)]
     else:
         name, body = part
-    own = _BedMesh(f"{name} body", BODY, *_join_meshes([body]))
+    own = _BedMesh(f"{name} body", BODY, *join_meshes([(body.vertices, body.triangles)]))
     points, stuck = own.vertices, None
     if symbols:
-        stuck = _BedMesh(f"{name} symbols", SYMBOLS, *_join_meshes(symbols))
+        stuck = _BedMesh(f"{name} symbols", SYMBOLS, *join_meshes(symbols))
         points = np.vstack([points, stuck.vertices])
     low, high = points.min(axis=0), points.max(axis=0)
     return _BedPart(name, own, stuck, low, (float(high[0] - low[0]), float(high[1] - low[1])))
@@ -225,20 +220,6 @@ def _move_to_bed(mesh: _BedMesh, part: _BedPart, place: BedPlace) -> _BedMesh:
         corner = (x, y)
     shift = np.array([place.x_mm - corner[0], place.y_mm - corner[1], -z])
     return _BedMesh(mesh.name, mesh.material, points + shift, mesh.triangles)
-
-
-def _join_meshes(meshes: Sequence[Mesh]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return vertices and triangles of meshes as one, with the vertices that a triangle uses."""
-    vertices, triangles = [], []
-    first = 0
-    for mesh in meshes:
-        used = np.zeros(len(mesh.vertices), np.bool_)
-        used[mesh.triangles] = True
-        numbers = np.cumsum(used) - 1 + first
-        vertices.append(mesh.vertices[used])
-        triangles.append(numbers[mesh.triangles])
-        first += len(vertices[-1])
-    return np.concatenate(vertices), np.concatenate(triangles)
 
 
 @dataclass(slots=True)
@@ -276,7 +257,7 @@ def _plate_packages(
         model.add(f"</resources>\n<build>\n{''.join(model.items)}</build>\n</model>\n")
     more = {_CONFIG: _volume_settings(parts, plate, settings)}
     if settings is not None:
-        more |= settings.files
+        more |= dict(settings.files)
     return _package(components.pieces), _package(volumes.pieces, more)
 
 
@@ -333,7 +314,7 @@ def _volume_settings(
     parts: Sequence[_BedPart], plate: Plate, settings: SlicerSettings | None
 ) -> str:
     """Return PrusaSlicer's settings of a plate: the ranges of triangles that are volumes."""
-    own = {} if settings is None else settings.of_object
+    own = {} if settings is None else dict(settings.of_object)
     text = [f"{_XML}<config>\n"]
     for number, place in enumerate(plate.places, 2):
         part = parts[place.part]

@@ -93,7 +93,6 @@ def _clip_ears(rings: Sequence[Ring], points: Ring, flat: float) -> Index:
 
 
 def _covers(rings: Sequence[Ring], points: Ring, triangles: Index) -> bool:
-    """Whether triangles cover the area between rings exactly once."""
     areas = triangle_areas(points[triangles])
     size = float(np.ptp(points, axis=0).max()) ** 2
     wanted = sum(signed_area(ring) for ring in rings)
@@ -357,7 +356,6 @@ class _MeshBuilder:
         return first
 
     def facet(self, facet: int) -> None:
-        """Triangulate a facet and all that stands on it."""
         plain = self.part.facets[facet].loops
         if len(plain) == 1 and len(plain[0]) == 3 and facet not in self.on:
             self.found.append((np.array(plain, dtype=np.int64), facet, -1, None))
@@ -425,7 +423,6 @@ class _MeshBuilder:
         return cuts
 
     def mesh(self) -> Mesh:
-        """Put everything together."""
         sizes = [len(found) for found, *_ in self.found]
         none = np.zeros((0, 3))
         return Mesh(
@@ -449,7 +446,6 @@ class _MeshBuilder:
     def _template(
         self, embossing: Embossing, label: int, pitch: float, closed: bool
     ) -> SymbolSolid:
-        """Return the template of a label."""
         tiers = embossing.tiers[label]
         try:
             return template_of(tiers, pitch, closed=closed)

@@ -236,7 +236,6 @@ class Knife:
         return self.on_edge[start, end]
 
     def _cycle(self, corners: list[int]) -> list[int]:
-        """Return corners and cut points around a ring."""
         cycle = []
         for start, end in pairwise([*corners, corners[0]]):
             cycle += [start, *self._between(start, end)]
@@ -349,7 +348,6 @@ def wrapped_onto(
 
 
 def _lift(strip: Strip, cut: CutSymbol) -> Points:
-    """Return the points of a symbol on the solid."""
     flat, z = np.array(cut.flat), np.array(cut.z_mm)
     facet, line = np.array(cut.facet), np.array(cut.line)
     points = np.empty((len(flat), 3))

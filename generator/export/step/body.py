@@ -124,7 +124,6 @@ class StepBody:
         return sorted(used)
 
     def _on(self, loop: tuple[int, ...]) -> str:
-        """Return a point of a loop."""
         return next(self.points[vertex] for vertex in loop if vertex in self.points)
 
     def _bound(self, loop: tuple[int, ...], kind: str) -> str:

@@ -87,7 +87,6 @@ class _RoundFace:
         return number
 
     def surface(self, z_mm: float) -> str:
-        """Return the surface moved outward by z."""
         found = self.surfaces.get(z_mm)
         if found is None:
             face, add = self.face, self.file.add
@@ -150,7 +149,6 @@ class _RoundSymbol:
         self.colour(on.add_face(bounds, heights[-1], f"{self.name}/top"))
 
     def sides(self, tier: int, ring: int) -> None:
-        """Write the sides between two tiers."""
         low, high = self.edges[tier][ring], self.edges[tier + 1][ring]
         risers = []
         for k in range(len(low)):
@@ -195,7 +193,6 @@ class _RoundSymbol:
         )
 
     def control_points(self, tier: int, ring: int, k: int) -> tuple[str, ...]:
-        """Return all control points of an edge."""
         inner = self.controls.get((tier, ring, k))
         points = self.points[tier][ring]
         if inner is None:
@@ -224,12 +221,10 @@ class _RoundSymbol:
         return self.add(f"EDGE_CURVE('',{ends},{spline},.T.)")
 
     def ring(self, tier: int, ring: int, *, forward: bool, kind: str) -> str:
-        """Write a bound along a ring."""
         edges = self.edges[tier][ring]
         order = edges if forward else edges[::-1]
         return self.file.bound([self.file.oriented(edge, forward=forward) for edge in order], kind)
 
     def colour(self, face: int) -> None:
-        """Give a face the symbols' colour."""
         self.on.coloured.append(self.file.next)
         self.add(f"STYLED_ITEM('',({self.on.style}),#{face})")

@@ -223,11 +223,9 @@ class _SymbolBuilder:
         return self.add(f"{kind}('',", self.add(*terms), ",.T.)")
 
     def flat(self, loops: list[list[int]], kind: str) -> None:
-        """Write a face parallel to the facet."""
         self.face(loops, self.normal, self.along, kind)
 
     def sides(self, low: list[int], high: list[int]) -> None:
-        """Write the quadrilaterals between two rings."""
         for i, point in enumerate(low):
             j = (i + 1) % len(low)
             number = len(self.quads)
