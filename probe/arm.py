@@ -113,11 +113,8 @@ def inverse(arm: Arm, pose: ArrayLike) -> list[NDArray[np.float64]]:
     One to four solutions in (-pi, pi]: base forwards before backwards, q3 > 0 before q3 < 0.
     Over the base axis with a vertical approach the first angle is free, and 0 is taken.
 
-    Raises
-    ------
-    PoseError
-        The pose is no rigid transform, out of reach, off the plane of the arm, or only
-        reached beyond the range of a joint.
+    Raises `PoseError` if the pose is no rigid transform, out of reach, off the plane of the arm, or
+    only reached beyond the range of a joint.
     """
     given = np.asarray(pose, np.float64)
     _check(arm, given)
@@ -223,12 +220,6 @@ def jacobian(arm: Arm, q: ArrayLike, point_mm: ArrayLike | None = None) -> NDArr
     return np.concatenate([np.cross(axes, arms).T, axes.T])
 
 
-def condition(arm: Arm, q: ArrayLike) -> float:
-    """Return the condition number of the Jacobian, lengths in links; infinite where singular."""
-    values = np.linalg.svd(_scaled_jacobian(arm, q), compute_uv=False)
-    return float(values[0] / values[-1]) if values[-1] > 0 else np.inf
-
-
 def joint_speeds(arm: Arm, q: ArrayLike, twist: ArrayLike) -> NDArray[np.float64]:
     """Return joint speeds (5,), rad/s, that follow a twist as well as bounded speeds can.
 
@@ -238,27 +229,19 @@ def joint_speeds(arm: Arm, q: ArrayLike, twist: ArrayLike) -> NDArray[np.float64
     other directions are followed exactly, and no unit of speed (a link's length per second) asks
     for more than GAIN over that value, 58 rad/s.
 
-    Raises
-    ------
-    PoseError
-        A value that is no number.
+    Raises `PoseError` for a value that is no number.
     """
     wanted = np.asarray(twist, np.float64)
     if wanted.shape != (6,) or not np.isfinite(wanted).all():
         raise PoseError(f"a twist {wanted.tolist()}", fix="give 3 speeds in mm/s and 3 in rad/s")
-    wanted = wanted / np.repeat([LENGTH_MM, 1.0], 3)
-    u, values, v = np.linalg.svd(_scaled_jacobian(arm, q), full_matrices=False)
+    scales = np.repeat([LENGTH_MM, 1.0], 3)
+    u, values, v = np.linalg.svd(jacobian(arm, q) / scales[:, None], full_matrices=False)
     weak = np.clip(values / LEAST_SINGULAR, 0.0, 1.0)
     damping = (1 - weak**2) * (LEAST_SINGULAR / 2) ** 2
     safe = np.where(values > 0, values, 1.0)
     gains = np.where(values > 0, values / (safe**2 + damping), 0.0)
-    speeds: NDArray[np.float64] = v.T @ (gains * (u.T @ wanted))
+    speeds: NDArray[np.float64] = v.T @ (gains * (u.T @ (wanted / scales)))
     return speeds
-
-
-def _scaled_jacobian(arm: Arm, q: ArrayLike) -> NDArray[np.float64]:
-    scaled: NDArray[np.float64] = jacobian(arm, q) / np.repeat([LENGTH_MM, 1.0], 3)[:, None]
-    return scaled
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,10 +259,7 @@ def sensor_pose(
 
     `joint_covariance` is (5, 5) of the joints' errors, rad^2; or (5,) standard deviations, rad.
 
-    Raises
-    ------
-    PoseError
-        Joint angles or their covariance are none.
+    Raises `PoseError` for joint angles or a covariance that are none.
     """
     errors = np.asarray(joint_covariance, np.float64)
     if errors.shape == (AXES,):

@@ -62,7 +62,6 @@ def median_filter(image: NDArray[Any]) -> NDArray[Any]:
 
 
 def _counts(values: ArrayLike, shape: tuple[int, ...] | None, name: str) -> NDArray[np.uint16]:
-    """Check readings of a shape; without one, those of any matrix."""
     array = np.asarray(values)
     if array.shape != shape and (shape is not None or array.ndim != 2 or array.size == 0):
         wanted = "(rows, columns)" if shape is None else shape

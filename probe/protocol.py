@@ -76,7 +76,7 @@ class FramePacket:
 
 @dataclass(frozen=True, slots=True)
 class IdentPacket:
-    """What the device is. It comes at boot and when it is asked for."""
+    """The description of the device. It comes at boot and on request."""
 
     seq: int  #: number of the next frame
     t_us: int
@@ -94,7 +94,7 @@ class IdentPacket:
 
 @dataclass(frozen=True, slots=True)
 class StatisticsPacket:
-    """What the device counted since it started."""
+    """The counts of the device since it started."""
 
     seq: int  #: number of the next frame
     t_us: int
@@ -141,7 +141,7 @@ def encode(packet: Packet) -> bytes:
 
 
 def decode(block: bytes, bits: int = 10) -> Packet | Damage:
-    """Return the packet of a block between two delimiters, or what is wrong with it.
+    """Return the packet of a block between two delimiters, or its damage.
 
     Readings of two bytes that need more than `bits` are refused.
     """

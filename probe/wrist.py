@@ -144,11 +144,8 @@ def counts_of(wrist: Wrist, distances: ArrayLike) -> NDArray[np.uint16]:
 def wrist_pose(wrist: Wrist, distances: ArrayLike) -> WristPose:
     """Return where the lower plate hangs by four distances AA', BB', CC', DD' (mm).
 
-    Raises
-    ------
-    PoseError
-        A distance is no number, the four contradict each other, or the plate would hang beyond
-        an end stop, each by more than six standard deviations: a transducer fails.
+    Raises `PoseError` if a distance is no number, the four contradict each other, or the plate
+    would hang beyond an end stop, each by more than six standard deviations: a transducer fails.
     """
     d = np.asarray(distances, np.float64)
     if d.shape != (4,) or not np.isfinite(d).all():
@@ -216,10 +213,7 @@ def travel_under_load(wrist: Wrist, force_n: float) -> float:
 def stiffness(wrist: Wrist) -> WristStiffness:
     """Return how the springs hold the plate, for the contact models.
 
-    Raises
-    ------
-    PoseError
-        The springs couple the two turns, which the contact models cannot say.
+    Raises `PoseError` if the springs couple the two turns, which the contact models cannot say.
     """
     springs = _tilt_springs(wrist)
     if abs(springs[0, 1]) > 0.01 * math.sqrt(springs[0, 0] * springs[1, 1]):

@@ -138,33 +138,31 @@ def read_text(path: Path, kind: DocumentKind) -> str:
     DocumentError
         The file is missing (the fix names similar ones), too large, or not UTF-8.
     """
+
+    def refusal(cause: str, fix: str) -> DocumentError:
+        return kind.error([Problem(cause, fix, file=str(path))])
+
     try:
         with path.open("rb") as file:
             data = file.read(BYTES_MAX + 1)
     except FileNotFoundError:
-        raise kind.error(
-            [Problem("there is no such file", _suggest_similar(path, kind), file=str(path))]
-        ) from None
+        raise refusal("there is no such file", _suggest_similar(path, kind)) from None
     except IsADirectoryError:
         fix = f"name the files in it, for example {path / '*.yaml'}"
-        raise kind.error(
-            [Problem(f"this is a folder, not {kind.name}", fix, file=str(path))]
-        ) from None
+        raise refusal(f"this is a folder, not {kind.name}", fix) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         fix = "check the name and the rights of the file"
-        raise kind.error([Problem(f"cannot read: {reason}", fix, file=str(path))]) from None
+        raise refusal(f"cannot read: {reason}", fix) from None
     if len(data) > BYTES_MAX:
-        cause = f"the file is larger than {BYTES_MAX // 1024} KiB"
-        raise kind.error([Problem(cause, kind.large, file=str(path))])
+        raise refusal(f"the file is larger than {BYTES_MAX // 1024} KiB", kind.large)
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         source = TextSource.of(str(path), data.decode("utf-8", errors="replace"))
         mark = SourceMark.at(source, data[: error.start].decode("utf-8"))
         cause = f"byte 0x{data[error.start]:02x} is not UTF-8 text"
         raise kind.error([Problem(cause, "save the file as UTF-8", mark)]) from None
-    return text
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
@@ -172,6 +170,12 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     lowered = {name.lower(): name for name in known}
     near = get_close_matches(word.lower()[:80], lowered, n=1, cutoff=0.6)
     return lowered[near[0]] if near else ""
+
+
+def suggest(word: str, known: Iterable[str], otherwise: str) -> str:
+    """Return a fix that names the known word nearest to `word`, or `otherwise`."""
+    near = did_you_mean(word, known)
+    return f"did you mean '{near}'?" if near else otherwise
 
 
 def _suggest_similar(path: Path, kind: DocumentKind) -> str:

@@ -256,6 +256,7 @@ def choose_sensor_type(
     SensorTypeError
         Images of another shape than the type.
     """
+    unknown = False
     if isinstance(asked, SensorType):
         found = asked
     elif asked:
@@ -268,25 +269,15 @@ def choose_sensor_type(
         found = parse_sensor_type(stored, f"{place}, attribute sensor_type")
     else:
         found = USUAL_SENSOR
-        if shape is not None and shape != found.shape:
-            raise _unknown_type(shape, place)
-    if shape is not None and shape != found.shape:
-        raise SensorTypeError(
-            [
-                Problem(
-                    f"images of {shape[0]} x {shape[1]} readings, {found.name} has "
-                    f"{found.rows} x {found.columns}",
-                    _fix_for(shape),
-                    file=place,
-                )
-            ]
-        )
-    return found
-
-
-def _unknown_type(shape: tuple[int, int], place: str) -> SensorTypeError:
-    cause = f"images of {shape[0]} x {shape[1]} readings, and nothing tells their sensor type"
-    return SensorTypeError([Problem(cause, _fix_for(shape), file=place)])
+        unknown = True
+    if shape is None or shape == found.shape:
+        return found
+    cause = f"images of {shape[0]} x {shape[1]} readings, "
+    if unknown:
+        cause += "and nothing tells their sensor type"
+    else:
+        cause += f"{found.name} has {found.rows} x {found.columns}"
+    raise SensorTypeError([Problem(cause, _fix_for(shape), file=place)])
 
 
 def _fix_for(shape: tuple[int, int]) -> str:

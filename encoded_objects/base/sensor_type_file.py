@@ -7,6 +7,7 @@ everything else is a file. Lengths in mm.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from encoded_objects.base.document import DocumentKind, Problem, did_you_mean
+from encoded_objects.base.document import DocumentKind, Problem, suggest
 from encoded_objects.base.sensor_type import (
     SENSOR_FILES,
     Overlay,
@@ -33,7 +34,7 @@ from encoded_objects.base.settings import (
     refuse,
     whole_number,
 )
-from encoded_objects.base.yaml_tree import Tree, read_tree, tree_of
+from encoded_objects.base.yaml_tree import Place, Tree, read_tree, tree_of
 
 LINES_MAX = 255  #: rows or columns: a packet holds each in a byte
 _NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,59}\Z")
@@ -149,41 +150,27 @@ class SensorTypeSettings(Block):
     missing: list[MissingSettings] = Field(default_factory=list)
     """Places without a tactel."""
 
-    def faults(self) -> list[tuple[tuple[str | int, ...], str, str]]:
-        """Return what does not fit together: the place of the setting, the cause, the way out."""
-        found: list[tuple[tuple[str | int, ...], str, str]] = [
-            (
-                ("missing", number),
-                (
-                    f"a missing tactel in row {place.rows[1]}, column {place.columns[1]}; the "
-                    f"matrix has rows 0 ... {self.rows - 1} and columns 0 ... {self.columns - 1}"
-                ),
-                "count rows and columns from 0",
-            )
-            for number, place in enumerate(self.missing)
-            if place.rows[1] >= self.rows or place.columns[1] >= self.columns
-        ]
-        if (self.value == "depth") != (self.overlay.kind == "gel"):
-            place = ("value",) if self.value == "depth" else ("overlay", "kind")
-            found.append(
-                (
-                    place,
-                    f"value {self.value} with a {self.overlay.kind} overlay",
-                    (
-                        "a gel shows depth, tabs and pads do not: write both or neither of "
-                        "value: depth and overlay: {kind: gel}"
-                    ),
+    def faults(self) -> Iterator[tuple[Place, str, str]]:
+        """Yield what does not fit together: the place of the setting, the cause, the way out."""
+        for number, place in enumerate(self.missing):
+            row, column = place.rows[1], place.columns[1]
+            if row >= self.rows or column >= self.columns:
+                cause = (
+                    f"a missing tactel in row {row}, column {column}; the matrix has rows "
+                    f"0 ... {self.rows - 1} and columns 0 ... {self.columns - 1}"
                 )
+                yield ("missing", number), cause, "count rows and columns from 0"
+        kind, depth = self.overlay.kind, self.value == "depth"
+        if depth != (kind == "gel"):
+            fix = (
+                "a gel shows depth, tabs and pads do not: write both or neither of "
+                "value: depth and overlay: {kind: gel}"
             )
-        if self._row_pitch() and self.overlay.kind != "tab":
-            found.append(
-                (
-                    ("row_pitch",),
-                    f"rows as far apart as no columns under a {self.overlay.kind}",
-                    "leave row_pitch out, or write overlay: {kind: tab}",
-                )
-            )
-        return found
+            where: Place = ("value",) if depth else ("overlay", "kind")
+            yield where, f"value {self.value} with a {kind} overlay", fix
+        if self._row_pitch() and kind != "tab":
+            fix = "leave row_pitch out, or write overlay: {kind: tab}"
+            yield ("row_pitch",), f"rows as far apart as no columns under a {kind}", fix
 
     def _row_pitch(self) -> float:
         """Return the pitch of rows where it is another, else 0."""
@@ -263,8 +250,7 @@ def sensor_type_named(name: str) -> SensorType:
     path = Path(name)
     if path.suffix in SENSOR_FILES or path.parent != Path() or path.exists():
         return _sensor_type(read_tree(path, _KIND))
-    near = did_you_mean(name, shipped_names())
-    fix = f"did you mean '{near}'?" if near else f"take {', '.join(shipped_names())}, or a file"
+    fix = suggest(name, shipped_names(), f"take {', '.join(shipped_names())}, or a file")
     raise SensorTypeError([Problem(f"there is no sensor type '{name}'", fix, file="--sensor-type")])
 
 

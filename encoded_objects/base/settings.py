@@ -24,7 +24,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from encoded_objects.base.document import Problem, SourceMark, did_you_mean
+from encoded_objects.base.document import Problem, SourceMark, did_you_mean, suggest
 from encoded_objects.base.yaml_tree import Place, Tree
 
 LENGTH_MAX_MM = 10_000.0
@@ -269,9 +269,7 @@ def unknown_name(place: Place, mark: SourceMark, model: type[BaseModel]) -> Prob
     word, block = str(place[-1]), place[:-1]
     known = list(model_at(model, block).model_fields)
     inside = f" in '{block[-1]}'" if block else ""
-    near = did_you_mean(word, known)
-    listed = f"use {'one of ' if len(known) > 1 else ''}{', '.join(known)}"
-    fix = f"did you mean '{near}'?" if near else listed
+    fix = suggest(word, known, f"use {'one of ' if len(known) > 1 else ''}{', '.join(known)}")
     return Problem(f"unknown setting '{word[:60]}'{inside}", fix, mark)
 
 
@@ -323,21 +321,17 @@ def _wrong_value(
     value, kind = error["input"], error["type"]
     if kind == "literal_error":
         known = re.findall(r"'([^']*)'", error["ctx"]["expected"])
-        near = did_you_mean(value, known) if isinstance(value, str) else ""
-        fix = f"did you mean '{near}'?" if near else f"choose one of {', '.join(known)}"
+        fix = f"choose one of {', '.join(known)}"
         single = key.removesuffix("s") if isinstance(place[-1], int) else key
         if not isinstance(value, str):
             return f"'{single}' cannot be {_value_text(value)}", fix
-        return f"unknown {single} {_value_text(value)}", fix
+        return f"unknown {single} {_value_text(value)}", suggest(value, known, fix)
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        known = list(model_at(model, place).model_fields)
-        example = (
-            words.blocks[key].removeprefix("{").removesuffix("}")
-            if key in words.blocks
-            else (f"{key}: {{{known[0]}: ...}}")
-        )
         if not place:
             return f"{words.whole}, not {_value_text(value)}", f"start with: {words.start}"
+        first = next(iter(model_at(model, place).model_fields))
+        written = words.blocks.get(key, f"{key}: {{{first}: ...}}")
+        example = written.removeprefix("{").removesuffix("}") if key in words.blocks else written
         return f"'{key}' takes settings, not {_value_text(value)}", f"write {example}"
     if kind in ("list_type", "tuple_type"):
         return f"'{key}' takes a list, not {_value_text(value)}", "write it in brackets: [..., ...]"

@@ -9,7 +9,7 @@ from generator.alphabet.outline import (
     outlines,
 )
 from generator.alphabet.printable import check_printable
-from generator.alphabet.strokes import Counts, Glyph, counts
+from generator.alphabet.strokes import Counts, Glyph, counts, key_points
 
 __all__ = [
     "ALPHABETS",
@@ -23,6 +23,7 @@ __all__ = [
     "check_printable",
     "counts",
     "footprint_half_mm",
+    "key_points",
     "outline",
     "outlines",
 ]

@@ -47,14 +47,21 @@ def counts(glyph: Glyph) -> Counts:
     Counts(ends=2, vertices=1, loops=0, pieces=1)
     """
     edges = _split(glyph.strokes)
+    ends, vertices = key_points(glyph)
+    nodes = {node for edge in edges for node in edge}
+    pieces = _pieces(edges)
+    return Counts(len(ends), len(vertices), len(edges) - len(nodes) + pieces, pieces)
+
+
+def key_points(glyph: Glyph) -> tuple[list[Point], list[Point]]:
+    """Return the end-points and the vertices of a glyph, from left to right, lattice units."""
     spokes: dict[Point, list[Point]] = {}
-    for a, b in sorted(edges):
+    for a, b in _split(glyph.strokes):
         spokes.setdefault(a, []).append((b[0] - a[0], b[1] - a[1]))
         spokes.setdefault(b, []).append((a[0] - b[0], a[1] - b[1]))
-    ends = sum(len(at) == 1 for at in spokes.values())
-    vertices = sum(not _is_straight(at) for at in spokes.values() if len(at) > 1)
-    pieces = _pieces(edges)
-    return Counts(ends, vertices, len(edges) - len(spokes) + pieces, pieces)
+    ends = [at for at, out in sorted(spokes.items()) if len(out) == 1]
+    vertices = [at for at, out in sorted(spokes.items()) if len(out) > 1 and not _is_straight(out)]
+    return ends, vertices
 
 
 def turn_glyph(glyph: Glyph, quarters: int) -> Glyph:

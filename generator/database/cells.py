@@ -19,7 +19,7 @@ from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.registered import canonical, digest
 from generator.database.rows import insert_rows
-from generator.layout.occupancy import TILE, Cells, Occupancy, Tiles, cells_of_tiles, tiles_of
+from generator.layout.occupancy import Cells, Occupancy, Tiles, cells_of_tiles, tiles_of
 
 _CHUNK = 64  #: cells looked up in one statement
 
@@ -44,13 +44,12 @@ def find_array(connection: Connection, array: SymbolArray) -> int | None:
 def occupancy(connection: Connection, array: SymbolArray) -> Occupancy:
     """Return which cells of an array objects hold; none of one that is new to the database."""
     array_id = find_array(connection, array)
-    tiles = {} if array_id is None else taken_tiles(connection, array_id)
-    return Occupancy.from_tiles(tiles, array)
+    return Occupancy.from_tiles(taken_tiles(connection, array_id), array)
 
 
 def occupied_cells(connection: Connection, array_id: int | None) -> Cells:
     """Return the taken cells of an array, sorted: rows (n,) and columns (n,); none for None."""
-    return cells_of_tiles({} if array_id is None else taken_tiles(connection, array_id))
+    return cells_of_tiles(taken_tiles(connection, array_id))
 
 
 def cells_of(connection: Connection, object_id: int, array_id: int) -> Cells:
@@ -107,8 +106,10 @@ def faces_at(
 _TILE_CHUNK = 256  # tile rows looked up in one statement
 
 
-def taken_tiles(connection: Connection, array_id: int) -> Tiles:
-    """Return the tiles of an array in which cells are taken, or were."""
+def taken_tiles(connection: Connection, array_id: int | None) -> Tiles:
+    """Return the tiles of an array in which cells are taken, or were; none for None."""
+    if array_id is None:
+        return {}
     occupancy = tables.occupancy.c
     return {
         (row, column): np.frombuffer(bits, np.uint8)
@@ -133,23 +134,17 @@ def free_cells(connection: Connection, array_id: int, cells: Cells) -> None:
 def _write(connection: Connection, array_id: int, cells: Cells, *, taken: bool) -> None:
     changed = tiles_of(*cells)
     known = _read_tiles(connection, array_id, changed)
-    empty = np.zeros(TILE * TILE // 8, np.uint8)
-    rows = []
-    for tile, bits in changed.items():
-        before = known.get(tile, empty)
-        after = before | bits if taken else before & ~bits
-        rows.append((tile, after.tobytes()))
+    old, new = [], []
+    for (row, column), bits in changed.items():
+        before = known.get((row, column), np.zeros_like(bits))
+        after = (before | bits if taken else before & ~bits).tobytes()
+        if (row, column) in known:
+            old.append({"at_array": array_id, "at_row": row, "at_column": column, "bits": after})
+        else:
+            new.append(
+                {"array_id": array_id, "tile_row": row, "tile_column": column, "bits": after}
+            )
     occupancy = tables.occupancy.c
-    old = [
-        {"at_array": array_id, "at_row": row, "at_column": column, "bits": bits}
-        for (row, column), bits in rows
-        if (row, column) in known
-    ]
-    new = [
-        {"array_id": array_id, "tile_row": row, "tile_column": column, "bits": bits}
-        for (row, column), bits in rows
-        if (row, column) not in known
-    ]
     if old:
         this_tile = and_(
             occupancy.array_id == bindparam("at_array"),

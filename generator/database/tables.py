@@ -69,6 +69,11 @@ class _SqliteDouble(UserDefinedType[float]):
 REAL: Double[float] = Double().with_variant(_SqliteDouble(), "sqlite")
 
 
+def required(kind: Any, *names: str) -> list[Column[Any]]:
+    """Return columns of one type that are never NULL."""
+    return [Column(name, kind, nullable=False) for name in names]
+
+
 def of_object() -> Column[int]:
     """Return the column that ties a row to its object, and removes it with the object."""
     return Column(
@@ -93,15 +98,10 @@ objects = Table(
     Column("object_id", Integer, primary_key=True),
     Column("name", Text, nullable=False, unique=True),
     Column("object_type", Text, nullable=False),  #: cube, box, tetrahedron, ..., file
-    Column("number_of_vertices", Integer, nullable=False),
-    Column("number_of_faces", Integer, nullable=False),
+    *required(Integer, "number_of_vertices", "number_of_faces"),
     Column("array_id", ForeignKey("arrays.array_id"), nullable=False, index=True),
     Column("alphabet_id", ForeignKey("alphabets.alphabet_id"), nullable=False, index=True),
-    Column("pitch_mm", REAL, nullable=False),
-    Column("height_mm", REAL, nullable=False),
-    Column("stroke_mm", REAL, nullable=False),
-    Column("draft_rad", REAL, nullable=False),
-    Column("chamfer_mm", REAL, nullable=False),
+    *required(REAL, "pitch_mm", "height_mm", "stroke_mm", "draft_rad", "chamfer_mm"),
     Column("layout", Text, nullable=False),  #: net | faces
     Column("layout_warnings", Text, nullable=False),  #: JSON, texts for the person who asked
     Column("retired_utc", String(32)),  #: ISO 8601; NULL while in use. Its cells stay taken
@@ -118,9 +118,7 @@ vertices = Table(
     metadata,
     of_object(),
     Column("vertex_id", Integer, nullable=False),
-    Column("x_vertex", REAL, nullable=False),
-    Column("y_vertex", REAL, nullable=False),
-    Column("z_vertex", REAL, nullable=False),
+    *required(REAL, "x_vertex", "y_vertex", "z_vertex"),
     PrimaryKeyConstraint("object_id", "vertex_id"),
     sqlite_with_rowid=False,
 )
@@ -148,15 +146,8 @@ edges = Table(
     "edges",
     metadata,
     of_object(),
-    Column("edge_id", Integer, nullable=False),
-    Column("face_id", Integer, nullable=False),
-    Column("right_face_id", Integer, nullable=False),
-    Column("start_vertex_id", Integer, nullable=False),
-    Column("end_vertex_id", Integer, nullable=False),
-    Column("left_previous_id", Integer, nullable=False),
-    Column("left_next_id", Integer, nullable=False),
-    Column("right_previous_id", Integer, nullable=False),
-    Column("right_next_id", Integer, nullable=False),
+    *required(Integer, "edge_id", "face_id", "right_face_id", "start_vertex_id", "end_vertex_id"),
+    *required(Integer, *_LINKS),
     Column("edge_length", REAL, nullable=False),  #: mm
     PrimaryKeyConstraint("object_id", "edge_id"),
     foreign_key("faces", "face_id", key="face_id"),
@@ -178,10 +169,7 @@ faces_to_vertices = Table(
     "faces_to_vertices",
     metadata,
     of_object(),
-    Column("face_id", Integer, nullable=False),
-    Column("loop", Integer, nullable=False),
-    Column("position", Integer, nullable=False),
-    Column("vertex_id", Integer, nullable=False),
+    *required(Integer, "face_id", "loop", "position", "vertex_id"),
     PrimaryKeyConstraint("object_id", "face_id", "loop", "position"),
     foreign_key("faces", "face_id", key="face_id"),
     foreign_key("vertices", "vertex_id", key="vertex_id"),
@@ -213,10 +201,8 @@ arrays = Table(
     Column("definition", Text, nullable=False),  #: canonical JSON for `array_from`
     Column("definition_sha256", String(64), nullable=False, unique=True),
     Column("profile", Text, nullable=False),  #: name under which it was first asked for
-    Column("rows", BigInteger, nullable=False),
-    Column("columns", BigInteger, nullable=False),
-    Column("window_rows", Integer, nullable=False),
-    Column("window_columns", Integer, nullable=False),
+    *required(BigInteger, "rows", "columns"),
+    *required(Integer, "window_rows", "window_columns"),
     Column("order", Integer, nullable=False),  #: number of different symbols
     Column("lab_key", String(32)),  #: from which it was made; NULL: the published array
     CheckConstraint('"rows" > 0 AND "columns" > 0', name="array_has_cells"),
@@ -240,11 +226,8 @@ placements = Table(
     of_object(),
     Column("face_id", Integer, nullable=False),
     Column("position", Integer, nullable=False),  #: of the face in its layout
-    Column("row", BigInteger, nullable=False),
-    Column("column", BigInteger, nullable=False),
-    Column("rotation_rad", REAL, nullable=False),
-    Column("x_mm", REAL, nullable=False),
-    Column("y_mm", REAL, nullable=False),
+    *required(BigInteger, "row", "column"),
+    *required(REAL, "rotation_rad", "x_mm", "y_mm"),
     Column("places", BigInteger, nullable=False),  #: places of the face that can be identified
     PrimaryKeyConstraint("object_id", "face_id"),
     foreign_key("faces", "face_id", key="face_id"),
@@ -259,10 +242,8 @@ cells = Table(
     "cells",
     metadata,
     Column("array_id", Integer, nullable=False),
-    Column("row", BigInteger, nullable=False),
-    Column("column", BigInteger, nullable=False),
-    Column("object_id", Integer, nullable=False),
-    Column("face_id", Integer, nullable=False),
+    *required(BigInteger, "row", "column"),
+    *required(Integer, "object_id", "face_id"),
     Column("position", Integer, nullable=False),  #: of the symbol in its face's layout
     Column("label", Integer, nullable=False),  #: symbol, 0 ... order - 1
     Column("x_mm", REAL, nullable=False),  #: centre of the symbol, face frame
@@ -282,8 +263,7 @@ occupancy = Table(
     "occupancy",
     metadata,
     Column("array_id", ForeignKey("arrays.array_id"), nullable=False),
-    Column("tile_row", BigInteger, nullable=False),
-    Column("tile_column", BigInteger, nullable=False),
+    *required(BigInteger, "tile_row", "tile_column"),
     Column("bits", LargeBinary, nullable=False),  #: 512 bytes
     PrimaryKeyConstraint("array_id", "tile_row", "tile_column"),
     sqlite_with_rowid=False,
@@ -324,8 +304,7 @@ as_built = Table(
     Column("as_built_id", Integer, primary_key=True),
     Column("object_id", ForeignKey("objects.object_id", ondelete="CASCADE"), index=True),
     Column("part", Text),  #: name in `parts`
-    Column("printer", Text, nullable=False),
-    Column("material", Text, nullable=False),
+    *required(Text, "printer", "material"),
     Column("scale_x", REAL, nullable=False),  #: felt length / drawn length
     Column("scale_y", REAL, nullable=False),
     Column("skew_rad", REAL, nullable=False),  #: by which x and y are felt off a right angle

@@ -20,7 +20,7 @@ from generator.alphabet.known import Alphabet, alphabet_named
 from generator.alphabet.outline import Tiers, footprint_half_mm, outlines
 from generator.alphabet.printable import check_printable
 from generator.array import SymbolArray, array_from
-from generator.errors import ArrayError, LayoutError, SolidError
+from generator.errors import LayoutError, SolidError
 from generator.layout.layout import Clearances, Outlines
 from generator.polyhedron import Polyhedron, dihedral, face_polygon
 from generator.polyhedron.development import Development, development
@@ -109,7 +109,6 @@ def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan
         array = array_from(spec.encoding)
     with error_location(source, "symbols.alphabet, encoding.alphabet, profile"):
         alphabet = alphabet_named(spec.alphabet)
-        _check_order(alphabet, array)
     with error_location(source, "symbols.pitch, symbols, profile"):
         check_printable(alphabet, spec.style, printer)
         shapes = outlines(alphabet, spec.style)
@@ -218,15 +217,6 @@ def _model(file: Path, sha256: str, scale: float) -> Polyhedron:  # noqa: ARG001
     from generator.polyhedron.read import read_shape  # readers load only for files
 
     return read_shape(file, scale)
-
-
-def _check_order(alphabet: Alphabet, array: SymbolArray) -> None:
-    if alphabet.order < array.order:
-        raise ArrayError(
-            f"the array has {array.order} symbols, but alphabet {alphabet.name} shows "
-            f"{alphabet.order}",
-            fix=f"choose an alphabet with {array.order} symbols or more",
-        )
 
 
 def _cut_corners(

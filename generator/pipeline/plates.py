@@ -28,7 +28,7 @@ from generator.pipeline.make import MakeJob
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, part_of_progress
-from generator.pipeline.sheet import Rows, layers_text, lies_text, material_text
+from generator.pipeline.sheet import Rows, cost_text, layers_text, lies_text, material_text
 from generator.printers import Printer
 from generator.solid import Part, box, volume
 
@@ -284,8 +284,6 @@ def _facts(
             if (not plate.printer.nozzle_mm) == resin
         )
         rows.append(("material", material_text(volume_mm3, resin=resin)))
-    if plates and all(cost is not None for cost in costs):
-        minutes = sum(cost.minutes for cost in costs if cost)
-        grams = sum(cost.filament_g for cost in costs if cost)
-        rows.append(("printing", f"{minutes // 60} h {minutes % 60} min, {grams:.0f} g"))
+    if plates and (printing := cost_text(costs)):
+        rows.append(("printing", printing))
     return tuple(rows)

@@ -103,6 +103,15 @@ def material_text(volume_mm3: float, *, resin: bool) -> str:
     return f"PLA, {cm3:.0f} cm3 in all; {cm3 * PLA_G_CM3:.0f} g if solid"
 
 
+def cost_text(costs: Sequence[PlateCost | None]) -> str:
+    """Return what printing of plates takes; empty where that is not known of all."""
+    known = [cost for cost in costs if cost is not None]
+    if len(known) < len(costs):
+        return ""
+    minutes, grams = sum(cost.minutes for cost in known), sum(cost.filament_g for cost in known)
+    return f"{minutes // 60} h {minutes % 60} min, {grams:.0f} g"
+
+
 def _facts(
     plan: ObjectPlan, layout: Layout, code: str, parts: Sequence[Part], plates: Sequence[SheetPlate]
 ) -> Rows:
@@ -118,11 +127,8 @@ def _facts(
         rows.append(("colours", f"2: change the filament at {spec.wall_mm:g} mm"))
     solid_mm3 = sum(volume(part) for part in parts)
     rows.append(("material", material_text(solid_mm3, resin=not printer.nozzle_mm)))
-    costs = [plate.cost for plate in plates if plate.cost is not None]
-    if len(costs) == len(plates):
-        minutes = sum(cost.minutes for cost in costs)
-        grams = sum(cost.filament_g for cost in costs)
-        rows.append(("printing", f"{minutes // 60} h {minutes % 60} min, {grams:.0f} g of PLA"))
+    if printing := cost_text([plate.cost for plate in plates]):
+        rows.append(("printing", f"{printing} of PLA"))
     return tuple(rows)
 
 

@@ -6,7 +6,8 @@
     explain.py    validation errors in the words of specs
     resolve.py    defaults, and what settings mean together -> resolved.ObjectSpec
     read.py       files, sets, values of a script -> ObjectSpec
-    option.py     options of commands, and starters for `encode-object init`
+    option.py     options of commands, by the rules of specs
+    starter.py    commented specs to begin with
     schema.py     the JSON schema for editors
     problem.py    SpecError: every problem with place, line, caret and fix
 """

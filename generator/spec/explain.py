@@ -6,7 +6,7 @@ import re
 
 from pydantic import BaseModel, ValidationError
 
-from encoded_objects.base.document import Problem, SourceMark, did_you_mean
+from encoded_objects.base.document import Problem, SourceMark, suggest
 from encoded_objects.base.settings import SettingWords, explain_settings, model_at
 from encoded_objects.base.yaml_tree import Place, Tree
 from generator.spec.settings import Defaults, ObjectSettings
@@ -45,11 +45,10 @@ def _unknown_setting(place: Place, mark: SourceMark, model: type[BaseModel]) -> 
         fix = f"write shape: {EXAMPLES[OTHER_NAMES[word.lower()]]}"
     elif elsewhere := _other_place(word, block):
         fix = elsewhere
-    elif near := did_you_mean(word, known):
-        fix = f"did you mean '{near}'?"
     else:
         listed = KINDS if what == "shape" else known
         fix = f"use {'one of ' if len(listed) > 1 else ''}{', '.join(listed)}"
+        fix = suggest(word, known, fix)
     return Problem(cause, fix, mark)
 
 

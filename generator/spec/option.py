@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic_core import PydanticCustomError
 
-from encoded_objects.base.document import Problem, did_you_mean
+from encoded_objects.base.document import Problem, suggest
 from encoded_objects.base.sensor_type import SENSOR_FILES
 from generator.export.formats import EXPORTERS
 from generator.spec.problem import SpecError
@@ -17,14 +17,13 @@ def format_option(text: str) -> tuple[str, ...]:
     """Return the formats of `--format step,stl`; raises `SpecError`."""
     known = tuple(EXPORTERS)
     names = [part.strip().lower().lstrip(".") for part in text.split(",") if part.strip()]
+    fix = f"choose from {','.join(known)}"
     problems = []
     for name in names:
         if name not in known:
-            near = did_you_mean(name, known)
-            fix = f"did you mean '{near}'?" if near else f"choose from {','.join(known)}"
-            problems.append(Problem(f"unknown format '{name}'", fix, file="--format"))
+            near = suggest(name, known, fix)
+            problems.append(Problem(f"unknown format '{name}'", near, file="--format"))
     if not names:
-        fix = f"choose from {','.join(known)}"
         problems.append(Problem("no format is named", fix, file="--format"))
     if problems:
         raise SpecError(problems)

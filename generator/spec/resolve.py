@@ -130,7 +130,7 @@ def resolve(
     spec = ObjectSpec(
         name=settings.name,
         shape=shape,
-        profile=EXPLICIT if settings.encoding else _profile(settings),
+        profile=EXPLICIT if settings.encoding else settings.profile or AUTO,
         encoding=encoding,
         alphabet=alphabet.name,
         style=style,
@@ -161,7 +161,7 @@ def folder_name(name: str) -> str:
 
 def _defaults(settings: NamedSettings, order: int | None, sensor: SensorType) -> SymbolDefaults:
     """Return the profile's defaults, or those of the smallest alphabet for an explicit array."""
-    if settings.encoding is None and _profile(settings) == AUTO:
+    if settings.encoding is None and settings.profile in (None, AUTO):
         pitch = sensor.symbol_pitch_mm
         coarser = tuple(more for more in COARSER_MM if more > pitch)
         return SymbolDefaults(PROFILES[SMALLEST].alphabet, pitch, PRINTER, coarser)
@@ -302,13 +302,9 @@ def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
     refuse("symbols.alphabet, encoding, profile", cause, fix)
 
 
-def _profile(settings: NamedSettings) -> str:
-    return settings.profile or AUTO
-
-
 def _array_profile(settings: NamedSettings) -> str:
     """Return the profile whose array is taken as long as none is chosen for `auto`."""
-    return SMALLEST if _profile(settings) == AUTO else _profile(settings)
+    return SMALLEST if settings.profile in (None, AUTO) else settings.profile
 
 
 def _array(settings: NamedSettings, refuse: Refuse) -> tuple[dict[str, Any], int | None]:

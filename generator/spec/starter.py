@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from encoded_objects.base.document import Problem, did_you_mean
+from encoded_objects.base.document import Problem, suggest
 from generator.spec.problem import SpecError
 from generator.spec.shape import EXAMPLES, OTHER_NAMES
 
@@ -72,7 +72,6 @@ def starter_named(shape: str, file: str = "") -> tuple[str, str]:
     word = shape.lower().replace("-", "_").replace(" ", "_")
     kind = OTHER_NAMES.get(word, word)
     if kind not in EXAMPLES:
-        near = did_you_mean(word, EXAMPLES)
-        fix = f"did you mean '{near}'?" if near else f"choose one of {', '.join(EXAMPLES)}"
+        fix = suggest(word, EXAMPLES, f"choose one of {', '.join(EXAMPLES)}")
         raise SpecError([Problem(f"unknown shape '{shape}'", fix)])
     return kind, starter(kind, file)

@@ -1,4 +1,4 @@
-"""Calibrate a load at a time: which load to put on, when it was read enough, how it was felt.
+"""Calibrate a load at a time: the load to put on next, the frames of it, and their summary.
 
 The first step is the unloaded sensor, then one step per load. The faces of the guide are
 `probe-sensor calibrate port` and the page of `open-bench`. Thesis 4.2, appendix 4.

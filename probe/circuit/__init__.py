@@ -11,7 +11,7 @@ from probe.circuit.electronics import QUIET, Electronics, Noise, Readout
 from probe.circuit.fsr import FilmState, Fsr, conductances, fsr_of
 from probe.circuit.inverse import ConductanceEstimate, invert_readings
 from probe.circuit.network import effective_resistances, transconductances
-from probe.circuit.reading import read_counts, read_sequence
+from probe.circuit.reading import read_counts
 
 __all__ = [
     "QUIET",
@@ -26,6 +26,5 @@ __all__ = [
     "fsr_of",
     "invert_readings",
     "read_counts",
-    "read_sequence",
     "transconductances",
 ]

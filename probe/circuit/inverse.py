@@ -96,7 +96,6 @@ def _sample_sigma(signal: Image, e: Electronics) -> Image:
 
 
 def _invert_driven(share: Image, spread: Image, e: Electronics) -> ConductanceEstimate:
-    """Invert a readout whose rows are all driven."""
     scale = e.volts_ratio * (e.load_ohm if e.readout == "grounded" else e.feedback_ohm)
     column = e.load_ohm if e.readout == "grounded" else e.column_ohm
     current, noise = share / scale, spread / scale
@@ -117,7 +116,6 @@ def _invert_driven(share: Image, spread: Image, e: Electronics) -> ConductanceEs
 def _undo_row_resistance(
     start: Image, first: Image, current: Image, noise: Image, row: float, column: float
 ) -> tuple[Image, Image]:
-    """Undo the row resistances, frame by frame."""
     shape = current.shape
     found, sigma = np.empty(shape), np.empty(shape)
     for index in np.ndindex(shape[:-2]):
@@ -157,7 +155,6 @@ def _newton(
 
 
 def _invert_floating(share: Image, spread: Image, e: Electronics) -> ConductanceEstimate:
-    """Invert floating rows, frame by frame."""
     shape = share.shape
     g, sigma, lost = np.empty(shape), np.empty(shape), np.empty(shape, np.bool_)
     series = e.load_ohm + e.row_ohm + e.column_ohm

@@ -5,10 +5,8 @@ exactly undone: the multiplexer does not settle fully, so that each tactel keeps
 the one scanned before (rows from the top, in a row from the left, frame after frame), and the
 tactels of a column couple. Shares are voltages over the ADC's full scale, (..., rows, columns).
 
-`read_counts` makes one frame (or independent ones), `read_sequence` frames one
-after another. Randomness is drawn from the generator that is passed in; with `QUIET`
-electronics nothing is drawn. The multiplexer's ring of samples takes the scene as steady
-over two frames.
+Randomness is drawn from the generator that is passed in; with `QUIET` electronics nothing is
+drawn. The multiplexer's ring of samples takes the scene as steady over two frames.
 """
 
 from __future__ import annotations
@@ -19,9 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.circuit.electronics import Electronics
-from probe.circuit.fsr import FilmState, Fsr, Image, checked_forces, conductances
+from probe.circuit.fsr import FilmState, Fsr, Image, conductances
 from probe.circuit.network import effective_resistances, transconductances
-from probe.errors import CircuitError
 
 Counts = NDArray[np.uint16]
 
@@ -53,29 +50,6 @@ def read_counts(
     offered = scan_shares(shares(conductance, electronics), electronics) * electronics.full
     counts = _sample_adc(offered, flutter, electronics, rng)
     return counts, FilmState(now.effective_n, now.age_s, flutter)
-
-
-def read_sequence(
-    forces_n: ArrayLike,
-    electronics: Electronics,
-    fsr: Fsr,
-    state: FilmState | None,
-    rng: np.random.Generator,
-) -> tuple[Counts, FilmState]:
-    """Read frames of forces (N, rows, columns), N >= 1, that follow at the board's frame time.
-
-    See `read_counts`.
-    """
-    forces = checked_forces(fsr, forces_n)
-    if forces.ndim != 3 or not len(forces):
-        raise CircuitError(
-            f"a sequence of shape {forces.shape}", fix="give (N, rows, columns), one frame or more"
-        )
-    counts = np.empty(forces.shape, dtype=np.uint16)
-    for i, force in enumerate(forces):
-        counts[i], state = read_counts(force, electronics, fsr, state, rng)
-    assert state is not None
-    return counts, state
 
 
 def _contact_noise(
@@ -122,7 +96,7 @@ def shares(conductance_s: Image, electronics: Electronics) -> Image:
 
 
 def scan_shares(share: Image, electronics: Electronics) -> Image:
-    """Add what the scan leaves from tactel to tactel, and what columns couple."""
+    """Add the residue of the tactel scanned before, and the coupling of columns."""
     k = electronics.coupling
     settled = _cyclic(share, electronics.residue, inverse=False)
     coupled: Image = settled + k * (settled.sum(axis=-2, keepdims=True) - settled)

@@ -141,7 +141,7 @@ class Client:
             return self._ended and not self._frames and self._failure is None
 
     def notices(self) -> list[str]:
-        """Return what happened since the last call, in words: reboots, reopenings, silence."""
+        """Return the events since the last call, in words: reboots, reopenings, silence."""
         with self._ready:
             notices = list(self._notices)
             self._notices.clear()
@@ -154,12 +154,12 @@ class Client:
 
     @property
     def ident(self) -> IdentPacket | None:
-        """What the device said it is; None before it did."""
+        """The description that the device sent; None before it did."""
         return self._receiver.ident
 
     @property
     def device(self) -> StatisticsPacket | None:
-        """What the device counted, after `ask_device`; None before it answered."""
+        """The counts of the device, after `ask_device`; None before it answered."""
         return self._receiver.device
 
     def wait_for_ident(self) -> IdentPacket | None:
@@ -188,7 +188,7 @@ class Client:
             self._ready.notify_all()
         self._thread.join()
 
-    # What follows runs in the thread, all but `_send`.
+    # All below but `_send` runs in the thread.
 
     def _send(self, commands: bytes) -> None:
         with self._ready:
@@ -236,7 +236,7 @@ class Client:
                 time.sleep(_GATHER_S)
 
     def _exchange(self) -> bytes:
-        """Send what waits to be sent; return what came."""
+        """Send the waiting commands; return the bytes that came."""
         if self._outbox:
             with self._ready:
                 outbox, self._outbox = self._outbox, b""
@@ -312,7 +312,7 @@ class Client:
 
 
 def diagnose_silence(damages: Mapping[Damage, int], waited_s: float, url: str) -> PortError:
-    """Return the error for a port at which no probe answered for so long, and what came instead."""
+    """Return the error for a port at which no probe answered for so long."""
     if damages[Damage.VERSION]:
         cause = f"the device speaks another version of the protocol, not {VERSION}"
         fix = "flash the firmware that belongs to this programme"

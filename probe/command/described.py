@@ -46,7 +46,6 @@ def describe(
 
 
 def _describe_probe(url: str, sensor: int | None, seconds: float, sensor_type: str) -> Described:
-    """Listen to a probe for a while."""
     peak, heard = 0, False
     shape: tuple[int, ...] = ()
     port, kind = typed_port(url, sensor_type)
@@ -106,7 +105,6 @@ def _describe_probe(url: str, sensor: int | None, seconds: float, sensor_type: s
 
 
 def _describe_recording(name: str, sensor_type: str) -> Described:
-    """Read a recording through."""
     held = Recording(name)
     kind = _type_of(held, sensor_type)
     seq: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
@@ -162,7 +160,6 @@ def _type_of(held: Recording, asked: str) -> str:
 
 
 def _gaps(seq: NDArray[np.int64], t_ns: NDArray[np.int64]) -> dict[str, Any]:
-    """Sum up numbers and times of a recording."""
     steps, pauses = np.diff(seq), np.diff(t_ns) * 1e-9
     going = (steps > 0) & (pauses >= 0)
     seconds = float(pauses[going].sum())

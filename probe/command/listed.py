@@ -77,7 +77,6 @@ def list_types(name: str, *, schema: bool, as_json: bool) -> int:
 
 
 def _entry(sensor: SensorType) -> dict[str, Any]:
-    """Return the values of a type."""
     wide, high = sensor.half_mm
     return {
         "name": sensor.name,

@@ -15,7 +15,7 @@ import time
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import lru_cache
 from itertools import groupby
 from textwrap import wrap
@@ -23,9 +23,9 @@ from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console, ConsoleOptions, RenderResult
+from rich.console import Console
 from rich.live import Live
-from rich.segment import Segment
+from rich.segment import Segment, Segments
 from rich.style import Style
 
 from encoded_objects.base.console import INTERRUPTED, interruption
@@ -50,7 +50,7 @@ GAP = 3  # characters
 BOLD, DIM, YELLOW, RED = map(Style.parse, ("bold", "dim", "yellow", "bold red"))
 _PICTURES_HZ = 15
 KeyReader = Callable[[float], str]
-"""Returns what was typed within so many seconds, as soon as something was; else nothing."""
+"""Returns the keys typed within so many seconds, as soon as one is."""
 
 
 def watch(options: LiveOptions) -> int:
@@ -172,19 +172,6 @@ def _no_keys(timeout_s: float) -> str:
     return ""
 
 
-@dataclass(frozen=True, slots=True)
-class LivePicture:
-    """Lines of pieces of text; cheaper to draw than tables."""
-
-    lines: list[list[Segment]]
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        for number, line in enumerate(self.lines):
-            if number:
-                yield Segment.line()
-            yield from line
-
-
 def render_frame(
     state: LiveState,
     counts: ClientStatistics,
@@ -192,7 +179,7 @@ def render_frame(
     *,
     height: int,
     colours: bool,
-) -> LivePicture:
+) -> Segments:
     """Return the whole view in a terminal of `height` lines.
 
     Without `colours` readings are characters of rising weight.
@@ -211,7 +198,7 @@ def render_frame(
         lines.append([*left, Segment(" " * GAP), *(numbers[i] if i < len(numbers) else ())])
     lines += [_legend(state, colours), [Segment(KEYS, DIM)]]
     lines += [[Segment(text, YELLOW)] for text in wrap(state.notice, len(KEYS))]
-    return LivePicture(lines)
+    return Segments([piece for line in lines for piece in (*line, Segment.line())][:-1])
 
 
 def heat_map(share: NDArray[np.float64], *, small: bool, colours: bool) -> list[list[Segment]]:

@@ -75,7 +75,7 @@ class LiveState:
             self.frame = frames[-1]
 
     def image(self) -> Image | None:
-        """Return what is shown, (rows, columns); None before the first frame."""
+        """Return the image that is shown, (rows, columns); None before the first frame."""
         if self.frame is None:
             return None
         if self.calibration is not None:

@@ -46,7 +46,7 @@ Made = Annotated[str, Option("When the loads were read, ISO 8601; now by default
 
 @dataclass(frozen=True)
 class LiveOptions(Options):
-    """What the live view shows."""
+    """The options of the live view."""
 
     url: Url
     sensor: SelectedSensor = None
@@ -61,7 +61,7 @@ class LiveOptions(Options):
 
 @dataclass(frozen=True)
 class RecordOptions(Options):
-    """What is recorded, and for how long."""
+    """The port that is recorded, and for how long."""
 
     url: Url
     output: Output
@@ -171,7 +171,7 @@ class GuideOptions(Options):
 
 @dataclass(frozen=True)
 class SimulateOptions(Options):
-    """Which touches are simulated, and what is written of them."""
+    """The touches that are simulated, and the files written of them."""
 
     target: Annotated[str, Argument("What is touched.", "TARGET")]
     x: Place = None

@@ -106,7 +106,7 @@ def _run(
     interrupted: Event,
     bar: ProgressBar,
 ) -> tuple[str, float]:
-    """Record until something ends it; returns what did, and the seconds recorded."""
+    """Record until something ends it; returns its name, and the seconds recorded."""
     limit_s, limit = options.seconds, options.frames
     began_s = heard_s = time.monotonic()
     began_ns = last_ns = frames[0].t_ns

@@ -46,13 +46,13 @@ def simulate_touches(options: SimulateOptions) -> int:
             recorder = stack.enter_context(probe.recorder(output))
         bar = stack.enter_context(progress_bar("touching", number))
         interrupted = stack.enter_context(interruption())
-        for i, felt in enumerate(probe.touches()):
+        for i, one in enumerate(probe.touches()):
             if recorder is not None:
-                for frame in felt.frames:
+                for frame in one.frames:
                     recorder.append(frame)
             if i == 0:
-                first = felt
-            kept.append(felt.truth())
+                first = one
+            kept.append(one.truth())
             bar.show(i + 1, f"{i + 1:,} of {number:,}")
             if interrupted.is_set():
                 break
@@ -82,15 +82,15 @@ def _check_outputs(options: SimulateOptions) -> None:
         require("matplotlib", extra="report", purpose="--png")
 
 
-def _picture(felt: SimulatedTouch, probe: SimulatedProbe, png: Path) -> None:
+def _picture(one: SimulatedTouch, probe: SimulatedProbe, png: Path) -> None:
     from probe.plot.touch import touch_picture
 
-    what = f"{felt.scene.name}, {felt.touch.force_n:g} N, {probe.overlay} overlay"
+    what = f"{one.scene.name}, {one.touch.force_n:g} N, {probe.overlay} overlay"
     if probe.noise == "quiet":
         what += ", without noise"
     with staged_file(png) as draft:
-        touch_picture(felt.scene.surface, probe.sensor, felt.touch, felt.contact.forces_n,
-                      felt.frames[0].counts, draft, title=what)  # fmt: skip
+        touch_picture(one.scene.surface, probe.sensor, one.touch, one.contact.forces_n,
+                      one.frames[0].counts, draft, title=what)  # fmt: skip
 
 
 def _say(

@@ -89,10 +89,7 @@ def refuse_steep(tilt_x_rad: float, tilt_y_rad: float, steepest_rad: float = STE
 def heights_at(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
     """Return heights (...), mm, at points (..., 2) of the sensor frame.
 
-    Raises
-    ------
-    ContactError
-        For heights that are no numbers, or +inf.
+    Raises `ContactError` for heights that are no numbers, or +inf.
     """
     points = touch.on_surface(points_mm.reshape(-1, 2))
     heights = np.asarray(surface.heights_mm(points), np.float64)
@@ -110,3 +107,11 @@ def nothing_under(touch: Touch) -> ContactError:
         f"there is nothing under the sensor to bear {touch.force_n:g} N",
         fix="move the sensor over the object",
     )
+
+
+def heights_under(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
+    """Return the heights under points (..., 2) of the sensor; refuse to press on nothing."""
+    heights = heights_at(surface, touch, points_mm)
+    if heights.max(initial=-math.inf) == -math.inf:
+        raise nothing_under(touch)
+    return heights

@@ -44,11 +44,8 @@ def deblur(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> Deblur
 
     `noise_n` is the standard deviation of one reading, N; 0 takes readings and blur as exact.
 
-    Raises
-    ------
-    ContactError
-        When the overlay is no pad, or one that passes too little; for readings or a noise that
-        are no numbers.
+    Raises `ContactError` when the overlay is no pad, or one that passes too little; for readings or
+    a noise that are no numbers.
     """
     read = np.asarray(forces_n, dtype=np.float64)
     shape = (sensor.rows, sensor.columns)

@@ -82,12 +82,8 @@ def engine_table() -> tuple[MeasuredEngine, ...]:
 def engine_named(name: str) -> Engine:
     """Return an engine; what it needs is loaded now.
 
-    Raises
-    ------
-    ContactError
-        There is no engine of this name.
-    MissingExtraError
-        What it needs is not installed.
+    Raises `ContactError` if there is no engine of this name; `MissingExtraError` if what it needs
+    is not installed.
     """
     if name not in ENGINES:
         raise ContactError(f"no contact engine '{name}'", fix=f"take {', '.join(ENGINES)}")

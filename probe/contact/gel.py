@@ -22,9 +22,8 @@ from probe.contact.contract import (
     STEEPEST_RAD,
     Contact,
     Touch,
-    heights_at,
+    heights_under,
     no_contact,
-    nothing_under,
 )
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import check_load, rest
@@ -41,10 +40,8 @@ MOST_STEPS = 2000  # of the membrane; each takes off 1 / (1 + 4 way^2) of its er
 def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     """Press a gel on a surface. No force gives an exactly zero image.
 
-    Raises
-    ------
-    ContactError
-        Another overlay, nothing under the sensor, a plate that tips, a gel pressed through.
+    Raises `ContactError` for another overlay, nothing under the sensor, a plate that tips, a gel
+    pressed through.
     """
     if sensor.overlay.kind != "gel":
         raise ContactError(
@@ -55,9 +52,7 @@ def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
         return no_contact(sensor, touch, "gel")
     step = sensor.pitch_mm / FINE
     points = _grid(sensor, step)
-    heights = heights_at(surface, touch, points)
-    if heights.max(initial=-math.inf) == -math.inf:
-        raise nothing_under(touch)
+    heights = heights_under(surface, touch, points)
     law = Linear(_bed_n_mm3(sensor) * step**2)
     found = rest(points.reshape(-1, 2), heights.ravel(), law, touch)
     tilt = max(abs(found.pose.tilt_x_rad), abs(found.pose.tilt_y_rad))

@@ -333,10 +333,8 @@ class _Springs:
 def descend(begun: LayerContact, plate: RigidPlate) -> LayerContact:
     """Return the contact in equilibrium, begun at the plane of the levels.
 
-    Raises
-    ------
-    ContactError
-        When the limits of this module are reached: forces that a fraction of one cell bears.
+    Raises `ContactError` when the limits of this module are reached: forces that a fraction of one
+    cell bears.
     """
     levels, grid = begun.levels, begun.levels.grid
     matter = levels.shares > 0

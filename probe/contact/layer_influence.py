@@ -99,10 +99,8 @@ class Influence:
 def influence(sensor: SensorType, cells_per_tactel: int) -> Influence:
     """Return the pad of a sensor on a grid of `cells_per_tactel` along each side of a tactel.
 
-    Raises
-    ------
-    ContactError
-        When the overlay is no pad, or has no physical height, modulus or Poisson's ratio.
+    Raises `ContactError` when the overlay is no pad, or has no physical height, modulus or
+    Poisson's ratio.
     """
     _check(sensor, cells_per_tactel)
     pad = sensor.overlay

@@ -107,11 +107,8 @@ def patch_under(
 ) -> LayerPatch:
     """Return the first samples under the matrix; no cell is sampled in full yet.
 
-    Raises
-    ------
-    ContactError
-        When the number of samples per cell is not 16, 64 or 256, the surface gives a height that is
-        no number, or carries strokes too thin to be seen.
+    Raises `ContactError` when the number of samples per cell is not 16, 64 or 256, the surface
+    gives a height that is no number, or carries strokes too thin to be seen.
     """
     if samples not in SAMPLES:
         raise ContactError(

@@ -26,7 +26,7 @@ from probe.contact.contract import (
     STEEPEST_RAD,
     Contact,
     Touch,
-    heights_at,
+    heights_under,
     no_contact,
     nothing_under,
 )
@@ -68,12 +68,8 @@ MOVED_MM = 0.05  # by which the mesh of heights may move, to need fewer triangle
 def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
     """Press a sensor with tabs on a written part, or on heights alone, which are meshed first.
 
-    Raises
-    ------
-    ContactError
-        An overlay that is no tabs, nothing under the sensor, or no rest.
-    SurfaceError
-        The triangles of a part close no body.
+    Raises `ContactError` for an overlay that is no tabs, nothing under the sensor, or no rest;
+    `SurfaceError` if the triangles of a part close no body.
     """
     if sensor.overlay.kind != "tab":
         raise ContactError(
@@ -253,21 +249,12 @@ def triangles_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> tup
 def mesh_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> Mesh:
     """Return the surface under the sensor: corners (n, 3) and triangles (m, 3).
 
-    Raises
-    ------
-    ContactError
-        There is nothing of it.
-    SurfaceError
-        The triangles of a part close no body.
+    Raises `ContactError` if there is nothing of it; `SurfaceError` if the triangles of a part close
+    no body.
     """
-    body = body_of(surface)
-    if body is None:
-        return mesh_heights_under(surface, sensor, touch)
-    return cut_under(body, sensor, touch)
-
-
-def cut_under(solid_mm: Array, sensor: SensorType, touch: Touch) -> Mesh:
-    """Return the part of a body (m, 3, 3) under the sensor; raises as `mesh_under`."""
+    solid_mm = body_of(surface)
+    if solid_mm is None:
+        return _mesh_heights_under(surface, sensor, touch)
     from manifold3d import Manifold
 
     reach = max(sensor.half_mm) + AROUND_MM
@@ -280,7 +267,7 @@ def cut_under(solid_mm: Array, sensor: SensorType, touch: Touch) -> Mesh:
     return corners, triangles
 
 
-def mesh_heights_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> Mesh:
+def _mesh_heights_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> Mesh:
     """Return the heights under the sensor as a body; raises as `mesh_under`.
 
     Heights are sampled twice as densely as they are kept; grooves between beads, narrower than a
@@ -289,10 +276,8 @@ def mesh_heights_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> 
     """
     reach = max(sensor.half_mm) + AROUND_MM
     at = np.linspace(-reach, reach, 2 * CELLS + 1)
-    heights = heights_at(surface, touch, np.stack(np.meshgrid(at, at), axis=-1))
+    heights = heights_under(surface, touch, np.stack(np.meshgrid(at, at), axis=-1))
     top = float(heights.max())
-    if not math.isfinite(top):
-        raise nothing_under(touch)
     heights = grey_closing(np.maximum(heights, top - DEEP_MM), size=3)[::2, ::2]
     triangles = mesh_heights(heights, HEIGHT_TOLERANCE_MM)
     bottom = top - 2 * DEEP_MM

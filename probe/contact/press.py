@@ -21,10 +21,10 @@ from functools import lru_cache, partial
 from importlib import resources
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import Contact, Touch, no_contact
+from probe.contact.contract import Contact, Touch, heights_under, no_contact
 from probe.contact.engines import Engine
 from probe.contact.plate import PlatePose, check_load
-from probe.contact.tabs import heights_under, tabs
+from probe.contact.tabs import tabs
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
@@ -61,11 +61,8 @@ def press(
     `accuracy` "auto" holds `AUTO_ERROR`; a number is the error to hold (0.003: 0.3 %); a name takes
     that level.
 
-    Raises
-    ------
-    ContactError
-        When the level is none of the overlay's, no level holds the error, or the touch has no
-        equilibrium.
+    Raises `ContactError` when the level is none of the overlay's, no level holds the error, or the
+    touch has no equilibrium.
     """
     level = level_for(sensor, accuracy)
     place = (touch.x_mm, touch.y_mm, touch.theta_rad, touch.tilt_x_rad, touch.tilt_y_rad)
@@ -109,10 +106,7 @@ def level_for(sensor: SensorType, accuracy: Accuracy = "auto") -> str:
 def accuracy_of(text: str) -> Accuracy:
     """Read an accuracy from text: a number is an error, everything else a name.
 
-    Raises
-    ------
-    ContactError
-        For a number that is no error.
+    Raises `ContactError` for a number that is no error.
     """
     try:
         value = float(text)
@@ -161,10 +155,7 @@ def footprint(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
 
     Tabs are sampled at 19 points of their round tips, a pad at 16 of the tactel's square.
 
-    Raises
-    ------
-    ContactError
-        When nothing lies under the sensor, or a force or a height is no number.
+    Raises `ContactError` when nothing lies under the sensor, or a force or a height is no number.
     """
     check_load(touch)
     if touch.force_n == 0:

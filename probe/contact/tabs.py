@@ -34,9 +34,8 @@ from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import (
     Contact,
     Touch,
-    heights_at,
+    heights_under,
     no_contact,
-    nothing_under,
     refuse_steep,
 )
 from probe.contact.neo_hooke import Linear, NeoHooke
@@ -65,12 +64,9 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
 
     No force gives an exactly zero image; other forces (rows, columns) sum to the touch's.
 
-    Raises
-    ------
-    ContactError
-        For an overlay that is no tabs, nothing under the sensor, a plate that tips or comes to
-        rest at a tilt that is not small, a force that is negative or no number, heights that
-        are no numbers, strokes too thin for any pattern.
+    Raises `ContactError` for an overlay that is no tabs, nothing under the sensor, a plate that
+    tips or comes to rest at a tilt that is not small, a force that is negative or no number,
+    heights that are no numbers, strokes too thin for any pattern.
     """
     overlay = sensor.overlay
     _check_tabs(overlay)
@@ -115,14 +111,6 @@ def _met_by_chance(heights_mm: Array, forces_n: Array, overlay: Overlay) -> int:
     near = np.count_nonzero(tips > tips.max(axis=1, keepdims=True) - apart, axis=1)
     few = int(np.count_nonzero(near <= min(BY_CHANCE, q // 7)))
     return few if few > max(1, ON_STEP * np.count_nonzero(near < q)) else 0
-
-
-def heights_under(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
-    """Return the heights under points (..., 2) of the sensor; refuse to press on nothing."""
-    heights = heights_at(surface, touch, points_mm)
-    if heights.max(initial=-math.inf) == -math.inf:
-        raise nothing_under(touch)
-    return heights
 
 
 def tabs_at_rest(

@@ -40,10 +40,7 @@ def tip_points(sensor: SensorType, tips: Tips) -> tuple[Array, Array]:
     The depths (rows * columns, q) mm lie below the plane of the undeformed tips, z away from the
     object: negative for a tab that is longer than drawn.
 
-    Raises
-    ------
-    ContactError
-        When the number of points is none of the patterns', or a shape is wrong.
+    Raises `ContactError` when the number of points is none of the patterns', or a shape is wrong.
     """
     points, drop = _draw_tips(sensor, tips.points, tips.dome_mm)
     shape = sensor.shape

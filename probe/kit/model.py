@@ -243,12 +243,8 @@ def mesh_of(solid: Any) -> Mesh:
 def check_part(name: str, solid: Any, step: Path, stl: Path) -> None:
     """Read the files of a part back by other programs.
 
-    Raises
-    ------
-    SolidError
-        They hold something else than one closed solid of its volume.
-    MissingExtraError
-        The CAD kernel or the mesh library is not installed.
+    Raises `SolidError` if they hold something else than one closed solid of its volume;
+    `MissingExtraError` if the CAD kernel or the mesh library is not installed.
     """
     volume = float(solid.volume)
     found, mesh = read_step(step), read_stl(stl)

@@ -1,4 +1,4 @@
-"""What a port is, and its URL in parts: scheme, target, options.
+"""A port, and its URL in parts: scheme, target, options.
 
 A port is bytes both ways, and knows nothing of packets. `probe.port.open_port(url)` makes one,
 `probe.client` reads frames from it, and opens it again when it went away.

@@ -53,7 +53,7 @@ class CommandedProbe:
         raise NotImplementedError
 
     def statistics(self) -> Packet:
-        """Return what was counted."""
+        """Return the counts of the device."""
         seq, t_us = self.now()
         errors = min(self.errors, 65535)
         return StatisticsPacket(seq, t_us, self.sent, self.waits, errors, t_us // 1000)

@@ -77,7 +77,6 @@ class FlexiTacPort(CommandedProbe):
         return self._seq % 65536, self._t_us % 2**32
 
     def _packets(self, images: list[bytes]) -> list[bytes]:
-        """Return the packets of images that are wanted."""
         packets = []
         for image in images:
             # Several images of one read follow each other: a clock that stands would deny it.

@@ -61,7 +61,7 @@ class SerialLine:
         return self._url
 
     def read(self, timeout_s: float) -> bytes:
-        """Return what has come; b"" when nothing came in `timeout_s`."""
+        """Return the bytes that came; b"" when none came in `timeout_s`."""
         try:
             descriptor = self._line.fileno()
             ready, _, _ = select.select([descriptor], [], [], timeout_s)

@@ -26,7 +26,7 @@ from probe.port.address import Address, Port, split_url
 GROUP = "encoded_objects.ports"
 EXAMPLES = "serial:///dev/ttyACM0?baud=1000000, sim: or file:recording.h5"
 
-#: scheme: what opens it, and what its URL has to name
+#: scheme: its opener, and the target that its URL must name
 SCHEMES = {
     "serial": ("probe.port.serial_line:open_serial", "device"),
     "flexitac": ("probe.port.flexitac:open_flexitac", "device"),

@@ -128,7 +128,7 @@ def piece_of(path: Path, number: int) -> Path:
 
 
 def draft_of(path: Path) -> Path:
-    """Return a hidden name for what will replace `path` once it is whole."""
+    """Return a hidden name for a file that will replace `path` once it is whole."""
     return path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
 
 

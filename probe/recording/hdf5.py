@@ -1,4 +1,4 @@
-"""Recordings as HDF5 files: what such a file must hold to be read, and how one is written.
+"""Recordings as HDF5 files: the datasets that are needed to read one, and how one is written.
 
 Files come from anywhere: everything that is used is checked, values when they are read.
 """
@@ -128,7 +128,7 @@ class _Draft(io.FileIO):
 
 
 def _append_block(file: h5py.File, block: FrameBlock, first: int) -> None:
-    """Append frames: what belongs to a frame lies near it.
+    """Append frames, the arrays of each chunk near each other.
 
     The datasets are made first, so a truncated copy holds all of the frames that reached it.
     """
@@ -220,7 +220,6 @@ def _checked(file: h5py.File, path: Path, *, closed: bool) -> FrameFile:
 
 
 def _read_block(file: h5py.File, path: Path, start: int, stop: int) -> FrameBlock:
-    """Read and check frames `start` ... `stop` - 1."""
     values: dict[str, Any] = {}
     with explain_errors(path, "read"):
         for name in DATASETS:

@@ -288,7 +288,6 @@ def _hdf5_arrays(path: Path, file: h5py.File) -> list[FileArray]:
 
 
 def _folder_array(folder: Path, image: tuple[int, int]) -> FileArray:
-    """Return the pictures of a folder as one array."""
     with explain_errors(folder, "read"):
         paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
     if not paths:
@@ -299,7 +298,6 @@ def _folder_array(folder: Path, image: tuple[int, int]) -> FileArray:
 
 
 def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
-    """Return the images of a table of numbers."""
     with explain_errors(path, "read"):
         try:
             with open(path, encoding="utf-8-sig", newline="") as file:

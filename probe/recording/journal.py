@@ -164,8 +164,6 @@ def open_journal(path: Path, *, live: bool = False) -> Iterator[FrameFile]:
 
 
 class _Records:
-    """The whole records of a journal."""
-
     def __init__(self, file: BinaryIO, start: int, dtype: np.dtype[Any]) -> None:
         self._file, self._start, self._dtype = file, start, dtype
         self.number = max(0, os.fstat(file.fileno()).st_size - start) // dtype.itemsize

@@ -96,7 +96,7 @@ class McapWriter:
         )
 
     def close(self) -> None:
-        """Write what belongs at the end of the file; the stream stays open."""
+        """Write the end of the file; the stream stays open."""
         self._writer.finish()
 
 
@@ -134,7 +134,7 @@ def import_mcap(
 
 
 def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
-    """Return where the frames of an MCAP file come from, and these in order of their time."""
+    """Return the origin of the frames of an MCAP file, and these in order of their time."""
     require("mcap_ros2.decoder", extra="robot", purpose="MCAP")
     from mcap.exceptions import McapError
     from mcap.reader import make_reader
@@ -229,7 +229,6 @@ def _messages(path: Path, kinds: Collection[str]) -> Iterator[tuple[str, Any]]:
 def _frame(
     image: Any, rest: Any, poses: Mapping[int, NDArray[np.float64]], number: int, path: Path
 ) -> Frame:
-    """Return the frame of an image and what else is known of it."""
     t_ns, seq, wrist = _stamp(image), number, None
     T = poses.get(t_ns)
     if rest is not None:

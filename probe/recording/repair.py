@@ -1,4 +1,4 @@
-"""What a killed writer or a bad copy left -> a recording that anybody can read.
+"""The file of a killed writer, or a bad copy -> a recording that anybody can read.
 
 Frames that can be read are copied into a new file, which takes the place of the old one.
 Where frames were lost, the old file stays as `touch.damaged.h5`: another tool may get more

@@ -50,10 +50,7 @@ def follow_poses(
     side of its play a joint arrives. `rng` draws the noise, and where in their play the joints
     start. The probe hangs level and half way.
 
-    Raises
-    ------
-    PoseError
-        A pose that the arm cannot reach.
+    Raises `PoseError` for a pose that the arm cannot reach.
     """
     wrist = Wrist()
     hanging = WristPose(sum(wrist.travel_mm) / 2, 0.0, 0.0, np.zeros((3, 3)))
@@ -76,10 +73,7 @@ def follow_poses(
 def joint_path(arm: Arm, poses: Sequence[ArrayLike]) -> NDArray[np.float64]:
     """Return joint angles (n, 5) for poses T_base_gripper, each branch next to the last one.
 
-    Raises
-    ------
-    PoseError
-        A pose that the arm cannot reach; the message names its number.
+    Raises `PoseError` for a pose that the arm cannot reach; the message names its number.
     """
     path: list[NDArray[np.float64]] = []
     for number, pose in enumerate(poses):

@@ -31,10 +31,7 @@ def touch_at(
 ) -> Touch:
     """Return the touch of a sensor that stands there, its tilts being those of the arm.
 
-    Raises
-    ------
-    PoseError
-        No pose, or the sensor does not face the surface.
+    Raises `PoseError` for no pose, or a sensor that does not face the surface.
     """
     T = np.asarray(T_surface_sensor, np.float64)
     if T.shape != (4, 4) or not np.isfinite(T).all():

@@ -48,10 +48,7 @@ class PrintOptions:
     def plan(self) -> PrintPlan:
         """Return these options as values.
 
-        Raises
-        ------
-        PrintError
-            An unknown profile or fault, or no PrusaSlicer.
+        Raises `PrintError` for an unknown profile or fault, or without PrusaSlicer.
         """
         plan = print_plan(self.profile, self.faults, self.seed)
         find_slicer()
@@ -154,12 +151,8 @@ def read_listing(file: str) -> PrintListing:
 def printed_scene(listing: str, database: str, object_name: str, face: str) -> Scene:
     """Return a face as it was printed.
 
-    Raises
-    ------
-    SurfaceError
-        The listing or the database cannot be read, or this face was not printed.
-    PrintError
-        The print is not where the listing says.
+    Raises `SurfaceError` if the listing or the database cannot be read, or this face was not
+    printed; `PrintError` if the print is not where the listing says.
     """
     prints = read_listing(listing)
     key = prints.keys.get((object_name, face))

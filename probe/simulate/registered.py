@@ -49,11 +49,9 @@ class DatabaseUnreadableError(SurfaceError):
 def registered_surface(database: str, object_name: str, face: str = "") -> Scene:
     """Return a face of a registered object; an empty name: the first one that bears symbols.
 
-    Raises
-    ------
-    SurfaceError
-        When the database (`lab.db`, `sqlite:///lab.db` or `postgresql://host/name`) cannot be read,
-        or holds no such object or face; the message lists those that it holds.
+    Raises `SurfaceError` when the database (`lab.db`, `sqlite:///lab.db` or
+    `postgresql://host/name`) cannot be read, or holds no such object or face; the message lists
+    those that it holds.
     """
     return scene_of_face(database, registered_object(database, object_name), face)
 

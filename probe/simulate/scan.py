@@ -46,10 +46,9 @@ class ScanPath:
     touches: tuple[Touch, ...]
     T_base_surface: Array | None  #: (4, 4) mm; None: a round face, every touch has its own
     T_base_object: Array | None  #: (4, 4) mm; None: the object's frame is not known
-    believed: Array  #: (n, 4, 4) T_base_sensor of the stands, as the arm believes
-    true: Array  #: (n, 4, 4) T_base_sensor of the stands, as they are
-    error: tuple[float, float]  #: standard deviation of believed from true: mm, rad
-    wrist: Wrist | None  #: None: its transducers are not read
+    slips: tuple[Array, ...] = ()  #: (4, 4) from true to believed poses, base; none: as it is
+    error: tuple[float, float] = (0.0, 0.0)  #: standard deviation of believed from true: mm, rad
+    wrist: Wrist | None = None  #: None: its transducers are not read
 
     def __len__(self) -> int:
         return len(self.touches)
@@ -65,10 +64,7 @@ class ScanPath:
 
     def believed_pose(self, number: int, true: Array) -> Array:
         """Return T_base_sensor (4, 4), the robot's estimate; depth along the normal is exact."""
-        if self.believed is self.true:
-            return true
-        pose: Array = self.believed[number] @ np.linalg.inv(self.true[number]) @ true
-        return pose
+        return self.slips[number] @ true if self.slips else true
 
     def wrist_counts(self, number: int, contact: Contact) -> NDArray[np.uint16] | None:
         """Return (4,) readings of the wrist's transducers while it pressed."""
@@ -119,26 +115,21 @@ def scan_path(
         way = way[begin : begin + most]
     x_mm, y_mm, z_mm = FACE_AT_MM
     T_base_middle = surface_to_sensor(x_mm, y_mm, FACE_TURN_RAD, z_mm)
+    level = tuple(Touch(x, y, theta_rad, force_n) for x, y in way.tolist())
     if scene.scene_at is not None:
         if kind == "kinesthetic":
             raise SurfaceError("an arm of five axes cannot go round a round face",
                                fix="scan it by raster", place=scene.name)  # fmt: skip
-        touches = tuple(Touch(x, y, theta_rad, force_n) for x, y in way.tolist())
-        stands = np.tile(np.eye(4), (len(touches), 1, 1))
-        return ScanPath(touches, None, T_base_middle, stands, stands, (0.0, 0.0), None)
+        return ScanPath(level, None, T_base_middle)
     x, y = scene.centre_mm().tolist()
     T_base_surface = T_base_middle @ surface_to_sensor(-x, -y, 0.0)
     T_base_object = None
     if scene.T_object_surface is not None:
         T_base_object = T_base_surface @ np.linalg.inv(scene.T_object_surface)
-    stands = np.array(
-        [T_base_surface @ surface_to_sensor(x, y, theta_rad) for x, y in way.tolist()]
-    )
     if kind == "raster":
-        touches = tuple(Touch(x, y, theta_rad, force_n) for x, y in way.tolist())
-        return ScanPath(touches, T_base_surface, T_base_object, stands, stands, (0.0, 0.0), None)
-    wrist = Wrist()
-    lift = surface_to_sensor(0.0, 0.0, 0.0, LIFT_MM)
+        return ScanPath(level, T_base_surface, T_base_object)
+    wrist, lift = Wrist(), surface_to_sensor(0.0, 0.0, 0.0, LIFT_MM)
+    stands = [T_base_surface @ surface_to_sensor(x, y, theta_rad) for x, y in way.tolist()]
     went = follow_poses(
         Arm(), [pose for stand in stands for pose in (lift @ stand, stand)], JointErrors(), rng
     )
@@ -149,7 +140,9 @@ def scan_path(
     )
     sd_x, sd_y, sd_turn = np.sqrt(np.diagonal(spread, axis1=1, axis2=2).mean(axis=0))[list(_PLANAR)]
     error = (math.sqrt((sd_x**2 + sd_y**2) / 2), float(sd_turn))
-    return ScanPath(touches, T_base_surface, T_base_object, went.believed[1::2], true, error, wrist)
+    pairs = zip(went.believed[1::2], true, strict=True)
+    slips = tuple(believed @ np.linalg.inv(stand) for believed, stand in pairs)
+    return ScanPath(touches, T_base_surface, T_base_object, slips, error, wrist)
 
 
 def _pressed_n(wrist: Wrist, force_n: float, rng: np.random.Generator) -> float:

@@ -93,10 +93,8 @@ def random_touches(
 ) -> Iterator[Touch]:
     """Yield touches without end, their centres uniform over a region (surface frame).
 
-    Raises
-    ------
-    SurfaceError
-        When the region has no place so far from its edges, or a range is no range.
+    Raises `SurfaceError` when the region has no place so far from its edges, or a range is no
+    range.
     """
     given = ranges or TouchRanges()
     low_n, high_n = given.force_n

@@ -58,10 +58,7 @@ class SimulatedSensor:
     ) -> SensorReading:
         """Return what the sensor reads under a steady force; the film was not loaded before.
 
-        Raises
-        ------
-        ContactError
-            The touch has no equilibrium.
+        Raises `ContactError` if the touch has no equilibrium.
         """
         met = scene.under(touch)
         contact = press(met.surface, self.sensor, touch, accuracy=self.accuracy)

@@ -57,10 +57,7 @@ class TouchOptions:
     def draw(self, scene: Scene, sensor: SensorType, rng: np.random.Generator) -> Touch:
         """Return a touch; values that are not named are drawn, or have a default of the type.
 
-        Raises
-        ------
-        SurfaceError
-            A value that is no finite number.
+        Raises `SurfaceError` for a value that is no finite number.
         """
         share = force_share(sensor)
         if self.touches is None:

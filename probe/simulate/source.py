@@ -52,12 +52,8 @@ def frames_of(target: str, options: Mapping[str, str] | None = None) -> Iterator
 
     `options` are those above, text as it stands in a port's URL; read before the first frame.
 
-    Raises
-    ------
-    SurfaceError
-        When the target or an option cannot be read.
-    ContactError
-        When the accuracy is no level, or no touch has an equilibrium.
+    Raises `SurfaceError` when the target or an option cannot be read; `ContactError` when the
+    accuracy is no level, or no touch has an equilibrium.
     """
     numbers, sensor = options_of(options or {}, place=target)
     rng = np.random.default_rng(int(numbers["seed"]))

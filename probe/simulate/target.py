@@ -31,10 +31,8 @@ WASHER = "washer"
 def surface_of(target: str) -> Scene:
     """Return the scene that a target names.
 
-    Raises
-    ------
-    SurfaceError
-        When nothing stands behind it; the message lists the objects or faces that are known.
+    Raises `SurfaceError` when nothing stands behind it; the message lists the objects or faces that
+    are known.
     """
     if target == WASHER:
         return _washer()

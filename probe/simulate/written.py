@@ -35,10 +35,8 @@ AROUND_MM = 24.0  #: triangles farther from a touch of a round face are not unde
 def written_triangles(file: str | os.PathLike[str]) -> Array:
     """Return the corners (n, 3, 3) of a part's triangles, mm, frame of the part.
 
-    Raises
-    ------
-    SurfaceError
-        The file cannot be read, is no STL, is cut short, too large, empty, or holds NaN.
+    Raises `SurfaceError` if the file cannot be read, is no STL, is cut short, too large, empty, or
+    holds NaN.
     """
     try:
         return part_triangles(file)
@@ -52,10 +50,7 @@ def part_mesh(file: str | os.PathLike[str], T_surface_part: ArrayLike | None = N
     `T_surface_part` (4, 4) leads to the surface frame, whose z points at the sensor; without it the
     part is as it lies in the file.
 
-    Raises
-    ------
-    SurfaceError
-        When the file is no STL or nothing of it can be seen along -z.
+    Raises `SurfaceError` when the file is no STL or nothing of it can be seen along -z.
     """
     return mesh(written_triangles(file), T_surface_part, place=str(file))
 
@@ -75,10 +70,7 @@ class RoundPart:
     def under(self, touch: Touch) -> Scene:
         """Return the scene of a touch: a surface in the plane that is tangent at its place.
 
-        Raises
-        ------
-        SurfaceError
-            Nothing of the part is there.
+        Raises `SurfaceError` if nothing of the part is there.
         """
         x, y = touch.x_mm, touch.y_mm
         T_object_plane = self.tangent(x, y)
@@ -115,10 +107,7 @@ def round_part(
 ) -> RoundPart:
     """Return a written part (STL) to be touched on a round face.
 
-    Raises
-    ------
-    SurfaceError
-        The face is flat, or the file is no STL.
+    Raises `SurfaceError` if the face is flat, or the file is no STL.
     """
     name = f"{held.entry.name}/{face.name}"
     if face.round is None:

@@ -70,10 +70,7 @@ def mesh_heights(heights_mm: Array, tolerance_mm: float) -> Index:
     The grid is (n + 1, n + 1), n a power of two, all finite. The triangles (m, 3) are places of the
     corners in the flat grid, counter-clockwise where x runs along columns and y along rows.
 
-    Raises
-    ------
-    SurfaceError
-        For a grid of another size.
+    Raises `SurfaceError` for a grid of another size.
     """
     cells = len(heights_mm) - 1
     if heights_mm.shape != (cells + 1, cells + 1) or cells < 2 or cells & (cells - 1):
@@ -180,11 +177,8 @@ def symbol_triangles(symbols: SymbolReliefs, label: int) -> Array:
 def triangulate(loops_mm: Sequence[Array]) -> NDArray[np.int64]:
     """Return triangles (m, 3) over the points of all loops (k, 2), one loop after the other.
 
-    Raises
-    ------
-    SurfaceError
-        When the triangles do not have the area of the loops: they cross, or run the wrong way
-        (the outer one runs counter-clockwise, holes clockwise).
+    Raises `SurfaceError` when the triangles do not have the area of the loops: they cross, or run
+    the wrong way (the outer one runs counter-clockwise, holes clockwise).
     """
     from manifold3d import triangulate
 

@@ -145,10 +145,8 @@ _BELOW_ONE = np.nextafter(1.0, 0.0)
 def list_lookup(rows: ArrayLike, columns: ArrayLike, labels: ArrayLike) -> LabelAt:
     """Return the look-up of symbols in cells (n,) counted from the anchor; others are empty.
 
-    Raises
-    ------
-    SurfaceError
-        When two symbols share a cell, or cells lie too far apart to belong to one face.
+    Raises `SurfaceError` when two symbols share a cell, or cells lie too far apart to belong to one
+    face.
     """
     r, c, q = (np.asarray(values, dtype=np.int64) for values in (rows, columns, labels))
     if not len(r):
@@ -265,10 +263,7 @@ class HeightTemplate:
 def template(symbols: SymbolReliefs, pitch_mm: float) -> HeightTemplate:
     """Return the table of an alphabet's symbols.
 
-    Raises
-    ------
-    SurfaceError
-        When symbols reach beyond their cells.
+    Raises `SurfaceError` when symbols reach beyond their cells.
     """
     if not symbols.foot_half_mm <= pitch_mm / 2:
         raise SurfaceError(

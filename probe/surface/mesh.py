@@ -81,10 +81,7 @@ def mesh(
 
     `T_surface_part` (4, 4) leads from their frame to the surface frame; `place` is named in errors.
 
-    Raises
-    ------
-    SurfaceError
-        When a corner is no number, or no triangle covers an area seen along -z.
+    Raises `SurfaceError` when a corner is no number, or no triangle covers an area seen along -z.
     """
     corners, outward, across = _read_triangles(triangles_mm, place)
     if T_surface_part is not None:

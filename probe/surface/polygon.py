@@ -80,10 +80,7 @@ class FaceRegion:
 def polygon(loops_mm: Sequence[ArrayLike]) -> FaceRegion:
     """Return the region inside the first loop and outside the others; each (k, 2), k >= 3, mm.
 
-    Raises
-    ------
-    SurfaceError
-        When a loop is no ring of finite points, or encloses no area.
+    Raises `SurfaceError` when a loop is no ring of finite points, or encloses no area.
     """
     rings = [np.asarray(loop, dtype=np.float64) for loop in loops_mm]
     if not rings or any(r.ndim != 2 or r.shape[1] != 2 or len(r) < 3 for r in rings):

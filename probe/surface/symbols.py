@@ -137,10 +137,7 @@ class SymbolReliefs:
 def emboss(glyphs: tuple[Strokes, ...], unit_mm: float, relief: Relief) -> SymbolReliefs:
     """Return the symbols of an alphabet, whose strokes join nodes in units of `unit_mm`.
 
-    Raises
-    ------
-    SurfaceError
-        When a number is out of range, or draft or chamfer make an edge vanish.
+    Raises `SurfaceError` when a number is out of range, or draft or chamfer make an edge vanish.
     """
     _check(relief)
     rings = tuple(
@@ -220,13 +217,7 @@ class Ring:
         return np.stack([x, y], axis=1)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Hull:
-    """A convex piece: all that one stroke covers."""
-
-    normals: Array  # (k, 2)
-    supports: Array  # (k,)
-    corners: Array  # (k, 2); edge i runs from corner i to corner i + 1
+Edge = tuple[Array, Array, Array, float]  #: its ends, normal and support
 
 
 def outline(strokes_mm: ArrayLike, stroke_mm: float) -> tuple[Ring, ...]:
@@ -234,10 +225,7 @@ def outline(strokes_mm: ArrayLike, stroke_mm: float) -> tuple[Ring, ...]:
 
     `stroke_mm` is the distance of two opposite flats of the nib.
 
-    Raises
-    ------
-    SurfaceError
-        For no strokes, a stroke without length, or a width that is not positive.
+    Raises `SurfaceError` for no strokes, a stroke without length, or a width that is not positive.
     """
     strokes = np.asarray(strokes_mm, dtype=np.float64)
     if strokes.ndim != 3 or strokes.shape[1:] != (2, 2) or not len(strokes):
@@ -256,7 +244,7 @@ def outline(strokes_mm: ArrayLike, stroke_mm: float) -> tuple[Ring, ...]:
     return tuple(_rings(_free_edges(hulls, eps), eps))
 
 
-def _hull(a: Array, b: Array, radius: float) -> _Hull:
+def _hull(a: Array, b: Array, radius: float) -> Ring:
     """Return the hull of the nib at both ends: the nib's flats, and two sides between them."""
     along = (b - a) / math.hypot(*(b - a))
     nib = radius / math.cos(math.pi / 8)
@@ -268,16 +256,16 @@ def _hull(a: Array, b: Array, radius: float) -> _Hull:
             normals.append(side)
             supports.append(side @ a + (corners @ side).max())
     order = np.argsort([math.atan2(n[1], n[0]) for n in normals])
-    ring = Ring(np.array(normals)[order], np.array(supports)[order])
-    return _Hull(ring.normals, ring.supports, ring.moved(0.0))
+    return Ring(np.array(normals)[order], np.array(supports)[order])
 
 
-def _free_edges(hulls: Sequence[_Hull], eps: float) -> list[tuple[Array, Array, Array, float]]:
+def _free_edges(hulls: Sequence[Ring], eps: float) -> list[Edge]:
     """Return the parts of all hulls' edges that no other hull covers: ends, normal, support."""
     free = []
     for i, hull in enumerate(hulls):
-        ends = np.roll(hull.corners, -1, axis=0)
-        for p, q, n, c in zip(hull.corners, ends, hull.normals, hull.supports, strict=True):
+        corners = hull.moved(0.0)
+        ends = np.roll(corners, -1, axis=0)
+        for p, q, n, c in zip(corners, ends, hull.normals, hull.supports, strict=True):
             left = [(0.0, 1.0)]
             for j, other in enumerate(hulls):
                 if j != i:
@@ -290,7 +278,7 @@ def _free_edges(hulls: Sequence[_Hull], eps: float) -> list[tuple[Array, Array, 
 
 
 def _covered_part(
-    p: Array, q: Array, normal: Array, hull: _Hull, first: bool, eps: float
+    p: Array, q: Array, normal: Array, hull: Ring, first: bool, eps: float
 ) -> tuple[float, float]:
     """Return the part of the edge p q inside a hull; (1, 0) for none.
 
@@ -321,7 +309,7 @@ def _subtract(
     return [(s, t) for s, t in left if s < t]
 
 
-def _rings(edges: list[tuple[Array, Array, Array, float]], eps: float) -> list[Ring]:
+def _rings(edges: list[Edge], eps: float) -> list[Ring]:
     """Chain edges end to start; where several start, the sharpest left turn goes on."""
     starts = np.array([p for p, _, _, _ in edges])
     unused = set(range(len(edges)))
@@ -351,15 +339,8 @@ def _turn(a: Array, b: Array) -> float:
     return math.atan2(a[0] * b[1] - a[1] * b[0], a @ b)
 
 
-def _merge_collinear(chain: list[tuple[Array, Array, Array, float]]) -> Ring:
+def _merge_collinear(chain: list[Edge]) -> Ring:
     """Join neighbours on one line, across the chain's seam too."""
-    kept = [
-        (n, c)
-        for (n, c), (m, _) in zip(
-            [(n, c) for _, _, n, c in chain],
-            [(n, c) for _, _, n, c in chain[-1:] + chain[:-1]],
-            strict=True,
-        )
-        if abs(_turn(m, n)) > SAME_POINT
-    ]
-    return Ring(np.array([n for n, _ in kept]), np.array([c for _, c in kept]))
+    normals, supports = [edge[2] for edge in chain], [edge[3] for edge in chain]
+    kept = [k for k in range(len(chain)) if abs(_turn(normals[k - 1], normals[k])) > SAME_POINT]
+    return Ring(np.array([normals[k] for k in kept]), np.array([supports[k] for k in kept]))

@@ -58,7 +58,7 @@ from recognizer.touch.hypothesis import (
     log_likelihood,
 )
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.next_touch import EarlierTouch, propose_next
+from recognizer.touch.next_touch import propose_next
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at, read_touch
 from recognizer.touch.recognition import (
@@ -73,7 +73,7 @@ from recognizer.touch.symbols.fit import refine_lattices, score_cells
 from recognizer.touch.symbols.image import Image, bend_image
 from recognizer.touch.symbols.posterior import explained_share, refit_pose
 from recognizer.touch.verdict import Face, least_explained, reject_joined
-from recognizer.touch.verify import SHARES, bend_at
+from recognizer.touch.verify import SHARES, curvature_at
 
 Array = NDArray[np.float64]
 Views = tuple[tuple[LatticeView, ...], ...]  #: of each touch
@@ -171,7 +171,7 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
     own = not agrees and bool(joined.rivals)
     rivals: Sequence[PlaceHypothesis] = joined.rivals if own else joined.found
     away = relative_pose(joined.touch_poses.poses[-1], joined.touch_poses.poses[:-1])
-    earlier = [EarlierTouch(p, one.signal) for p, one in zip(away, scan.touches, strict=True)]
+    earlier = [(pose, one.signal) for pose, one in zip(away, scan.touches, strict=True)]
     step = propose_next(reader, touch.signal, answer, rivals, earlier)
     return replace(
         scan,
@@ -403,7 +403,7 @@ def refine_last_pose(reader: Reader, image: Image, found: ScanHypothesis) -> Sca
     embossed, hypothesis, fit = found.embossed, found.hypothesis, found.fit
     worn = fit.cells[weigh_cells(embossed, fit, hypothesis).worn]
     labels = unworn_labels_at(embossed, hypothesis, worn)
-    bend = bend_at(embossed, hypothesis, fit)
+    bend = curvature_at(embossed, hypothesis, fit)
     shares = (1.0,) if bend is None else SHARES
     if bend is not None:
         image = bend_image(image, reader.sensor, bend, shares)

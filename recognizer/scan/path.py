@@ -70,15 +70,18 @@ def follow_path(
     `views` of each touch, `steps` by `known_steps`.
     """
     places = [_places_of_touch(embossed, each) for each in views]
-    trellis = _Trellis([], [])
+    every: list[Array] = []  # (k,) nats of the best path to each place, of each touch so far
+    previous: list[list[tuple[int, int]]] = []  # touch and place before; (-1, -1): a path begins
     for t in range(len(places)):
-        _reach_touch(embossed, places, steps, t, trellis)
-    ends = [float(each.max(initial=-math.inf)) for each in trellis.scores]
+        reached, before_t = _reach_touch(embossed, places, steps, t, every)
+        every.append(reached)
+        previous.append(before_t)
+    ends = [float(each.max(initial=-math.inf)) for each in every]
     ends = [end - LEFT_OUT_NATS * (len(ends) - 1 - t) for t, end in enumerate(ends)]
     last = int(np.argmax(ends))
     if not math.isfinite(ends[last]):
         return RegisteredPath(np.zeros((len(views), 3)), np.zeros(len(views), np.bool_), 0.0, 0.0)
-    scores = trellis.scores[last]
+    scores = every[last]
     end = int(scores.argmax())
     elsewhere = _lie_elsewhere(embossed, places[last], end)
     margin = float(scores[end] - scores[elsewhere].max(initial=-math.inf))
@@ -86,7 +89,7 @@ def follow_path(
     t, n = last, end
     while t >= 0:
         chosen[t] = n
-        t, n = trellis.previous[t][n]
+        t, n = previous[t][n]
     poses, before = np.zeros((len(places), 3)), min(chosen)
     for t in range(len(places)):
         before = t if t in chosen else before
@@ -167,37 +170,31 @@ class _TouchPlaces:
     losses: Array  #: (k,) nats below the best symbols of any kind, 0 or less
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Trellis:
-    """The best path to each place of each touch so far."""
-
-    scores: list[Array]  # (k,) nats
-    previous: list[list[tuple[int, int]]]  # touch and place; (-1, -1): a path begins here
-
-
 def _reach_touch(
     embossed: EmbossedArray,
     places: Sequence[_TouchPlaces],
     steps: Sequence[PlanarBelief],
     t: int,
-    trellis: _Trellis,
-) -> None:
-    """Add a touch to a trellis: paths reach its places from an earlier touch, or begin there."""
+    before: Sequence[Array],
+) -> tuple[Array, list[tuple[int, int]]]:
+    """Return the best paths to a touch's places from the scores of the touches `before` it.
+
+    Nats (k,), and touch and place before; (-1, -1) where the path begins there.
+    """
     at = places[t]
     best = np.full(len(at.poses), -LEFT_OUT_NATS * t)  # all earlier touches are left out
     previous = [(-1, -1)] * len(best)
     for k in range(t - 1, max(t - 1 - MOST_SKIPPED, 0) - 1, -1):
-        if not len(trellis.scores[k]):
+        if not len(before[k]):
             continue
         step = step_between(steps, k, t)
-        reached = trellis.scores[k][:, None] - _step_costs(embossed, places[k], at, step)
+        reached = before[k][:, None] - _step_costs(embossed, places[k], at, step)
         reached -= LEFT_OUT_NATS * (t - 1 - k)
         nearest = reached.argmax(axis=0)
         value = reached[nearest, np.arange(len(best))]
         for n in np.flatnonzero(value > best).tolist():
             best[n], previous[n] = value[n], (k, int(nearest[n]))
-    trellis.scores.append(best + at.losses)
-    trellis.previous.append(previous)
+    return best + at.losses, previous
 
 
 def _places_of_touch(embossed: EmbossedArray, views: Sequence[LatticeView]) -> _TouchPlaces:

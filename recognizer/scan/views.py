@@ -18,7 +18,7 @@ from recognizer.scan.mosaic.planar import PlacedTouch, pose_difference
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.options import Effort
 from recognizer.touch.reader import Reader
-from recognizer.touch.symbols.curvature import guess_bends
+from recognizer.touch.symbols.curvature import guess_curvatures
 from recognizer.touch.symbols.fit import (
     Fit,
     fit_lattices,
@@ -28,7 +28,7 @@ from recognizer.touch.symbols.fit import (
 )
 from recognizer.touch.symbols.image import Image, bend_image, first_gain
 from recognizer.touch.symbols.search import Bank
-from recognizer.touch.verify import BENDS
+from recognizer.touch.verify import CURVATURES
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -148,7 +148,7 @@ def round_views(
     `image` is as of a flat face, `near` (k, 3) as for `flat_views`.
     """
     effort, views = reader.options.first, list[LatticeView]()
-    for guess in guess_bends(image, reader.sensor, embossed.radii_mm, BENDS):
+    for guess in guess_curvatures(image, reader.sensor, embossed.radii_mm, CURVATURES):
         under = bend_image(image, reader.sensor, guess.bend)
         fits = fit_lattices(under, bank, effort, search_image(under, bank, [guess.gain]))
         views += [LatticeView(fit, predicted=False) for fit in fits]

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.tactile_image import TactileImage
+from recognizer.touch.tactile_image import ImageError, TactileImage
 
 Array = NDArray[np.float64]
 
@@ -27,11 +27,18 @@ def subtract_bias(image: TactileImage) -> TactileImage:
     return _replace_values(image, values)
 
 
-def median(image: TactileImage) -> TactileImage:
+def median(image: TactileImage, thinnest_mm: float | None = None) -> TactileImage:
     """Return the median of the 3 x 3 neighbourhood of every sample; edges are repeated.
 
-    It takes spikes away and keeps edges, but erases lines of one sample's width.
+    It takes spikes away and keeps edges, but erases lines of one sample's width: `ImageError` if
+    the thinnest line that must survive, `thinnest_mm`, is not two samples wide.
     """
+    if thinnest_mm is not None and thinnest_mm < 2 * image.step_mm:
+        raise ImageError(
+            f"a 3 x 3 median erases lines of one sample: {thinnest_mm:g} mm are "
+            f"{thinnest_mm / image.step_mm:.2g} samples of {image.step_mm:g} mm",
+            fix="leave the median out, or take it of a finer mosaic",
+        )
     known = np.where(image.defined, image.values, np.nan)
     padded = np.pad(known, 1, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).reshape(*known.shape, 9)
@@ -62,10 +69,21 @@ def magnify_image(image: TactileImage, doublings: int = 2) -> TactileImage:
     values, weights = image.values, image.defined.astype(np.float64)
     values = values * weights
     for _ in range(doublings):
-        values, weights = _double_sampling(values), _double_sampling(weights)
+        values, weights = double_sampling(values), double_sampling(weights)
     defined = weights > 0.5
     filled = np.where(defined, values / np.where(defined, weights, 1.0), 0.0)
     return TactileImage(filled, defined, image.step_mm / 2**doublings, image.corner_mm)
+
+
+def double_sampling(values: Array) -> Array:
+    """Return samples (2 h - 1, 2 w - 1): between two the mean of both."""
+    for axis in (0, 1):
+        rows = np.moveaxis(values, axis, 0)
+        finer = np.empty((2 * len(rows) - 1, *rows.shape[1:]))
+        finer[::2] = rows
+        finer[1::2] = (rows[1:] + rows[:-1]) / 2
+        values = np.moveaxis(finer, 0, axis)
+    return values
 
 
 def sobel(image: TactileImage) -> tuple[Array, Array]:
@@ -79,16 +97,6 @@ def sobel(image: TactileImage) -> tuple[Array, Array]:
     x = across[:-2] + 2 * across[1:-1] + across[2:]
     y = -(down[:, :-2] + 2 * down[:, 1:-1] + down[:, 2:])
     return x / (8 * image.step_mm), y / (8 * image.step_mm)
-
-
-def _double_sampling(values: Array) -> Array:
-    for axis in (0, 1):
-        rows = np.moveaxis(values, axis, 0)
-        finer = np.empty((2 * len(rows) - 1, *rows.shape[1:]))
-        finer[::2] = rows
-        finer[1::2] = (rows[1:] + rows[:-1]) / 2
-        values = np.moveaxis(finer, 0, axis)
-    return values
 
 
 def _replace_values(image: TactileImage, values: Array) -> TactileImage:

@@ -7,11 +7,10 @@ along the way; they stay bounded if the search is around the arm's pose itself r
 `recognizer.scan.mosaic` does better; its poses can be given as beliefs. Where touches overlap, the
 image is the mean of their magnified images.
 
-The correlation: each image is magnified to four times its resolution by zeros between the tactels
-and a convolution with H, twice. The zone is the common part of both images at the believed shift;
-it stays fixed in the first image while the second one is shifted under it. The largest sum of
-products wins, to the cell. Kept as published, to measure `scan.mosaic.search` and `register`
-against: sums of products favour large readings.
+The correlation: each image is magnified to four times its resolution (`filters`). The zone is the
+common part of both images at the believed shift; it stays fixed in the first image while the second
+one is shifted under it. The largest sum of products wins, to the cell. Kept as published, to
+measure `scan.mosaic` against: sums of products favour large readings.
 """
 
 from __future__ import annotations
@@ -33,14 +32,13 @@ from recognizer.scan.mosaic.planar import (
     transform_points,
 )
 from recognizer.scan.mosaic.search import MAGNIFIED
-from recognizer.thesis.filters import magnify_image
+from recognizer.thesis.filters import double_sampling, magnify_image
 from recognizer.touch.tactile_image import ImageError, TactileImage, tactile_image, touch_image
 
 Array = NDArray[np.float64]
 #: correct the believed step, correct the believed pose, or keep it
 Placing = Literal["product", "bounded", "believed"]
 
-H = np.outer([0.5, 1.0, 0.5], [0.5, 1.0, 0.5])
 WINDOW_TACTELS = 0.75  #: half width of the search around a belief
 LEAST_OVERLAP = 0.5  #: share of the sensor's width and height in common
 TURN_RAD = math.radians(3)  #: touches turned further against each other are not compared
@@ -190,13 +188,9 @@ def product_shift(a: Array, b: Array, believed: tuple[float, float], window: flo
 
 
 def magnify_samples(image: Array) -> Array:
-    """Return an image of four times the rows and columns, by H."""
-    from scipy.ndimage import convolve
-
+    """Return an image of four times the rows and columns, 0 beyond the last ones."""
     for _ in range(2):
-        wide = np.zeros((2 * image.shape[0], 2 * image.shape[1]))
-        wide[::2, ::2] = image
-        image = convolve(wide, H, mode="constant")
+        image = double_sampling(np.pad(image, (0, 1)))[:-1, :-1]
     return image
 
 

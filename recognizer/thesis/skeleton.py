@@ -16,13 +16,16 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.errors import require
-from generator.alphabet import Glyph
+from generator.alphabet import Glyph, counts, key_points
 
 Array = NDArray[np.float64]
 Pixel = tuple[int, int]
@@ -35,7 +38,6 @@ SPUR = 0.4  #: shorter branches with a free end are pruned
 HOOK = 0.3  #: of a free end, in which thinning may have bent the line
 BOW = 0.16  #: how far a line may bow from a straight one
 NEAR = 0.5  #: vertices nearer together are one
-ROUNDING = 1e-9  #: below which numbers are equal
 
 TURN_RAD = math.radians(40)  #: from which a bend is a corner
 
@@ -92,29 +94,11 @@ def points_of_skeleton(skeleton: NDArray[np.bool_], unit: float) -> KeyPoints:
     return KeyPoints(_stack_points(ends), _stack_points(merged), loops)
 
 
+@lru_cache(maxsize=256)
 def points_of_glyph(glyph: Glyph) -> KeyPoints:
     """Return the end-points and vertices, (x, y) in lattice units, of a stroke graph."""
-    strokes = [(complex(*a), complex(*b)) for a, b in glyph.strokes]
-    places = {end for stroke in strokes for end in stroke}
-    for one, other in itertools.combinations(strokes, 2):
-        places |= _crossing_points(one, other)
-    ends, vertices = [], []
-    spokes = 0
-    for at in sorted(places, key=lambda z: (z.real, z.imag)):
-        leaving = {
-            _round_complex((to - at) / abs(to - at))
-            for a, b in strokes
-            if _on_segment(at, a, b)
-            for to in (a, b)
-            if abs(to - at) > ROUNDING
-        }
-        spokes += len(leaving)
-        straight = len(leaving) == 2 and abs(sum(leaving)) < ROUNDING
-        if len(leaving) == 1:
-            ends.append((at.real, at.imag))
-        elif not straight:
-            vertices.append((at.real, at.imag))
-    return KeyPoints(_stack_points(ends), _stack_points(vertices), spokes // 2 - len(places) + 1)
+    ends, vertices = key_points(glyph)
+    return KeyPoints(_stack_points(ends), _stack_points(vertices), counts(glyph).loops)
 
 
 def graph(skeleton: NDArray[np.bool_], shortest: float = 0.0) -> Graph:
@@ -257,24 +241,5 @@ def _merge_points(points: Path, near: float) -> Path:
     return [(sum(p[0] for p in g) / len(g), sum(p[1] for p in g) / len(g)) for g in groups]
 
 
-def _crossing_points(one: tuple[complex, complex], other: tuple[complex, complex]) -> set[complex]:
-    (a, b), (c, d) = one, other
-    u, v, w = b - a, d - c, c - a
-    cross = (u.conjugate() * v).imag
-    if abs(cross) < ROUNDING:
-        return set()
-    at = a + u * (w.conjugate() * v).imag / cross
-    inside = _on_segment(at, a, b) and _on_segment(at, c, d)
-    return {_round_complex(at)} if inside else set()
-
-
-def _on_segment(at: complex, a: complex, b: complex) -> bool:
-    return abs(at - a) + abs(b - at) < abs(b - a) + ROUNDING
-
-
-def _round_complex(z: complex) -> complex:
-    return complex(round(z.real, 9) + 0.0, round(z.imag, 9) + 0.0)
-
-
-def _stack_points(points: Path) -> Array:
+def _stack_points(points: Sequence[tuple[SupportsFloat, SupportsFloat]]) -> Array:
     return np.array(points, np.float64).reshape(-1, 2)

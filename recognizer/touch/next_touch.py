@@ -33,6 +33,8 @@ from recognizer.touch.signal import Signal, combine_around, mean_of_strongest
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+#: x, y (mm) and turn (rad) of an earlier touch, in the sensor frame of the last one; its signal
+EarlierTouch = tuple[Array, Signal]
 
 # Which steps are weighed, and what they are worth. Lengths,
 # forces and counts are those of `fsr-16`; `next_limits` makes those of another type.
@@ -121,7 +123,7 @@ def propose_next(
         return NextTouch(0.0, 0.0, 0.0, limits.force_n, "nothing is felt: press onto the object")
     steps = _steps(limits)
     pitch_mm = min(each.style.pitch_mm for each in reader.lab.arrays)
-    before = tuple((one.pose, _loaded_tactels(one.signal, limits)) for one in earlier)
+    before = tuple((pose, _loaded_tactels(felt, limits)) for pose, felt in earlier)
     area = LoadedArea(reader.sensor, _loaded_tactels(signal, limits), before)
     share = float(area.loaded.mean())
     novelty = NOVELTY_INSIDE if share >= WHOLE_SHARE else NOVELTY
@@ -240,14 +242,6 @@ def _why(
     if step[2]:
         words.append("turned, more of the symbols fit under the sensor")
     return "; ".join(words) or f"once more: {answer.reason or 'to be sure'}"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class EarlierTouch:
-    """An earlier touch of the face."""
-
-    pose: Array  #: (3,) x, y (mm) and turn (rad), in the sensor frame of the last touch
-    signal: Signal
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -124,8 +124,8 @@ class Recognition:
     runner_up: RunnerUp | None
     reason: str  #: "" where it answers
     noise: float | None = None  #: standard deviation of psi that the symbols leave unexplained
-    scale: float | None = None  #: of the print as this touch felt it: 1 is as designed
-    stroke_mm: float | None = None  #: width of the strokes, likewise
+    scale: float | None = None  #: of the print by this touch: 1 is as designed
+    stroke_mm: float | None = None  #: width of the strokes of the print
     doubt: float | None = None
     """Expected number of registered places that a foreign surface (other symbols than any that
     are registered) would match as well by chance; None where another reason refuses, and where the

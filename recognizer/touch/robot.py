@@ -17,7 +17,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from encoded_objects.base.sensor_type import SensorType
 from probe.arm import Arm, SensorPose, sensor_pose
 from probe.wrist import Wrist, distances_mm, wrist_pose
 from recognizer.touch.recognition import Recognition
@@ -43,11 +42,6 @@ class Seating:
     tilt_rad: float = 0.005  #: of the sensor against the face, both ways, wholly on the face
     tilt_border_rad: float = 0.064  #: with the centre on the border, in the direction it tips
     half_mm: float = 12.7  #: half the width of the sensor
-
-    @classmethod
-    def of(cls, sensor: SensorType) -> Seating:
-        """Return how a sensor of a type lies."""
-        return cls(half_mm=min(sensor.half_mm))
 
     def beyond(self, inside_mm: float | None) -> float:
         """Return how far the sensor hangs over the border, 0 ... 1; 1 where it is not known."""
@@ -143,7 +137,6 @@ class FusedPose:
 
     pose: ObjectPose
     chi2: float  #: squared disagreement over the covariances
-    freedoms: int  #: 6 for each pose beyond the first
     since: int  #: index of the first pose since the object lies where it does now
     moved: bool  #: the object was moved before `since`: fuse what came since
 
@@ -156,20 +149,20 @@ def fuse_poses(poses: Sequence[ObjectPose]) -> FusedPose:
     frame, in the order of their time; all are fused, whether or not the object was moved in
     between.
     """
-    told = np.stack([pose.T_robot_object for pose in poses])
+    every = np.stack([pose.T_robot_object for pose in poses])
     own = [pose.covariance - pose.shared for pose in poses]
     weights = np.asarray(np.linalg.inv(own), np.float64)
     information = weights.sum(axis=0)
-    T = told[0]
+    T = every[0]
     for _ in range(FUSION_STEPS):
-        pull = np.einsum("nij,nj->i", weights, _differences(told, T))
+        pull = np.einsum("nij,nj->i", weights, _differences(every, T))
         T = _displaced(T, np.asarray(np.linalg.solve(information, pull)))
-    offs = _differences(told, T)
+    offs = _differences(every, T)
     chi2 = float(np.einsum("ni,nij,nj->", offs, weights, offs))
     whole = np.linalg.inv(information) + poses[0].shared
     placed = ObjectPose(T, (whole + whole.T) / 2, poses[0].shared)
     since, moved = _last_move(offs, weights)
-    return FusedPose(placed, chi2, 6 * (len(poses) - 1), since, moved)
+    return FusedPose(placed, chi2, since, moved)
 
 
 def _last_move(offs: Array, weights: Array) -> tuple[int, bool]:

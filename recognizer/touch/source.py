@@ -111,10 +111,10 @@ def source_of(
     """
     origin, path = recording.origin, Path(recording.path)
     known, notice = _calibration_for(origin, calibration, path.parent)
-    told = str(origin.more.get("overlay", "")) or origin.sensor.rpartition("/")[2]
+    recorded = str(origin.more.get("overlay", "")) or origin.sensor.rpartition("/")[2]
     return TouchSource(
         place=str(path),
-        sensor=recording.sensor_type(sensor).with_overlay(overlay or told),
+        sensor=recording.sensor_type(sensor).with_overlay(overlay or recorded),
         calibration=known,
         together=1 if every else _frames_per_touch(origin, path),
         frames=len(recording),
@@ -125,14 +125,14 @@ def source_of(
 
 def _frames_per_touch(origin: RecordingOrigin, path: Path) -> int:
     """Return how many frames follow each other at one place; 0 if the recording does not say."""
-    told: Any = origin.more.get("frames_per_touch", 0)
-    if not isinstance(told, int) or told < 0:
+    frames: Any = origin.more.get("frames_per_touch", 0)
+    if not isinstance(frames, int) or frames < 0:
         raise RecordingError(
-            f"its attribute frames_per_touch is {told!r}",
+            f"its attribute frames_per_touch is {frames!r}",
             fix="write a whole number there, or delete it",
             place=str(path),
         )
-    return told
+    return frames
 
 
 def _calibration_for(

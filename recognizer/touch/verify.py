@@ -36,7 +36,7 @@ from recognizer.touch.options import Effort
 from recognizer.touch.pose import face_pose
 from recognizer.touch.prepare import Prepared, PreparedLab
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.curvature import BendGuess, guess_bends
+from recognizer.touch.symbols.curvature import CurvatureGuess, guess_curvatures
 from recognizer.touch.symbols.fit import (
     CoarseSearch,
     Fit,
@@ -50,10 +50,10 @@ from recognizer.touch.symbols.image import Image, bend_image
 STEPS = 4  #: of damped least squares, of a place with known symbols
 
 # Of round faces (`tests/bench/round_faces.py`).
-BENDS = 2  #: curvatures that an image is read under
-THOROUGH_BENDS = 5  #: in the second search, ...
+CURVATURES = 2  #: curvatures that an image is read under
+THOROUGH_CURVATURES = 5  #: in the second search, ...
 #: ... each with this effort: several curvatures do what several gains do on a flat face
-EACH_BEND = Effort(candidates=8, steps=3, finalists=3, final_steps=4)
+EACH_CURVATURE = Effort(candidates=8, steps=3, finalists=3, final_steps=4)
 #: Factors by which a face is taken to fall away less: a force law that rises less than the one that
 #: is taken makes a strip look so.
 SHARES = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)
@@ -93,10 +93,12 @@ class ArrayImage:
         return self._fits[effort]
 
     @cached_property
-    def curvatures(self) -> list[BendGuess]:
+    def curvatures(self) -> list[CurvatureGuess]:
         """Possible curvatures of the touch, likeliest first."""
         embossed = self.prepared.embossed
-        return guess_bends(self.image, self.reader.sensor, embossed.radii_mm, THOROUGH_BENDS)
+        return guess_curvatures(
+            self.image, self.reader.sensor, embossed.radii_mm, THOROUGH_CURVATURES
+        )
 
     def curved(self, number: int) -> tuple[Image, CoarseSearch]:
         """Return the image under a curvature, and its coarse search."""
@@ -196,9 +198,9 @@ def _fit_hypotheses(
 def verify_on_round_faces(touch: ArrayImage, effort: Effort) -> list[VerifiedHypothesis]:
     """Return the likeliest places on round faces."""
     image, sensor, embossed = touch.image, touch.reader.sensor, touch.prepared.embossed
-    keep = BENDS
+    keep = CURVATURES
     if effort.crossed:
-        keep, effort = THOROUGH_BENDS, EACH_BEND
+        keep, effort = THOROUGH_CURVATURES, EACH_CURVATURE
     fits: list[Fit] = []
     under: list[Bend] = []
     for number, guess in enumerate(touch.curvatures[:keep]):
@@ -231,7 +233,7 @@ def verify_on_round_faces(touch: ArrayImage, effort: Effort) -> list[VerifiedHyp
     return found
 
 
-def bend_at(embossed: EmbossedArray, hypothesis: Hypothesis, fit: Fit) -> Bend | None:
+def curvature_at(embossed: EmbossedArray, hypothesis: Hypothesis, fit: Fit) -> Bend | None:
     """Return the curvature of the face at a place, in the axes of the sensor; None if flat."""
     if not embossed.radii_mm:
         return None
@@ -247,10 +249,12 @@ def _is_compatible(
     embossed: EmbossedArray, hypothesis: Hypothesis, fit: Fit, under: Bend | None
 ) -> bool:
     """Whether a place has about the curvature under which its symbols were read."""
-    return _same_bend(bend_at(embossed, hypothesis, fit), under, TURNED_RAD, RADIUS_FACTOR)
+    return _same_curvature(
+        curvature_at(embossed, hypothesis, fit), under, TURNED_RAD, RADIUS_FACTOR
+    )
 
 
-def _same_bend(a: Bend | None, b: Bend | None, turn_rad: float, factor: float) -> bool:
+def _same_curvature(a: Bend | None, b: Bend | None, turn_rad: float, factor: float) -> bool:
     if a is None or b is None:
         return False
     turn = abs(math.remainder(a.towards_rad - b.towards_rad, math.pi))
@@ -266,7 +270,7 @@ def _verify_under_curvature(
     """
     found = None
     for shares in (FIRST_SHARES, SHARES):
-        bend = bend_at(embossed, hypothesis, fit)
+        bend = curvature_at(embossed, hypothesis, fit)
         if bend is None:
             return None
         several = bend_image(image, sensor, bend, shares)
@@ -295,7 +299,7 @@ def _under_best_fit(one: VerifiedHypothesis, found: list[VerifiedHypothesis]) ->
     for other in found:
         if other.hypothesis.fit != one.hypothesis.fit:
             continue
-        if not _same_bend(other.bend, one.bend, SAME_RAD, SAME_FACTOR):
+        if not _same_curvature(other.bend, one.bend, SAME_RAD, SAME_FACTOR):
             continue
         score = log_likelihood(one.embossed, other.fit, one.hypothesis)
         if score > best.score:

@@ -3,7 +3,6 @@
     python tests/bench/database_scale.py [--engine sqlite|postgresql|both] [--fill blocks|placed]
                                          [--objects 2 10 167 1000 10000 16667] [--array 4095]
     python tests/bench/database_scale.py --full [--array 1023] [--size 1.0]
-    python tests/bench/database_scale.py --copies 100 1000
 
 The array is 4095 x 4097 (GF(4), one of `large` "and up"), the next object a 60 mm cube of 384
 symbols. `blocks` fills the array with such cubes, 8 x 8 cells per face in growing squares: nothing
@@ -20,7 +19,7 @@ has opened (`generator.layout.torus.board_size`: it grows when nothing fits into
 `array` by those of the array.
 
 `--full` places the mixture, edges `--size` times as long, until none of its shapes fits anywhere,
-without a database. `--copies` chooses the places of a set of copies of a 30 mm cube.
+without a database.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -50,10 +49,8 @@ from generator.layout.layout import lay_out
 from generator.layout.occupancy import Occupancy
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.layout.torus import board_size
-from generator.pipeline import encode
 from generator.pipeline.place import occupancy_with
 from generator.polyhedron import shapes
-from generator.spec import read_specs
 
 CUBE = shapes.cube(60.0)
 STYLE = SymbolStyle()
@@ -252,31 +249,6 @@ def filled(array, size):
     told()
 
 
-class PlacesChosenError(Exception):
-    """Ends the making of a set where its parts would be built."""
-
-
-def copied(numbers):
-    """Print what choosing the places of a set of copies costs."""
-    print(f"{'copies':>8} {'placing CPU s':>14} {'per copy ms':>12}")
-    for number in numbers:
-        marks = []
-
-        def progress(what, _, marks=marks):
-            if what.startswith("making"):
-                raise PlacesChosenError
-            if what.startswith("placing"):
-                marks.append(time.process_time())
-
-        with tempfile.TemporaryDirectory() as folder, suppress(PlacesChosenError):
-            file = Path(folder) / "set.yaml"
-            file.write_text(f"name: A\nprofile: auto\nshape: {{cube: 30 mm}}\ncopies: {number}\n")
-            url = f"sqlite:///{folder}/lab.db"
-            encode(read_specs([file]), database=url, formats=(), jobs=1, progress=progress)
-        spent = marks[-1] - marks[0]
-        print(f"{number:8d} {spent:14.2f} {1e3 * spent / (len(marks) - 1):12.1f}", flush=True)
-
-
 def main() -> int:
     options = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -287,11 +259,7 @@ def main() -> int:
     options.add_argument("--array", type=int, default=4095, help="rows")
     options.add_argument("--full", action="store_true", help="how full the array gets")
     options.add_argument("--size", type=float, default=1.0, help="of the objects of --full")
-    options.add_argument("--copies", type=int, nargs="+", help="places of a set")
     chosen = options.parse_args()
-    if chosen.copies:
-        copied(chosen.copies)
-        return 0
     array = array_of(chosen.array)
     print(f"array {array.rows} x {array.columns}")
     if chosen.full:

@@ -11,39 +11,34 @@ take 8 GB.
 
 from __future__ import annotations
 
-import argparse
 import math
 import multiprocessing
-import os
 import resource
+import sys
 import time
 from collections import Counter
+from pathlib import Path
 
-for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(library, "1")
+import numpy as np
+from sqlalchemy import create_engine
 
-import numpy as np  # noqa: E402
-from sqlalchemy import create_engine  # noqa: E402
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
 
-from encoded_objects.base.sensor_type import SensorType  # noqa: E402
-from generator.alphabet import SymbolStyle, alphabet_named  # noqa: E402
-from generator.array import next_larger, profile  # noqa: E402
-from probe.contact.contract import Touch  # noqa: E402
-from probe.simulate.scene import Scene  # noqa: E402
-from probe.simulate.world.levels import TYPICAL  # noqa: E402
-from probe.simulate.world.sensor import LevelSensor  # noqa: E402
-from probe.surface.face import (  # noqa: E402
-    FaceSurface,
-    LatticeSurface,
-    list_lookup,
-    template,
-)
-from probe.surface.polygon import polygon  # noqa: E402
-from probe.surface.symbols import Relief, emboss  # noqa: E402
-from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab, cell_keys  # noqa: E402
-from recognizer.touch.reader import Reader  # noqa: E402
-from recognizer.touch.recognise import recognise  # noqa: E402
-from recognizer.touch.signal import signal_of  # noqa: E402
+from encoded_objects.base.sensor_type import SensorType
+from generator.alphabet import SymbolStyle, alphabet_named
+from generator.array import next_larger, profile
+from probe.contact.contract import Touch
+from probe.simulate.scene import Scene
+from probe.simulate.world.levels import TYPICAL
+from probe.simulate.world.sensor import LevelSensor
+from probe.surface.face import FaceSurface, LatticeSurface, list_lookup, template
+from probe.surface.polygon import polygon
+from probe.surface.symbols import Relief, emboss
+from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab, cell_keys
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import recognise
+from recognizer.touch.signal import signal_of
 
 SIDE = 11  # symbols along an edge
 STYLE = SymbolStyle(pitch_mm=5.0, stroke_mm=1.0, draft_rad=math.radians(5.0))
@@ -82,12 +77,8 @@ def encoding_of(array, faces: int) -> EmbossedArray:
     wide = array.columns // SIDE
     row, column = (SIDE * part for part in np.divmod(np.arange(faces), wide))
     rows, columns = (row[:, None] + R).ravel(), (column[:, None] + C).ravel()
-    labels = np.concatenate(
-        [
-            array.symbols(r, c)
-            for r, c in zip(np.array_split(rows, 64), np.array_split(columns, 64), strict=True)
-        ]
-    )
+    parts = zip(np.array_split(rows, 64), np.array_split(columns, 64), strict=True)
+    labels = np.concatenate([array.symbols(r, c) for r, c in parts])
     keys = cell_keys(array.columns, rows, columns)
     order = np.argsort(keys)
     owners = np.repeat(np.arange(faces), SIDE * SIDE)[order]
@@ -101,7 +92,8 @@ def encoding_of(array, faces: int) -> EmbossedArray:
     )  # fmt: skip
 
 
-def measured(faces: int, touches: int) -> str:
+def measured(faces: int, touches: int) -> tuple[object, ...]:
+    """Return the line of so many faces."""
     array = array_for(faces)
     encoding = encoding_of(array, faces)
     reader = Reader(Lab("", (encoding,)), SensorType())
@@ -130,22 +122,21 @@ def measured(faces: int, touches: int) -> str:
         counts["right" if right else "wrong" if found else "rejected"] += 1
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     doubt = np.median(doubts) if doubts else math.nan
-    return (
-        f"{faces:9,d} {array.rows:5d}x{array.columns:<5d} {indexed:9.2f} {np.median(ms):9.1f} "
-        f"{peak:9.0f} {doubt:9.1e} "
-        f"{counts['right']:7d} {counts['wrong']:6d} {counts['rejected']:6d}"
-    )
+    verdicts = (counts[name] for name in ("right", "wrong", "rejected"))
+    return (f"{faces:,}", f"{array.rows}x{array.columns}", indexed, float(np.median(ms)), peak,
+            f"{doubt:.1e}", *verdicts)  # fmt: skip
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    """Print a line for each number of faces."""
+    parser = runner.arguments(__doc__, touches=40)
     parser.add_argument("--faces", type=int, nargs="+", default=[10, 1000, 100000, 1000000])
-    parser.add_argument("--touches", type=int, default=40)
-    options = parser.parse_args()
-    print("    faces array         index s  ms/touch   peak MB     doubt   right  wrong reject")
-    for faces in options.faces:
-        with multiprocessing.get_context("spawn").Pool(1) as alone:
-            print(alone.apply(measured, (faces, options.touches)), flush=True)
+    asked = runner.parse(parser)
+    runner.table(("faces", "array", "index, s", "ms a touch", "peak MB", "doubt", "right", "wrong",
+                  "rejected"))  # fmt: skip
+    for faces in asked.faces:
+        with multiprocessing.get_context("spawn").Pool(1) as alone:  # whose memory is measured
+            runner.row(*alone.apply(measured, (faces, asked.touches)))
 
 
 if __name__ == "__main__":

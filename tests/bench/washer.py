@@ -17,18 +17,22 @@ The picture shows the first frame of each, filtered, from above and as a surface
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from probe.circuit import Electronics, fsr_of, read_sequence
+from probe.circuit import Electronics, fsr_of
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import median_filter
 from probe.plot.frame import frames_picture
 from probe.surface.indenters import Washer
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from reference.drawn_fsr import read_sequence
 
 FORCE_N = 80.0
 FINEST = {"tab": "tabs-61", "pad": "layer-8"}

@@ -5,8 +5,8 @@
     rows = runner.resume(file, jobs, work, options.jobs)
     runner.table(("level", "right"), lines)
 
-A script of `tests/campaigns` imports it by `import runner`, one of `tests/bench` by
-`from campaigns import runner` after `sys.path.insert(0, str(Path(__file__).parents[1]))`.
+A script imports it by `import runner`, one of `tests/bench` after
+`sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))`.
 """
 
 from __future__ import annotations

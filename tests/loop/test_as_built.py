@@ -93,15 +93,3 @@ def test_what_touches_tell_of_a_print_betters_later_poses(lab, capsys):
     with closing(sqlite3.connect("lab.db")) as connection:
         kept = connection.execute("select object_id, part, printer, material from as_built")
         assert kept.fetchall() == [(None, None, "fdm-0.4", "PLA")]
-
-
-def test_bad_input_ends_with_one_message(lab, capsys):
-    simulate("printed/Cube-F1.stl@lab.db", 4, 3)
-    capsys.readouterr()
-    assert recognize_object(["as-built", "4.h5"]) == 2
-    said = capsys.readouterr().err
-    assert "Cube-F1" in said
-    assert "10 are the least" in said
-    assert "fix: record 25-50" in said
-    assert recognize_object(["as-built", "none.h5", "--json"]) == 2
-    assert "none.h5" in json.loads(capsys.readouterr().out)["error"]["place"]

@@ -12,10 +12,19 @@ from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_nam
 from probe.command import run as probe_sensor
 from recognizer.command import run as recognize_object
 
+CLOTH = """name: cloth
+rows: 14
+columns: 20
+pitch: 1.5 mm
+row_pitch: 2.1 mm
+overlay: {tip: 1.2 mm}
+"""
 
-@pytest.mark.parametrize("name", shipped_names())
+
+@pytest.mark.parametrize("name", [*shipped_names(), "cloth.yaml"])
 def test_a_type_reads_its_symbols(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "cloth.yaml").write_text(CLOTH)
     sensor = sensor_type_named(name)
     spec = {
         "name": "Box",
@@ -35,32 +44,3 @@ def test_a_type_reads_its_symbols(name, tmp_path, monkeypatch, capsys):
     T = answer["T_face_probe"]
     assert math.hypot(T[0][3] - 42, T[1][3] - 38) < 0.15
     assert math.degrees(math.atan2(T[1][0], T[0][0])) == pytest.approx(31, abs=0.6)
-
-
-def test_a_type_of_unequal_pitches_is_read(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "cloth.yaml").write_text(
-        "name: cloth\nrows: 14\ncolumns: 20\npitch: 1.5 mm\nrow_pitch: 2.1 mm\n"
-        "overlay: {tip: 1.2 mm}\n"
-    )
-    spec = {"name": "Box", "shape": {"box": ["90 mm", "80 mm", "70 mm"]}}
-    encode(spec | {"sensor_type": str(tmp_path / "cloth.yaml")}, database="lab.db", formats=())
-    touch = [
-        "simulate",
-        "lab.db#Box/F1",
-        "--x",
-        "42",
-        "--y",
-        "38",
-        "--theta",
-        "31",
-        "--force",
-        "90",
-    ]
-    assert probe_sensor([*touch, "--sensor-type", "cloth.yaml", "-o", "touch.h5"]) == 0
-    capsys.readouterr()
-    assert recognize_object(["touch.h5", "--json"]) == 0
-    (answer,) = json.loads(capsys.readouterr().out)
-    assert (answer["object"], answer["face"]) == ("Box", "F1")
-    T = answer["T_face_probe"]
-    assert math.hypot(T[0][3] - 42, T[1][3] - 38) < 0.1

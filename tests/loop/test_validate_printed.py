@@ -20,8 +20,9 @@ TOUCHES = 8
 
 @pytest.fixture(scope="module")
 def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("specs") / "cube.yaml"
-    path.write_text("name: Cube\nshape: {cube: 28 mm}\n")
+    """A tile: its two large faces bear symbols, and are sliced."""
+    path = tmp_path_factory.mktemp("specs") / "tile.yaml"
+    path.write_text("name: Tile\nshape: {box: [28 mm, 28 mm, 10 mm]}\nsymbols: {pitch: 5 mm}\n")
     return path
 
 
@@ -41,7 +42,7 @@ def printed(spec: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_what_the_beads_leave_is_read(printed: Path) -> None:
     results = json.loads((printed / "results.json").read_text())
     said = results["printed"]
-    assert (said["profile"], said["faults"], said["faces"]) == ("fdm-0.4-0.2", "usual", 6)
+    assert (said["profile"], said["faults"], said["faces"]) == ("fdm-0.4-0.2", "usual", 2)
     assert said["not_simulated"] == []
     assert 0.0 < said["moved_rms_mm"] < 0.1
     rows = pq.read_table(printed / "trials.parquet").to_pylist()

@@ -1,5 +1,8 @@
 """A small campaign over kinds that need objects of their own, by faulty sensors."""
 
+from types import SimpleNamespace
+
+from generator.command import run as encode_object
 from recognizer.validation import encoded_set, validate
 from recognizer.validation.campaign import Campaign, series_of
 from recognizer.validation.encoded_set import is_extra
@@ -13,8 +16,13 @@ SET = """objects:
 
 
 def test_a_campaign_over_worlds(tmp_path, monkeypatch):
-    for name, few in (("COPIES", 2), ("SMALL_PITCHES", (3.3,)), ("LAB_OBJECTS", 2)):
-        monkeypatch.setattr(encoded_set, name, few)  # each takes time to make
+    few = {"COPIES": 2, "SMALL_PITCHES": (3.3,), "LAB_OBJECTS": 2, "OTHER_LABS": 1}
+    for name, count in few.items():  # each object takes time to make, as does each process
+        monkeypatch.setattr(encoded_set, name, count)
+    here = SimpleNamespace(
+        run=lambda command, **_: SimpleNamespace(returncode=encode_object(command[3:]))
+    )
+    monkeypatch.setattr(encoded_set, "subprocess", here)
     (tmp_path / "set.yaml").write_text(SET)
     folder = tmp_path / "run"
     result = validate(

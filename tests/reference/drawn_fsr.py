@@ -11,7 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike
 
+from probe.circuit import Electronics, FilmState, read_counts
 from probe.circuit.fsr import BREAK_N, GAIN_S, LEAK_S, SERIES_OHM, Fsr
 
 
@@ -45,7 +48,7 @@ DATASHEET = Spread(
 
 
 def draw_fsr(
-    rng: np.random.Generator,
+    rng: Generator,
     spread: Spread = MEASURED,
     rows: int = 16,
     columns: int = 16,
@@ -81,3 +84,14 @@ def draw_fsr(
         hysteresis=spread.hysteresis,
         drift=spread.drift,
     )
+
+
+def read_sequence(
+    forces_n: ArrayLike, board: Electronics, fsr: Fsr, state: FilmState | None, rng: Generator
+) -> tuple[np.ndarray, FilmState | None]:
+    """Read frames of forces (N, rows, columns) that follow at the board's frame time."""
+    frames = []
+    for force in np.asarray(forces_n):
+        counts, state = read_counts(force, board, fsr, state, rng)
+        frames.append(counts)
+    return np.stack(frames), state

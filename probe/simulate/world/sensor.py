@@ -128,12 +128,8 @@ class LevelSensor:
         The scene is without the faults of its print, whose scale leaves its middle in its place.
         `rng` draws the instance unless it is given, the direction of a slide, the noise.
 
-        Raises
-        ------
-        ContactError
-            The touch has no equilibrium.
-        CircuitError
-            The level does not suit the sensor.
+        Raises `ContactError` if the touch has no equilibrium; `CircuitError` if the level does not
+        suit the sensor.
         """
         level, met = self.level, scene.under(touch)
         instance = self.instance or sample_sensor(self.sensor, rng)
@@ -196,10 +192,7 @@ class LevelSensor:
 def mount(counts: Counts, mounting: str) -> Counts:
     """Return counts as a mounting leaves them.
 
-    Raises
-    ------
-    CircuitError
-        The matrix is not square, and the mounting would give it another shape.
+    Raises `CircuitError` if the matrix is not square, and the mounting would give it another shape.
     """
     found = MOUNTINGS[mounting](counts)
     if found.shape != counts.shape:

@@ -250,10 +250,7 @@ def place_adjacent(
     Returns the place of the second's frame in the first's, and (2,) a place on the first, at most
     `REACH_MM` from the edge, opposite the second's edge.
 
-    Raises
-    ------
-    SurfaceError
-        A face has no edge beyond which nothing of it lies.
+    Raises `SurfaceError` if a face has no edge beyond which nothing of it lies.
     """
     start, along, outward, length = _outer_edge(first, rng)
     other, other_along, _, other_length = _outer_edge(second, rng)

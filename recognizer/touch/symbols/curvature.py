@@ -1,8 +1,8 @@
 """Along which line, and under which radius, a round face lies under the sensor: from forces alone.
 
-Image -> a few bends with a gain each, likeliest first. A plate on a cylinder presses a strip along
-the cylinder's lines; its width gives depth and radius. Forces averaged over about a symbol are
-compared with those of a face with the mean response of symbols all over; every direction under
+Image -> a few curvatures with a gain each, likeliest first. A plate on a cylinder presses a strip
+along the cylinder's lines; its width gives depth and radius. Forces averaged over about a symbol
+are compared with those of a face with the mean response of symbols all over; every direction under
 every registered radius is fitted by depth and slopes at once. Roots of forces have nearly even
 errors. Sensor frame, mm, rad.
 """
@@ -37,18 +37,18 @@ FAINT = 0.03  #: root of a response below which its slope is not trusted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BendGuess:
-    """A possible bend of a touch."""
+class CurvatureGuess:
+    """A possible curvature of a touch."""
 
     bend: Bend  #: in the axes of the sensor, of the face without its symbols
     gain: Array  #: (4,) to begin with
     left: float  #: share of the image that it does not explain
 
 
-def guess_bends(
+def guess_curvatures(
     image: Image, sensor: SensorType, radii_mm: tuple[float, ...], keep: int
-) -> list[BendGuess]:
-    """Return the bends that explain an image best, at most `keep`, no two of them alike.
+) -> list[CurvatureGuess]:
+    """Return the curvatures that explain an image best, at most `keep`, no two of them alike.
 
     `image` is as of a flat face; `radii_mm` are those of the faces that may be touched.
     """
@@ -64,19 +64,19 @@ def guess_bends(
     if not whole > 0:
         return []
     fitted = _fit_gains(image, falls, smooth, seen)
-    found: list[BendGuess] = []
+    found: list[CurvatureGuess] = []
     for b in np.argsort(-fitted.value, kind="stable").tolist():
         if len(found) == keep:
             break
-        if any(_same_bend(bends[b], one.bend, APART_RAD) for one in found):
+        if any(_same_curvature(bends[b], one.bend, APART_RAD) for one in found):
             continue
         scale = 2.0 * math.log(max(float(fitted.scale[b]), 1e-9))
         gain = bounded_gain(np.array([[scale, *fitted.plane[b]]]))[0]
-        found.append(BendGuess(bends[b], gain, -float(fitted.value[b]) / whole))
+        found.append(CurvatureGuess(bends[b], gain, -float(fitted.value[b]) / whole))
     return found
 
 
-def _same_bend(a: Bend, b: Bend, apart: float) -> bool:
+def _same_curvature(a: Bend, b: Bend, apart: float) -> bool:
     turn = math.remainder(a.towards_rad - b.towards_rad, math.pi)
     return a.radius_mm == b.radius_mm and abs(turn) < apart
 
@@ -95,7 +95,7 @@ def _average(image: Image) -> Smooth:
 
 
 class _Strips(NamedTuple):
-    """Planes under b bends, and how well they explain an image."""
+    """Planes under b curvatures, and how well they explain an image."""
 
     plane: Array  # (b, 3) depths
     scale: Array  # (b,) root of the force scale
@@ -105,7 +105,7 @@ class _Strips(NamedTuple):
 
 
 def _fit_gains(image: Image, falls: Array, smooth: Smooth, seen: Array) -> _Strips:
-    """Return the planes under which bends explain an image best."""
+    """Return the planes under which curvatures explain an image best."""
     pressing, basis, ink = image.pressing, image.plane, image.template.ink
 
     def pressed(plane: Array) -> _Strips:

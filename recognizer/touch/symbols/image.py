@@ -212,7 +212,7 @@ def bend_image(
     return replace(
         image,
         points_mm=bend.unrolled_mm(points, symbol),
-        loaded=np.ones_like(image.loaded),  # where it falls away is told by the bend
+        loaded=np.ones_like(image.loaded),  # the curvature says where it falls away
         falls=np.multiply.outer(np.array(shares), bend.raised(symbol).falls_mm(points) / height),
     )
 

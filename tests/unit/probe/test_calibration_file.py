@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 import pytest
-from reference.drawn_fsr import Spread, draw_fsr
+from reference.drawn_fsr import Spread, draw_fsr, read_sequence
 
 from probe.calibration import (
     calibrate_image,
@@ -16,7 +16,7 @@ from probe.calibration import (
     read_calibration,
     write_calibration,
 )
-from probe.circuit import Electronics, read_sequence
+from probe.circuit import Electronics
 from probe.errors import CalibrationError
 
 NONE = np.zeros((16, 16))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference.drawn_fsr import DATASHEET, MEASURED, Spread, draw_fsr
+from reference.drawn_fsr import DATASHEET, MEASURED, Spread, draw_fsr, read_sequence
 
 from probe.calibration import (
     Condition,
@@ -15,7 +15,7 @@ from probe.calibration import (
 )
 from probe.calibration.fit import FittedLaw, fit_laws, law_s, shrink_laws
 from probe.calibration.load import average_frames
-from probe.circuit import Electronics, Noise, fsr_of, read_sequence
+from probe.circuit import Electronics, Noise, fsr_of
 from probe.errors import CalibrationError
 
 BOARD = Electronics()

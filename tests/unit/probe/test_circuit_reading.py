@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference.drawn_fsr import DATASHEET, draw_fsr
+from reference.drawn_fsr import DATASHEET, draw_fsr, read_sequence
 
 from probe.circuit import (
     QUIET,
@@ -14,7 +14,6 @@ from probe.circuit import (
     effective_resistances,
     fsr_of,
     read_counts,
-    read_sequence,
 )
 from probe.circuit.reading import scan_shares, unscan_shares
 from probe.errors import CircuitError
@@ -105,19 +104,6 @@ def test_the_contact_s_noise_does_not_average_out_at_once():
     assert kept == pytest.approx(np.exp(-board.frame_s / 0.05), abs=0.02)
 
 
-def test_a_sequence_is_its_frames_one_after_another():
-    forces = np.stack([pressed(i) for i in range(5)])
-    board, fsr = Electronics(), fsr_of()
-    rng = np.random.default_rng(7)
-    state, single = None, []
-    for force in forces:
-        counts, state = read_counts(force, board, fsr, state, rng)
-        single.append(counts)
-    together, last = read_sequence(forces, board, fsr, None, np.random.default_rng(7))
-    np.testing.assert_array_equal(together, single)
-    np.testing.assert_array_equal(last.age_s, state.age_s)
-
-
 @pytest.mark.parametrize("readout", ["floating", "grounded", "virtual"])
 def test_touches_side_by_side_are_read_as_alone(readout):
     board = Electronics(readout=readout, row_ohm=20.0, column_ohm=50.0, noise=QUIET)
@@ -140,5 +126,3 @@ def test_what_is_refused():
     ):
         with pytest.raises(CircuitError):
             replace(Electronics(), **change)
-    with pytest.raises(CircuitError, match="sequence"):
-        read_sequence(np.zeros((16, 16)), IDEAL, fsr_of(), None, np.random.default_rng(0))

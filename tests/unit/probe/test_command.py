@@ -8,9 +8,10 @@ import sys
 import numpy as np
 import pytest
 from recorded import record
+from reference.drawn_fsr import read_sequence
 
 from probe.calibration import calibration_from, even_load, write_calibration
-from probe.circuit import Electronics, fsr_of, read_sequence
+from probe.circuit import Electronics, fsr_of
 from probe.command import run
 from probe.command.calibrated import board_from, loads_given
 from probe.errors import CalibrationError, CircuitError

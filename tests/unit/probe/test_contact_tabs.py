@@ -8,9 +8,9 @@ from reference.indenters import Formula, half_plane, sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact import tabs as tabs_module
-from probe.contact.contract import Touch, WristStiffness
+from probe.contact.contract import Touch, WristStiffness, heights_under
 from probe.contact.plate import Columns, PlatePose, rest
-from probe.contact.tabs import SKIN, heights_under, tabs, tabs_at_rest, tip_laws
+from probe.contact.tabs import SKIN, tabs, tabs_at_rest, tip_laws
 from probe.contact.tips import NUMBERS, Tips, rings, tip_points
 from probe.errors import ContactError
 from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, RoughSurface, TiltedPlane, Washer

@@ -4,11 +4,12 @@ import re
 
 import numpy as np
 import pytest
+from reference.drawn_fsr import read_sequence
 from rich.console import Console
 
 from probe.calibration import calibration_from, even_load, expected_counts
 from probe.calibration.load import BIAS_FRAMES
-from probe.circuit import Electronics, fsr_of, read_sequence
+from probe.circuit import Electronics, fsr_of
 from probe.client import ClientStatistics
 from probe.command.live import KEYS, render_frame
 from probe.command.live_state import LiveState

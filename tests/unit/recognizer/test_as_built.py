@@ -103,14 +103,6 @@ def test_a_wall_alone_does_not_tell_the_print():
         estimate_print(felt)
 
 
-def test_few_touches_are_refused_with_what_is_needed():
-    felt = [felt_on(print_with(0.98), TOP)] * 9
-    with pytest.raises(AsBuiltError, match=r"9 touches of it were read, 10 are the least") as error:
-        estimate_print(felt)
-    assert error.value.place == "Cube-F1"
-    assert "25-50 touches" in error.value.fix
-
-
 def test_a_printer_is_what_its_parts_are_and_how_far_they_differ():
     spread = np.diag([1e-8, 1e-8, 1e-8, 1e-4])
     one = estimate_printer([print_with(0.99, 0.995, 0.001, covariance=spread)])

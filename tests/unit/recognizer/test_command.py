@@ -9,12 +9,13 @@ import h5py
 import numpy as np
 import pytest
 from PIL import Image
+from reference.drawn_fsr import read_sequence
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.calibration import calibration_from, even_load, write_calibration
-from probe.circuit import Electronics, fsr_of, read_counts, read_sequence
+from probe.circuit import Electronics, fsr_of, read_counts
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import frame_from

@@ -11,7 +11,7 @@ from encoded_objects.base.sensor_type import GEL_IMPRINT_MM, Overlay, SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 from recognizer.touch.hypothesis import Hypothesis, PlaceHypothesis
 from recognizer.touch.lab import EncodedFace
-from recognizer.touch.next_touch import FORCE_N, EarlierTouch, NextLimits, next_limits, propose_next
+from recognizer.touch.next_touch import FORCE_N, NextLimits, next_limits, propose_next
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, TOO_FEW, refusal
 from recognizer.touch.signal import signal_of
@@ -67,16 +67,16 @@ def test_along_a_narrow_face_the_sensor_is_turned_and_keeps_to_the_middle(small)
 def test_what_was_seen_before_is_not_sought_again(small):
     inside = np.full((16, 16), True)
     right = np.array([[x, y, 0.0] for x in (9.0, 18.0) for y in (-20.0, 0.0, 20.0)])
-    before = [EarlierTouch(pose, felt(inside)) for pose in right]
+    before = [(pose, felt(inside)) for pose in right]
     assert step_of(small, inside, earlier=before)[0][0] < -4
-    before = [EarlierTouch(-pose, felt(inside)) for pose in right]
+    before = [(-pose, felt(inside)) for pose in right]
     assert step_of(small, inside, earlier=before)[0][0] > 4
 
 
 def test_what_a_touch_before_did_not_feel_is_no_face(small):
     inside = np.full((16, 16), True)
     for side in (-1, 1):  # there the touch before was loaded on its near side alone
-        before = [EarlierTouch(np.array([14.0 * side, 0.0, 0.0]), felt(side * X < -4))]
+        before = [(np.array([14.0 * side, 0.0, 0.0]), felt(side * X < -4))]
         assert step_of(small, inside, earlier=before)[0][0] * side <= 0
 
 

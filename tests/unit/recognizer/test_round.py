@@ -16,7 +16,7 @@ from probe.contact.press import press
 from probe.surface.face import endless_face
 from recognizer.touch.lab import LEAST_RADIUS_MM, MOST_RADIUS_MM, RADIUS_FACTOR, radii_of
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.curvature import guess_bends
+from recognizer.touch.symbols.curvature import guess_curvatures
 from recognizer.touch.symbols.image import Image, bend_image, image_of_signal, normalize_image
 
 SENSOR = SensorType()
@@ -79,7 +79,7 @@ def test_beside_the_strip_nothing_is_expected():
 def test_forces_tell_along_which_line_a_cylinder_lies(radius, degrees):
     surface = Rolled(radius, math.radians(degrees))
     forces = press(surface, SENSOR, Touch(0, 0, 0, 60.0)).forces_n
-    found = guess_bends(image(forces), SENSOR, (20.0, 40.0, 80.0), 3)
+    found = guess_curvatures(image(forces), SENSOR, (20.0, 40.0, 80.0), 3)
     assert 1 <= len(found) <= 3
     turns = [math.remainder(b.bend.towards_rad - math.radians(degrees), math.pi) for b in found]
     assert min(map(abs, turns)) < math.radians(12)

@@ -16,14 +16,13 @@ import pytest
 
 from generator.errors import PrintError
 from generator.pipeline import encode
-from generator.printed import prints, slicer
+from generator.printed import prints
 from generator.printed.prints import surface_keys, surface_path
 from generator.printed.surface import PrintedSurface, write_surface
 from generator.spec import read_specs
 from probe.errors import SurfaceError
 from probe.simulate import printed
 from probe.simulate.printed import (
-    PartToPrint,
     PrintOptions,
     listing_of,
     printed_scene,
@@ -41,14 +40,16 @@ from recognizer.validation.trial import RIGHT, trial
 OPTIONS = PrintOptions(faults="usual", seed=5)
 
 
-@pytest.fixture(autouse=True)
-def no_slicer(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(printed, "find_slicer", lambda: "none")
-    for module in (printed, prints):
-        monkeypatch.setattr(module, "slicer_version", lambda: "test")
+@pytest.fixture(autouse=True, scope="module")
+def no_slicer():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(printed, "find_slicer", lambda: "none")
+        for module in (printed, prints):
+            patch.setattr(module, "slicer_version", lambda: "test")
+        yield
 
 
-def make(folder: Path, spec: str) -> str:
+def make(folder, spec):
     (folder / "spec.yaml").write_text(spec)
     database = str(folder / "lab.db")
     encode(read_specs([folder / "spec.yaml"]), folder=folder / "parts",
@@ -57,17 +58,17 @@ def make(folder: Path, spec: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def panels(tmp_path_factory: pytest.TempPathFactory) -> str:
+def panels(tmp_path_factory):
     return make(tmp_path_factory.mktemp("panels"), "name: Cube\nshape: {cube: 36 mm}\n")
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> str:
+def whole(tmp_path_factory):
     spec = "name: Cube\nshape: {cube: 36 mm}\nprint: {parts: whole}\n"
     return make(tmp_path_factory.mktemp("whole"), spec)
 
 
-def print_as_designed(part: PartToPrint, database: str, folder: Path, faces: int) -> None:
+def print_as_designed(part, database, folder, faces):
     """Write what the STL says, .1 mm aside, as the print of some of a part's faces."""
     keys = surface_keys(part.job, OPTIONS.plan())
     for face in part.job.faces[:faces]:
@@ -84,21 +85,16 @@ def print_as_designed(part: PartToPrint, database: str, folder: Path, faces: int
 
 
 @pytest.fixture(scope="module")
-def listing(panels: str, tmp_path_factory: pytest.TempPathFactory) -> str:
+def listing(panels, tmp_path_factory):
     """One panel of six, printed."""
     folder = tmp_path_factory.mktemp("run")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(printed, "find_slicer", lambda: "none")
-        for module in (printed, prints):
-            patch.setattr(module, "slicer_version", lambda: "test")
-        part = find_parts(panels)[2]
-        print_as_designed(part, panels, folder / "kept", 1)
-        text = listing_of([part], OPTIONS, folder / "kept", folder)
-    (folder / "printed.json").write_text(text)
+    part = find_parts(panels)[2]
+    print_as_designed(part, panels, folder / "kept", 1)
+    (folder / "printed.json").write_text(listing_of([part], OPTIONS, folder / "kept", folder))
     return str(folder / "printed.json")
 
 
-def test_each_panel_is_printed_for_its_own_face(panels: str) -> None:
+def test_each_panel_is_printed_for_its_own_face(panels):
     parts = find_parts(panels)
     assert [[face.name for face in part.job.faces] for part in parts] == [
         [f"F{k}"] for k in range(1, 7)
@@ -110,7 +106,7 @@ def test_each_panel_is_printed_for_its_own_face(panels: str) -> None:
         assert len(part.job.faces[0].embossing.labels) >= 9
 
 
-def test_of_a_whole_body_what_looks_down_is_not_simulated(whole: str) -> None:
+def test_of_a_whole_body_what_looks_down_is_not_simulated(whole):
     (part,) = find_parts(whole)
     assert part.job.supports
     assert len(part.job.faces) == 5
@@ -121,16 +117,14 @@ def test_of_a_whole_body_what_looks_down_is_not_simulated(whole: str) -> None:
     assert list(values["faces"]["Cube"]) == [face.name for face in part.job.faces]
 
 
-def test_a_body_of_which_nothing_is_seen_is_refused(
-    whole: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_body_of_which_nothing_is_seen_is_refused(whole, monkeypatch):
     monkeypatch.setattr(prints, "is_seen", lambda _T: False)
     with pytest.raises(ValidationError, match="no face of this set") as caught:
         find_parts(whole)
     assert "panels" in caught.value.fix
 
 
-def test_a_print_is_touched_in_the_frame_of_its_face(panels: str, listing: str) -> None:
+def test_a_print_is_touched_in_the_frame_of_its_face(panels, listing):
     scene = printed_scene(listing, panels, "Cube", "F3")
     part = find_parts(panels)[2]
     designed = part_surface(part.job.file, database=panels, face="F3")
@@ -145,7 +139,7 @@ def test_a_print_is_touched_in_the_frame_of_its_face(panels: str, listing: str) 
         printed_scene(listing, panels, "Cube", "F1")
 
 
-def test_a_listing_tells_whether_all_is_there(panels: str, listing: str, tmp_path: Path) -> None:
+def test_a_listing_tells_whether_all_is_there(panels, listing, tmp_path):
     found = read_listing(listing)
     assert found.complete()
     assert found.moved_mm() == [(0.1, 0.0)]
@@ -160,7 +154,7 @@ def test_a_listing_tells_whether_all_is_there(panels: str, listing: str, tmp_pat
             read_listing(str(tmp_path / "bad.json"))
 
 
-def test_a_part_is_left_until_all_its_faces_are_there(whole: str, tmp_path: Path) -> None:
+def test_a_part_is_left_until_all_its_faces_are_there(whole, tmp_path):
     (part,) = find_parts(whole)
     assert part.left(OPTIONS, tmp_path)
     print_as_designed(part, whole, tmp_path, 1)
@@ -170,7 +164,7 @@ def test_a_part_is_left_until_all_its_faces_are_there(whole: str, tmp_path: Path
     assert part.left(replace(OPTIONS, seed=6), tmp_path)
 
 
-def test_touches_of_prints_are_of_printed_faces_and_right(panels: str, listing: str) -> None:
+def test_touches_of_prints_are_of_printed_faces_and_right(panels, listing):
     reader = Reader(open_lab(panels))
     plan = TouchPlan(panels, 3, "typical", files=True, prints=listing)
     found = [trial(plan, number, reader) for number in range(4)]
@@ -182,7 +176,7 @@ def test_touches_of_prints_are_of_printed_faces_and_right(panels: str, listing: 
     )
 
 
-def test_a_print_brings_its_own_faults(panels: str, listing: str) -> None:
+def test_a_print_brings_its_own_faults(panels, listing):
     plan = TouchPlan(panels, level="mismatch")
     assert plan.noise.scale != 0
     level = replace(plan, prints=listing).noise
@@ -190,22 +184,9 @@ def test_a_print_brings_its_own_faults(panels: str, listing: str) -> None:
     assert level.shift_mm == plan.noise.shift_mm > 0
 
 
-def test_other_faces_than_those_of_the_lab_are_refused(
-    panels: str, listing: str, tmp_path: Path
-) -> None:
+def test_other_faces_than_those_of_the_lab_are_refused(panels, listing, tmp_path):
     values = json.loads(Path(listing).read_text())
     (tmp_path / "other.json").write_text(json.dumps(values | {"faces": {"Ball": {"F1": "a"}}}))
     reader = Reader(open_lab(panels))
     with pytest.raises(ValidationError, match="no face for touches of kind face was printed"):
         draw_touch(TouchPlan(panels, prints=str(tmp_path / "other.json")), 0, reader)
-
-
-def test_options_are_read_before_anything_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.undo()
-    with pytest.raises(PrintError, match="unknown fault"):
-        PrintOptions(faults="worse").plan()
-    with pytest.raises(PrintError, match="unknown print profile"):
-        PrintOptions(profile="worse").plan()
-    monkeypatch.setattr(slicer.shutil, "which", lambda _name: None)
-    with pytest.raises(PrintError, match="not installed"):
-        PrintOptions().plan()
