@@ -34,7 +34,7 @@ _FAR = 7.0  #: nats below the best: no candidate (odds of 1 to 1,100)
 _VALUES = 1 << 18  #: log-likelihoods held at a time
 _WINDOWS = 1 << 10  #: windows weighed at a time
 
-Weighed = tuple[Ranked, NDArray[np.uint8], NDArray[np.float64]]
+Weighed = tuple[Ranked, NDArray[np.uint8], NDArray[np.float64], int]
 
 
 class Likelihood:
@@ -137,7 +137,7 @@ def decode_likelihood(
 
 
 def _weigh(decoder: Likelihood, scores: Scores, number: int) -> Weighed:
-    """Return the best places, their rotation (N, K), and the doubt (N,)."""
+    """Return the best places, their rotation (N, K), the doubt (N,), and how many were weighed."""
     parts, places = [], 0
     for turn in decoder.rotations:
         turned = np.rot90(scores, turn, axes=(1, 2))
@@ -146,7 +146,7 @@ def _weigh(decoder: Likelihood, scores: Scores, number: int) -> Weighed:
         block = max(1, min(_WINDOWS, _VALUES // ranking.work))
         starts = range(0, max(1, len(scores)), block)
         chunks = [ranking.rank(flat[start : start + block], number) for start in starts]
-        parts.append(chunks[0] if len(chunks) == 1 else concatenate(chunks))
+        parts.append(concatenate(chunks))
         places += ranking.size
     best, source = best_of_all(parts, number) if len(parts) > 1 else (parts[0], None)
     rotations = np.array(decoder.rotations, dtype=np.uint8)
@@ -155,11 +155,11 @@ def _weigh(decoder: Likelihood, scores: Scores, number: int) -> Weighed:
     odds = decoder.blank / (1 - decoder.blank) * places
     nothing = odds * np.exp((unrelated_score(flat) - best.values[:, 0]).clip(max=100.0))
     others = np.where(np.isfinite(best.values[:, 0]), best.rest + nothing, 1e30)
-    return best, turns, others / (1 + others)
+    return best, turns, others / (1 + others), places
 
 
 def _answers(decoder: Likelihood, scores: Scores, weighed: Weighed, top: int) -> Decodings:
-    best, turns, doubts = weighed
+    best, turns, doubts, _ = weighed
     array = decoder.array
     reasons = np.where(doubts > decoder.doubt, Reason.AMBIGUOUS, Reason.NONE).astype(np.uint8)
     listed = {i: _candidates(best, turns, i) for i in range(len(scores))} if top else {}
@@ -195,12 +195,9 @@ def _why(
     decoder: Likelihood, scores: Scores, weighed: Weighed, refused: NDArray[np.intp]
 ) -> NDArray[np.uint8]:
     """Tell too few symbols from a tie, and a tie from a surface without code."""
-    best = weighed[0]
+    best, _, _, places = weighed
     flat = scores.reshape(len(scores), -1, scores.shape[3])
     likely = best.values[refused, 0] + np.log1p(best.rest[refused])
-    a, b = scores.shape[1:3]
-    shapes = [(b, a) if turn % 2 else (a, b) for turn in decoder.rotations]
-    places = sum(decoder.ranking(shape).size for shape in shapes)
     odds = decoder.blank / (1 - decoder.blank) * places
     without = likely < unrelated_score(flat) + np.log(max(odds, np.finfo(float).tiny))
     reasons = np.where(without, Reason.NOT_ENCODED, Reason.AMBIGUOUS)

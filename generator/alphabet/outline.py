@@ -13,8 +13,10 @@ name the lines, and vertices are their intersections.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,18 +26,9 @@ from generator.alphabet.strokes import Glyph
 from generator.errors import AlphabetError
 from generator.plane.polygon import edges_cross, keeps_edges, signed_area
 
-
-@dataclass(frozen=True, slots=True)
-class OutlineSettings:
-    """What an outline may have, and what a printer needs of it."""
-
-    shortest_edge: float = 0.01  #: of the stroke: an edge shorter than this is refused as collapsed
-    least_chamfer_mm: float = 0.01  #: a smaller one cannot be seen, and its sides would be slivers
-    foot_margin: float = 0.005  #: of the pitch: free around the footprint, for triangulation
-
-
-OUTLINE = OutlineSettings()
-
+SHORTEST_EDGE = 0.01  #: of the stroke: an edge shorter than this is refused as collapsed
+LEAST_CHAMFER_MM = 0.01  #: a smaller one cannot be seen, and its sides would be slivers
+FOOT_MARGIN = 0.005  #: of the pitch: free around the footprint, for triangulation
 
 Lines = NDArray[np.float64]  # (k, 3): unit normal out of the material, and offset in mm
 
@@ -164,8 +157,7 @@ def outline(glyph: Glyph, unit_mm: float, style: SymbolStyle, *, place: str = ""
     lines = _stroke_lines(glyph, unit_mm, style.stroke_mm, place)
     steps = _steps(style)
     if _regular(lines, [d for _, d in steps], style.stroke_mm):
-        rings = tuple(tuple(_read_only(offset_ring(ring, d)) for ring in lines) for _, d in steps)
-        return Tiers(tuple(z for z, _ in steps), rings)
+        return _tiers(lines, steps)
     raise _collapse(glyph, unit_mm, style, place)
 
 
@@ -182,10 +174,15 @@ def engrave(glyph: Glyph, unit_mm: float, stroke_mm: float, depth_mm: float) -> 
             f"'{glyph.name}' collapses: stroke {stroke_mm:g} mm, depth {depth_mm:g} mm",
             fix=f"engrave less than {0.45 * stroke_mm:.2g} mm deep, or use larger figures",
         )
-    rings = tuple(
-        tuple(_read_only(offset_ring(ring, d)) for ring in lines) for d in (0.0, -depth_mm)
-    )
-    return Tiers((0.0, -depth_mm), rings)
+    return _tiers(lines, [(0.0, 0.0), (-depth_mm, -depth_mm)])
+
+
+def _tiers(lines: list[Lines], steps: Sequence[tuple[float, float]]) -> Tiers:
+    """Return the read-only rings at heights, each so far (mm) outside the lines."""
+    rings = tuple(tuple(offset_ring(ring, out) for ring in lines) for _, out in steps)
+    for ring in chain.from_iterable(rings):
+        ring.setflags(write=False)
+    return Tiers(tuple(z for z, _ in steps), rings)
 
 
 def foot_half_mm(tiers: Tiers) -> float:
@@ -200,11 +197,11 @@ def footprint_half_mm(alphabet: Alphabet, style: SymbolStyle) -> float:
     `AlphabetError` if neighbouring symbols would touch, or as `outline` does.
     """
     half = max(foot_half_mm(tiers) for tiers in outlines(alphabet, style))
-    half += OUTLINE.foot_margin * style.pitch_mm
+    half += FOOT_MARGIN * style.pitch_mm
     if half < style.pitch_mm / 2:
         return half
     solid = style.stroke_mm / 2 + style.draft_mm
-    free = 0.5 - alphabet.reach - OUTLINE.foot_margin
+    free = 0.5 - alphabet.reach - FOOT_MARGIN
     fix = f"set pitch to {math.ceil(solid / free * 100) / 100 + 0.01:g} mm or more"
     if free * style.pitch_mm > style.draft_mm:
         widest = 2 * (free * style.pitch_mm - style.draft_mm)
@@ -243,10 +240,10 @@ def _check_numbers(style: SymbolStyle, place: str) -> None:
             place=place,
         )
     most = 0.9 * style.height_mm
-    if style.chamfer_mm and not OUTLINE.least_chamfer_mm <= style.chamfer_mm <= most:
+    if style.chamfer_mm and not LEAST_CHAMFER_MM <= style.chamfer_mm <= most:
         raise AlphabetError(
             f"chamfer {style.chamfer_mm:g} mm on symbols {style.height_mm:g} mm high",
-            fix=f"set chamfer to 0, or between {OUTLINE.least_chamfer_mm:g} and {most:.2g} mm",
+            fix=f"set chamfer to 0, or between {LEAST_CHAMFER_MM:g} and {most:.2g} mm",
             place=place,
         )
 
@@ -275,7 +272,7 @@ def _regular(lines: list[Lines], distances: list[float], stroke_mm: float) -> bo
     normal = [offset_ring(ring, 0.0) for ring in lines]
     for distance in distances:
         rings = [offset_ring(ring, distance) for ring in lines]
-        short = OUTLINE.shortest_edge * stroke_mm
+        short = SHORTEST_EDGE * stroke_mm
         if not all(keeps_edges(a, b, short) for a, b in zip(normal, rings, strict=True)):
             return False
         if edges_cross(rings):
@@ -315,8 +312,3 @@ def _collapse(glyph: Glyph, unit_mm: float, style: SymbolStyle, place: str) -> A
     if not ways:
         ways.append("pitch to more, or height to less")
     return AlphabetError(cause, fix="set " + ", or ".join(ways), place=place)
-
-
-def _read_only(ring: Ring) -> Ring:
-    ring.setflags(write=False)
-    return ring

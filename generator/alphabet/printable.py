@@ -9,7 +9,6 @@ tops of two strokes, which may be narrower, because one that half closes costs c
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -114,36 +113,15 @@ def _ways_out(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> str:
             for tiers in outlines(alphabet, trial)
         )
 
-    def stroke(steps: int) -> SymbolStyle:
-        return replace(style, stroke_mm=round(style.stroke_mm + steps * 0.05 * style.stroke_mm, 2))
-
-    def pitch(steps: int) -> SymbolStyle:
-        return replace(style, pitch_mm=round(style.pitch_mm + steps * 0.05 * style.pitch_mm, 2))
-
-    ways = [
-        f"{name} to {value:g} mm"
-        for name, value in (
-            ("stroke", _first(passes, stroke, -1, "stroke_mm")),
-            ("stroke", _first(passes, stroke, 1, "stroke_mm")),
-            ("pitch", _first(passes, pitch, 1, "pitch_mm")),
-        )
-        if value is not None
-    ]
+    ways = []
+    for name, direction in (("stroke", -1), ("stroke", 1), ("pitch", 1)):
+        field = f"{name}_mm"
+        given = getattr(style, field)
+        for steps in range(1, 16):  # of 5 %
+            value = round(given + direction * steps * 0.05 * given, 2)
+            if value <= 0:
+                break
+            if passes(replace(style, **{field: value})):
+                ways.append(f"{name} to {value:g} mm")
+                break
     return "set " + ", or ".join(ways) if ways else "set draft or height to less, or pitch to more"
-
-
-def _first(
-    passes: Callable[[SymbolStyle], bool],
-    trial: Callable[[int], SymbolStyle],
-    direction: int,
-    value: str,
-) -> float | None:
-    """Return the first of up to 15 trials, 5 % apart, in one direction that passes."""
-    for steps in range(1, 16):
-        style = trial(direction * steps)
-        found = float(getattr(style, value))
-        if found <= 0:
-            return None
-        if passes(style):
-            return found
-    return None

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from generator.array.contract import SymbolArray
+from generator.array.contract import SymbolArray, on_torus
 
 Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  #: rows (n,) and columns (n,)
 Tiles = dict[tuple[int, int], NDArray[np.uint8]]  #: (TILE TILE / 8,) bits each
@@ -94,8 +94,8 @@ class Occupancy:
     def _changed(self, rows: ArrayLike, columns: ArrayLike, *, taken: bool) -> Occupancy:
         tiles, used = dict(self.tiles), self.used
         empty = np.zeros(TILE * TILE // 8, np.uint8)
-        cells = on_torus(np.asarray(rows), self.rows), on_torus(np.asarray(columns), self.columns)
-        for at, bits in tiles_of(*cells).items():
+        r, c = on_torus(rows, self.rows).ravel(), on_torus(columns, self.columns).ravel()
+        for at, bits in tiles_of(r.astype(np.int64), c.astype(np.int64)).items():
             before = tiles.get(at, empty)
             after = before | bits if taken else before & ~bits
             used += int(np.bitwise_count(after).sum()) - int(np.bitwise_count(before).sum())
@@ -143,10 +143,3 @@ def cells_of_tiles(tiles: Mapping[tuple[int, int], NDArray[np.uint8]]) -> Cells:
         found.append((r + tile_row * TILE, first[c // TILE] + c % TILE))
     rows, columns = zip(*found, strict=True)
     return np.concatenate(rows), np.concatenate(columns)
-
-
-def on_torus(values: NDArray[np.int64], size: int) -> NDArray[np.int64]:
-    """Return values modulo a size, which may be too large for the array's own arithmetic."""
-    if size > np.iinfo(np.int64).max:
-        values = values.astype(object)
-    return np.mod(values, size).astype(np.int64).ravel()

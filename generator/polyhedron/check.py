@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +39,7 @@ Users = dict[tuple[int, int], list[tuple[int, bool]]]  # edge -> (face, runs upw
 LISTED = 8  #: problems spelled out in one message
 
 
-@dataclass(frozen=True, slots=True)
-class FaceProblem:
+class FaceProblem(NamedTuple):
     """One thing that is wrong, where, and what to do about it."""
 
     place: str  #: name of a face, or "" for the solid as a whole
@@ -98,46 +98,36 @@ def face_axes(vertices: Vertices, loops: Loops) -> tuple[Vertices, Vertices, Ver
     return plane_axes(area_vector(outer), outer[1] - outer[0])
 
 
-def euler_characteristic(vertices: int, edges: int, faces: Sequence[Loops]) -> int:
-    """Return V - E + F - (loops - faces): 2 (shells - genus) of a closed solid."""
-    return vertices - edges + 2 * len(faces) - sum(map(len, faces))
+def flat_loops(
+    vertices: Vertices, loops: Loops, x: Vertices, y: Vertices, *points: Vertices
+) -> tuple[Vertices, ...]:
+    """Return the loops of a face, (k, 2) each, and then sets of points (n, 3), in its frame."""
+    origin, axes = vertices[loops[0][0]], np.stack([x, y], axis=1)
+    sets = [vertices[list(loop)] for loop in loops] + list(points)
+    return tuple((own - origin) @ axes for own in sets)
 
 
 def number_problems(surface: Surface) -> list[FaceProblem]:
     """Return what is wrong with counts, coordinates and indices; the rest needs these right."""
     vertices, problems = surface.vertices, []
-    if len(vertices) < 4 or len(surface.faces) < 4:
-        problems.append(
-            FaceProblem(
-                "",
-                f"{len(vertices)} vertices and {len(surface.faces)} faces: a solid has at least "
-                "4 of each",
-                "give every vertex and every face",
-            )
-        )
+    count = len(vertices)
+    if count < 4 or len(surface.faces) < 4:
+        cause = f"{count} vertices and {len(surface.faces)} faces: a solid has at least 4 of each"
+        problems.append(FaceProblem("", cause, "give every vertex and every face"))
     for number in np.flatnonzero(~np.isfinite(vertices).all(axis=1)):
-        problems.append(
-            FaceProblem(
-                "", f"vertex {number} is not a point: {vertices[number]}", "give three lengths"
-            )
-        )
+        cause = f"vertex {number} is not a point: {vertices[number]}"
+        problems.append(FaceProblem("", cause, "give three lengths"))
+    few = "list at least 3 vertices"
     for name, loops in zip(surface.names, surface.faces, strict=True):
         if not loops:
-            problems.append(FaceProblem(name, "it has no vertices", "list at least 3 vertices"))
+            problems.append(FaceProblem(name, "it has no vertices", few))
         for loop in loops:
-            outside = [v for v in loop if not 0 <= v < len(vertices)]
+            outside = [v for v in loop if not 0 <= v < count]
             if outside:
-                problems.append(
-                    FaceProblem(
-                        name,
-                        f"there is no vertex {outside[0]}; they are 0 to {len(vertices) - 1}",
-                        "count vertices from 0",
-                    )
-                )
+                cause = f"there is no vertex {outside[0]}; they are 0 to {count - 1}"
+                problems.append(FaceProblem(name, cause, "count vertices from 0"))
             elif len(loop) < 3:
-                problems.append(
-                    FaceProblem(name, f"a loop of {len(loop)} vertices", "list at least 3 vertices")
-                )
+                problems.append(FaceProblem(name, f"a loop of {len(loop)} vertices", few))
     return problems
 
 
@@ -147,9 +137,19 @@ def edge_problems(surface: Surface) -> list[FaceProblem]:
     for face, loops in enumerate(surface.faces):
         for a, b in directed_edges(loops):
             users[min(a, b), max(a, b)].append((face, a < b))
-    problems = [
-        _edge_problem(surface, edge, faces) for edge, faces in users.items() if len(faces) != 2
-    ]
+    problems = []
+    for (a, b), found in users.items():
+        if len(found) == 2:
+            continue
+        names = [surface.names[face] for face, _ in found]
+        where = f"the edge between {surface.vertex(a)} and {surface.vertex(b)}"
+        if len(found) == 1:
+            cause, fix = f"open: {where} has no second face", "add the face that is missing"
+            problems.append(FaceProblem(names[0], cause, fix))
+        else:
+            joined = f"{len(found)} faces ({', '.join(names)})"
+            cause = f"{where} joins {joined}; a solid has 2 at each edge"
+            problems.append(FaceProblem(names[0], cause, "separate them there, or leave one out"))
     problems += [
         FaceProblem("", f"{surface.vertex(int(v))} belongs to no face", "remove it, or use it")
         for v in np.setdiff1d(np.arange(len(surface.vertices)), np.unique(list(users)))
@@ -158,20 +158,6 @@ def edge_problems(surface: Surface) -> list[FaceProblem]:
         return problems
     problems = _orientation_problems(surface, users)
     return problems or _fan_problems(surface) or _shell_problems(surface, users)
-
-
-def _edge_problem(
-    surface: Surface, edge: tuple[int, int], users: list[tuple[int, bool]]
-) -> FaceProblem:
-    a, b = edge
-    names = [surface.names[face] for face, _ in users]
-    where = f"the edge between {surface.vertex(a)} and {surface.vertex(b)}"
-    if len(users) == 1:
-        return FaceProblem(
-            names[0], f"open: {where} has no second face", "add the face that is missing"
-        )
-    cause = f"{where} joins {len(users)} faces ({', '.join(names)}); a solid has 2 at each edge"
-    return FaceProblem(names[0], cause, "separate them there, or leave one out")
 
 
 def _orientation_problems(surface: Surface, users: Users) -> list[FaceProblem]:
@@ -264,55 +250,38 @@ def crossing_problems(surface: Surface) -> list[FaceProblem]:
     tolerance = CLOSENESS * surface.size
     vertices, problems = surface.vertices, []
     edges = np.array(sorted({(min(e), max(e)) for f in surface.faces for e in directed_edges(f)}))
+    move = "move it away, or join the faces there"
     for name, loops in zip(surface.names, surface.faces, strict=True):
         own = np.zeros(len(vertices), dtype=bool)
         own[[v for loop in loops for v in loop]] = True
-        origin = vertices[loops[0][0]]
+        sides = {(min(edge), max(edge)) for edge in directed_edges(loops)}
         x, y, z = face_axes(vertices, loops)
-        problems += _chord_problems(surface, name, loops, edges[own[edges].all(axis=1)])
-        height = (vertices - origin) @ z
+        chords = [(v, w) for v, w in edges[own[edges].all(axis=1)].tolist() if (v, w) not in sides]
+        if chords:  # edges of other faces between two vertices of this one
+            middle = vertices[np.array(chords)].mean(axis=1)
+            *polygon, middle = flat_loops(vertices, loops, x, y, middle)
+            for v, w in np.array(chords)[side_of_polygon(polygon, middle) > 0]:
+                cause = f"the edge between vertices {v} and {w} of other faces lies on it"
+                problems.append(FaceProblem(name, cause, move))
+        height = (vertices - vertices[loops[0][0]]) @ z
         height[own] = 0.0
         if height.max() <= tolerance and not (np.abs(height[~own]) <= tolerance).any():
-            continue
-        axes = np.stack([x, y], axis=1)
-        polygon = [(vertices[list(loop)] - origin) @ axes for loop in loops]
+            continue  # of a convex solid no vertex is in front of any face
         touching = np.flatnonzero(~own & (np.abs(height) <= tolerance))
-        for v in touching[
-            _in_widened_polygon(polygon, (vertices[touching] - origin) @ axes, tolerance)
-        ]:
-            cause = f"{surface.vertex(int(v))} of another face lies on it"
-            problems.append(FaceProblem(name, cause, "move it away, or join the faces there"))
         a, b = height[edges[:, 0]], height[edges[:, 1]]
         cut = np.flatnonzero((np.minimum(a, b) < -tolerance) & (np.maximum(a, b) > tolerance))
         t = a[cut] / (a[cut] - b[cut])
         start, end = vertices[edges[cut, 0]], vertices[edges[cut, 1]]
         point = start + t[:, None] * (end - start)
-        for k in np.flatnonzero(_in_widened_polygon(polygon, (point - origin) @ axes, tolerance)):
+        *polygon, near, through = flat_loops(vertices, loops, x, y, vertices[touching], point)
+        for v in touching[_in_widened_polygon(polygon, near, tolerance)]:
+            cause = f"{surface.vertex(int(v))} of another face lies on it"
+            problems.append(FaceProblem(name, cause, move))
+        for k in np.flatnonzero(_in_widened_polygon(polygon, through, tolerance)):
             v, w = edges[cut[k]]
             cause = f"the edge between vertices {v} and {w} runs through it at {_point(point[k])}"
             problems.append(FaceProblem(name, cause, "a solid must not cut through itself"))
     return problems
-
-
-def _chord_problems(
-    surface: Surface, name: str, loops: Loops, joined: NDArray[np.intp]
-) -> list[FaceProblem]:
-    """Find edges of other faces between two vertices of this one that lie on it."""
-    own = {(min(edge), max(edge)) for edge in directed_edges(loops)}
-    chords = [(int(v), int(w)) for v, w in joined if (v, w) not in own]
-    if not chords:
-        return []
-    origin = surface.vertices[loops[0][0]]
-    axes = np.stack(face_axes(surface.vertices, loops)[:2], axis=1)
-    polygon = [(surface.vertices[list(loop)] - origin) @ axes for loop in loops]
-    middle = surface.vertices[np.array(chords)].mean(axis=1)
-    inside = side_of_polygon(polygon, (middle - origin) @ axes) > 0
-    fix = "move it away, or join the faces there"
-    return [
-        FaceProblem(name, f"the edge between vertices {v} and {w} of other faces lies on it", fix)
-        for (v, w), hit in zip(chords, inside, strict=True)
-        if hit
-    ]
 
 
 def _duplicate_vertices(surface: Surface, tolerance: float) -> list[FaceProblem]:
@@ -337,96 +306,71 @@ def _loop_problems(
     for loop in loops:
         if len(set(loop)) < len(loop):
             twice = next(v for k, v in enumerate(loop) if v in loop[:k])
-            return [
-                FaceProblem(
-                    name,
-                    f"its loop visits {surface.vertex(twice)} twice",
-                    "a loop must not touch itself; split the face there",
-                )
-            ]
+            cause = f"its loop visits {surface.vertex(twice)} twice"
+            fix = "a loop must not touch itself; split the face there"
+            return [FaceProblem(name, cause, fix)]
     vertices = surface.vertices
     outer = vertices[list(loops[0])]
     normal = area_vector(outer)
     area = float(np.sqrt(normal @ normal))
     longest = float(np.sqrt(((np.roll(outer, -1, axis=0) - outer) ** 2).sum(axis=1).max()))
-    if area <= longest * tolerance:
-        return [_no_area(name, outer, area, tolerance)]
-    x, y, z = plane_axes(normal, outer[1] - outer[0])
+    order = "list its vertices in the order in which the edge runs"
+    if area <= longest * tolerance:  # a loop that crosses itself, or a sliver
+        spread = np.linalg.svd(outer - outer.mean(axis=0), compute_uv=False)
+        if spread[1] > tolerance:
+            cause = f"its loop crosses itself: the parts of its area cancel to {area:.2g} mm^2"
+            return [FaceProblem(name, cause, order)]
+        fix = "remove it and join its neighbours, or correct its vertices"
+        return [FaceProblem(name, f"its area is {area:.2g} mm^2: a line, not a face", fix)]
     every = [v for loop in loops for v in loop]
+    x, y, z = face_axes(vertices, loops)
     height = (vertices[every] - outer.mean(axis=0)) @ z
     worst = int(np.abs(height).argmax())
     allowed = PLANARITY * surface.size
     if abs(height[worst]) > allowed:
-        return [
-            FaceProblem(
-                name,
-                f"not planar: its vertices lie up to {abs(height[worst]):.3g} mm off their plane, "
-                f"{allowed:.2g} mm is allowed; the farthest is {surface.vertex(every[worst])}",
-                "correct the coordinates or split the face into triangles",
-            )
-        ]
-    axes = np.stack([x, y], axis=1)
-    polygon = [(vertices[list(loop)] - outer[0]) @ axes for loop in loops]
+        cause = (
+            f"not planar: its vertices lie up to {abs(height[worst]):.3g} mm off their plane, "
+            f"{allowed:.2g} mm is allowed; the farthest is {surface.vertex(every[worst])}"
+        )
+        fix = "correct the coordinates or split the face into triangles"
+        return [FaceProblem(name, cause, fix)]
+    polygon = flat_loops(vertices, loops, x, y)
     if len(polygon) == 1 and is_convex(polygon[0]):
         return []
     gap, i, j = closest_pair(polygon)
-    if gap <= tolerance:
-        edges = list(directed_edges(loops))
-        cause = (
-            f"its edges {_edge(edges[i])} and {_edge(edges[j])} cross or touch "
-            f"near {_point(vertices[edges[i][0]])}"
-        )
-        return [FaceProblem(name, cause, "list its vertices in the order in which the edge runs")]
-    return _hole_problems(name, polygon)
+    if gap > tolerance:
+        return _hole_problems(name, polygon)
+    edges = list(directed_edges(loops))
+    (a, b), (c, d) = edges[i], edges[j]
+    cause = f"its edges {a}-{b} and {c}-{d} cross or touch near {_point(vertices[a])}"
+    return [FaceProblem(name, cause, order)]
 
 
-def _no_area(name: str, outer: Vertices, area: float, tolerance: float) -> FaceProblem:
-    """Tell a loop that crosses itself from a sliver."""
-    spread = np.linalg.svd(outer - outer.mean(axis=0), compute_uv=False)
-    if spread[1] > tolerance:
-        fix = "list its vertices in the order in which the edge runs"
-        return FaceProblem(
-            name, f"its loop crosses itself: the parts of its area cancel to {area:.2g} mm^2", fix
-        )
-    fix = "remove it and join its neighbours, or correct its vertices"
-    return FaceProblem(name, f"its area is {area:.2g} mm^2: a line, not a face", fix)
-
-
-def _hole_problems(name: str, polygon: list[Vertices]) -> list[FaceProblem]:
+def _hole_problems(name: str, polygon: Sequence[Vertices]) -> list[FaceProblem]:
     problems = []
     for k, hole in enumerate(polygon[1:], start=1):
         others = [loop for i, loop in enumerate(polygon) if i not in (0, k)]
         if side_of_polygon(polygon[:1], hole[:1])[0] < 0:
-            problems.append(
-                FaceProblem(name, f"hole {k} lies outside it", "list the outer loop first")
-            )
+            cause, fix = f"hole {k} lies outside it", "list the outer loop first"
         elif any(side_of_polygon([loop], hole[:1])[0] > 0 for loop in others):
-            problems.append(
-                FaceProblem(name, f"hole {k} lies inside another hole", "make it a face of its own")
-            )
+            cause, fix = f"hole {k} lies inside another hole", "make it a face of its own"
         elif signed_area(hole) > 0:
-            problems.append(
-                FaceProblem(
-                    name,
-                    f"hole {k} runs counter-clockwise where the outer loop does",
-                    "reverse the order of its vertices",
-                )
-            )
+            cause = f"hole {k} runs counter-clockwise where the outer loop does"
+            fix = "reverse the order of its vertices"
+        else:
+            continue
+        problems.append(FaceProblem(name, cause, fix))
     return problems
 
 
 def _in_widened_polygon(
-    polygon: list[Vertices], points: Vertices, tolerance: float
+    polygon: Sequence[Vertices], points: Vertices, tolerance: float
 ) -> NDArray[np.bool_]:
     """Whether points lie in a polygon, its boundary widened by the tolerance."""
     if len(points) == 0:
         return np.zeros(0, dtype=bool)
     inside = side_of_polygon(polygon, points) >= 0
     return inside | (distance(points, polygon) <= tolerance)
-
-
-def _edge(edge: tuple[int, int]) -> str:
-    return f"{edge[0]}-{edge[1]}"
 
 
 def _point(point: Vertices) -> str:

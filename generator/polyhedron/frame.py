@@ -17,7 +17,7 @@ from generator.plane.polygon import (
     signed_area,
     signed_volume,
 )
-from generator.polyhedron.check import face_axes
+from generator.polyhedron.check import face_axes, flat_loops
 from generator.polyhedron.winged import Polyhedron
 
 Matrix = NDArray[np.float64]
@@ -37,9 +37,7 @@ def face_polygon(polyhedron: Polyhedron, face: int) -> tuple[Matrix, ...]:
     """Return the loops of a face in its own frame: (k, 2) mm each, the outer one first."""
     loops = polyhedron.faces[face].loops
     x, y, _ = face_axes(polyhedron.vertices, loops)
-    axes = np.stack([x, y], axis=1)
-    origin = polyhedron.vertices[loops[0][0]]
-    return tuple((polyhedron.vertices[list(loop)] - origin) @ axes for loop in loops)
+    return flat_loops(polyhedron.vertices, loops, x, y)
 
 
 def face_area(polyhedron: Polyhedron, face: int) -> float:

@@ -22,7 +22,6 @@ from generator.polyhedron.check import (
     crossing_problems,
     directed_edges,
     edge_problems,
-    euler_characteristic,
     face_problems,
     number_problems,
     raise_problems,
@@ -112,8 +111,8 @@ class Polyhedron:
     @property
     def euler_characteristic(self) -> int:
         """V - E + F - (loops - faces)."""
-        loops = [face.loops for face in self.faces]
-        return euler_characteristic(len(self.vertices), len(self.edges), loops)
+        loops = sum(len(face.loops) for face in self.faces)
+        return len(self.vertices) - len(self.edges) + 2 * len(self.faces) - loops
 
     @property
     def genus(self) -> int:

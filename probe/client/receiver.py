@@ -74,11 +74,6 @@ class FrameOrder:
         self._step_us = 0.0  # from frame to frame
         self._rebooted = False
 
-    @property
-    def holds(self) -> bool:
-        """Whether a frame waits for its neighbour."""
-        return self._held is not None
-
     def fail(self, length: int) -> None:
         """Note a block of so many bytes that was no packet."""
         self._failed += 1
@@ -199,8 +194,10 @@ class Receiver:
                     self._order.fail(len(block))
                 continue
             self.packets += 1
-            if not isinstance(packet, FramePacket):
-                self._note(packet)
+            if isinstance(packet, IdentPacket):
+                self.ident = packet
+            elif isinstance(packet, StatisticsPacket):
+                self.device = packet
             frame = self._order.take(packet, now_ns)
             if frame is not None:
                 frames.append(self._counted(frame))
@@ -208,7 +205,7 @@ class Receiver:
 
     def settle(self, now_ns: int) -> list[Frame]:
         """Return the frame that waits for a neighbour: the line is silent, none will come."""
-        frame = self._order.settle(now_ns) if self._order.holds else None
+        frame = self._order.settle(now_ns)
         return [] if frame is None else [self._counted(frame)]
 
     @property
@@ -229,12 +226,6 @@ class Receiver:
             reopenings=reopenings,
             overruns=overruns,
         )
-
-    def _note(self, packet: IdentPacket | StatisticsPacket) -> None:
-        if isinstance(packet, IdentPacket):
-            self.ident = packet
-        else:
-            self.device = packet
 
     def _counted(self, frame: Frame) -> Frame:
         self.frames += 1

@@ -1,27 +1,56 @@
 """Images as heat maps and as surfaces that can be turned. Thesis figures 4.9 and 4.10.
 
 Axes are those of the sensor frame (mm, seen through the sensor's back); row 0 lies at the
-top, so at the largest y.
+top, at the largest y. matplotlib draws on `page`, without its pyplot, which takes the user's
+matplotlibrc: the same picture is the same bytes everywhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.plot.canvas import HEAT, in_mm, page
 
+DPI = 100
+HEAT = "inferno"
+_SETTINGS = {"font.family": "DejaVu Sans", "font.size": 9.0, "svg.hashsalt": "probe"}
 UNITS = {"counts": "reading (ADC counts)", "N": "force (N)", "scaled": "reading (scaled)"}
 WIDTH, HEIGHT = 1000, 440  #: px, of each image
 #: left, low, wide and high of heat map, its scale, and the surface: shares of WIDTH and HEIGHT
 _PLACES = ((0.07, 0.13, 0.352, 0.8), (0.437, 0.2, 0.015, 0.66), (0.5, 0.02, 0.49, 0.96))
+
+
+@contextmanager
+def page(path: Path, width_px: int, height_px: int) -> Iterator[Figure]:
+    """Yield a figure of that size; it is written as PNG when the block ends."""
+    defaults = {
+        name: value for name, value in mpl.rcParamsDefault.items() if not name.startswith("backend")
+    }
+    with mpl.rc_context({**defaults, **_SETTINGS}):
+        figure = Figure(figsize=(width_px / DPI, height_px / DPI), dpi=DPI, layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
+        figure.savefig(path, format="png", dpi=DPI, metadata={"Software": None})
+
+
+def in_mm(axes: Axes, title: str) -> None:
+    """Label axes of the sensor frame."""
+    axes.set_title(title)
+    axes.set_xlabel("x (mm)")
+    axes.set_ylabel("y (mm)")
+    axes.set_aspect("equal")
 
 
 def frame_picture(

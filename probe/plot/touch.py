@@ -20,8 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
-from probe.plot.canvas import HEAT, in_mm, page
-from probe.plot.frame import UNITS
+from probe.plot.frame import HEAT, UNITS, in_mm, page
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]

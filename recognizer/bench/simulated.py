@@ -78,7 +78,7 @@ class PressSequence:
         self._sensor = simulated_sensor(sensor, quiet=quiet, frame_s=1 / manner.rate)
         self._rest = np.zeros(sensor.shape)
         self._turn = threading.Condition()
-        self._felt = 0  #: beats so far
+        self._sent = 0  #: beats so far
         self._coming: list[tuple[int, Array]] = []  #: beats to stay at these forces
         self._now = self._rest
 
@@ -108,8 +108,8 @@ class PressSequence:
             raise BenchError(f"a load of {newtons:g} N", fix=f"give 0 to {10 * LARGEST_N:g} N")
         self._play([(1, np.full(self._rest.shape, newtons / self._rest.size))])
         with self._turn:
-            then = self._felt + self._beats(LOADED_S)
-            self._turn.wait_for(lambda: self._felt >= then, UNREAD_S)
+            then = self._sent + self._beats(LOADED_S)
+            self._turn.wait_for(lambda: self._sent >= then, UNREAD_S)
 
     def lift(self) -> None:
         """Lift at once."""
@@ -136,7 +136,7 @@ class PressSequence:
                 self._coming[0] = (left - 1, self._now)
                 if left <= 1:
                     self._coming.pop(0)
-            self._felt += 1
+            self._sent += 1
             self._turn.notify_all()
             return self._now
 

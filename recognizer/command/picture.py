@@ -24,7 +24,7 @@ from generator.alphabet import Alphabet
 from generator.database.read import read_object
 from generator.database.registered import Polyhedron
 from generator.database.transaction import read_transaction
-from probe.plot.canvas import HEAT, in_mm, page
+from probe.plot.frame import HEAT, in_mm, page
 from probe.plot.touch import MARK
 from probe.surface.body import triangulate
 from recognizer.touch.hypothesis import Hypothesis, labels_of

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.tactile_image import TactileImage
+from recognizer.touch.tactile_image import ImageError, TactileImage
 
 Array = NDArray[np.float64]
 
@@ -27,11 +27,18 @@ def subtract_bias(image: TactileImage) -> TactileImage:
     return _replace_values(image, values)
 
 
-def median(image: TactileImage) -> TactileImage:
+def median(image: TactileImage, thinnest_mm: float | None = None) -> TactileImage:
     """Return the median of the 3 x 3 neighbourhood of every sample; edges are repeated.
 
-    It takes spikes away and keeps edges, but erases lines of one sample's width.
+    It takes spikes away and keeps edges, but erases lines of one sample's width: `ImageError` if
+    the thinnest line that must survive, `thinnest_mm`, is not two samples wide.
     """
+    if thinnest_mm is not None and thinnest_mm < 2 * image.step_mm:
+        raise ImageError(
+            f"a 3 x 3 median erases lines of one sample: {thinnest_mm:g} mm are "
+            f"{thinnest_mm / image.step_mm:.2g} samples of {image.step_mm:g} mm",
+            fix="leave the median out, or take it of a finer mosaic",
+        )
     known = np.where(image.defined, image.values, np.nan)
     padded = np.pad(known, 1, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).reshape(*known.shape, 9)

@@ -89,8 +89,8 @@ def _read_array(
     embossed: EmbossedArray, image: TactileImage, T_image_probe: Array, seq: int
 ) -> ClassicalReading:
     style = embossed.style
-    if style.stroke_mm >= 2 * image.step_mm:  # a median erases lines of one sample
-        image = median(image)
+    if style.stroke_mm >= 2 * image.step_mm:
+        image = median(image, style.stroke_mm)
     found = tuple(symbols(image, embossed.alphabet, style))
     window = grid(found, style.pitch_mm)
     if window is None:

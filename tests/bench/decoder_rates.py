@@ -126,7 +126,7 @@ def measured(name, array, shape, damage, number, seed):
                      else max(200, number // 4))  # fmt: skip
         scores = hard_scores(windows[part], array.order)
         start = time.process_time()
-        ranked, _, doubts = _weigh(decoder, scores, 2)
+        ranked, _, doubts, _ = _weigh(decoder, scores, 2)
         spent = (time.process_time() - start) / len(scores) * 1e6
         right = is_at(ranked.rows[:, 0], ranked.columns[:, 0], truth[part])
         single = ranked.values[:, 0] - ranked.values[:, 1] > 1e-3
@@ -226,7 +226,7 @@ def answers(array, mask, number, rng):
                        rng.integers(0, array.columns, number)], axis=1)  # fmt: skip
     windows = damaged(seen(array, mask.shape, places), array.order, (0.05, 0.0), rng)
     scores = hard_scores(np.where(mask, windows, -1), array.order)
-    ranked, _, certain = _weigh(Likelihood(array, blank=0), scores, 2)
+    ranked, _, certain, _ = _weigh(Likelihood(array, blank=0), scores, 2)
     doubts = _weigh(Likelihood(array), scores, 2)[2]
     right = is_at(ranked.rows[:, 0], ranked.columns[:, 0], places)
     given = doubts <= Likelihood(array).doubt

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from itertools import groupby, pairwise
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -95,7 +96,7 @@ def _tessellate(solid: Any, faces: list[Any], kinds: list[str], coarser: float) 
     step, radius = _step(faces, kinds, coarser)
     limits = IMeshTools_Parameters()
     # On circles of cylinders and cones the angle alone may count, so that those of a cone match.
-    limits.Deflection = max(BLANK_ERROR_MM * coarser, 2.0 * _chord_error(radius, step))
+    limits.Deflection = max(BLANK_ERROR_MM * coarser, 2.0 * radius * (1.0 - math.cos(step / 2.0)))
     limits.DeflectionInterior = limits.Deflection
     limits.Angle = 2.0 * step  # which the kernel halves on edges
     limits.AngleInterior = INTERIOR_RAD * math.sqrt(coarser)
@@ -151,10 +152,6 @@ def _step(faces: list[Any], kinds: list[str], coarser: float) -> tuple[float, fl
     fewest = FACETS[0] / math.sqrt(coarser)
     wanted = min(4 * math.ceil(max(steps, fewest) / 4), FACETS[1])
     return 2.0 * math.pi / wanted * (1.0 + 1e-9), max(radii)  # so that a rounding adds no step
-
-
-def _chord_error(radius: float, step: float) -> float:
-    return radius * (1.0 - math.cos(step / 2.0))
 
 
 def _ids(wire: list[tuple[Any, list[int]]]) -> list[int]:
@@ -295,7 +292,7 @@ def _run_of(
     origin = np.array([axis.Location().X(), axis.Location().Y(), axis.Location().Z()])
     ahead = np.array([axis.Direction().X(), axis.Direction().Y(), axis.Direction().Z()])
     where = np.array(points)
-    sides = [_Side.of(numbers, where[numbers] - origin, ahead) for _, numbers in wires[0]]
+    sides = [_side(numbers, where[numbers] - origin, ahead) for _, numbers in wires[0]]
     chains = _two_chains(sides)
     if chains is None:
         return None
@@ -323,25 +320,20 @@ def _run_of(
     }
 
 
-@dataclass(frozen=True, slots=True)
-class _Side:
-    """One edge of a round face."""
+Side = tuple[str, list[int]]  #: circle, line, other; its points, in order around the face
 
-    kind: str  #: circle, line, other
-    numbers: list[int]  #: its points, in order around the face
 
-    @classmethod
-    def of(cls, numbers: list[int], place: Any, ahead: Any) -> _Side:
-        """Return what an edge is; `place` (k, 3) from a point of the axis along `ahead`."""
-        height = place @ ahead
-        radial = place - height[:, None] * ahead
-        radius = np.linalg.norm(radial, axis=1)
-        slack = SAME * max(1.0, float(np.abs(place).max()))
-        if len(numbers) > 2 and np.ptp(height) <= slack and np.ptp(radius) <= slack:
-            return cls("circle", numbers)
-        if len(numbers) == 2 and _is_upright(radial, radius):
-            return cls("line", numbers)
-        return cls("other", numbers)
+def _side(numbers: list[int], place: Any, ahead: Any) -> Side:
+    """Return what an edge of a round face is; `place` (k, 3) from a point of the axis `ahead`."""
+    height = place @ ahead
+    radial = place - height[:, None] * ahead
+    radius = np.linalg.norm(radial, axis=1)
+    slack = SAME * max(1.0, float(np.abs(place).max()))
+    if len(numbers) > 2 and np.ptp(height) <= slack and np.ptp(radius) <= slack:
+        return "circle", numbers
+    if len(numbers) == 2 and _is_upright(radial, radius):
+        return "line", numbers
+    return "other", numbers
 
 
 def _is_upright(radial: Any, radius: Any) -> bool:
@@ -352,25 +344,24 @@ def _is_upright(radial: Any, radius: Any) -> bool:
     return cosine > 1.0 - 1e-9
 
 
-def _two_chains(sides: list[_Side]) -> tuple[list[int], list[int]] | None:
+def _two_chains(sides: list[Side]) -> tuple[list[int], list[int]] | None:
     """Return the points below and above, both to the right; None for another outline.
 
     The outline is circles, a line, circles, a line; or, of a cone up to its tip, circles and two
     lines.
     """
-    starts = [
-        k for k, side in enumerate(sides) if side.kind == "circle" and sides[k - 1].kind == "line"
-    ]
+    kinds = [kind for kind, _ in sides]
+    starts = [k for k, kind in enumerate(kinds) if kind == "circle" and kinds[k - 1] == "line"]
     if not starts:
         return None
     sides = sides[starts[0] :] + sides[: starts[0]]
-    runs = [(kind, list(same)) for kind, same in groupby(sides, key=lambda side: side.kind)]
+    runs = [(kind, [own for _, own in same]) for kind, same in groupby(sides, key=itemgetter(0))]
     shape = [kind if kind == "circle" else f"{len(same)} {kind}" for kind, same in runs]
-    below = _join_chains([side.numbers for side in runs[0][1]])
+    below = _join_chains(runs[0][1])
     if shape == ["circle", "1 line", "circle", "1 line"]:
-        return below, _join_chains([side.numbers for side in runs[2][1]])[::-1]
+        return below, _join_chains(runs[2][1])[::-1]
     if shape == ["circle", "2 line"]:
-        return below, [runs[1][1][0].numbers[-1]]
+        return below, [runs[1][1][0][-1]]
     return None
 
 

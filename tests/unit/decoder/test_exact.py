@@ -67,20 +67,6 @@ def test_logarithm_up_to_2_to_the_64(order, degree):
     assert [(d.row, d.column) for d in found] == cells
 
 
-def test_windows_that_wrap_the_torus_and_arrays_with_one_row():
-    array = PROFILES["thesis"].array()
-    window = windows_at(array, [62], [64], (6, 2))
-    assert [(d.row, d.column) for d in decode_exact(array, window)] == [(62, 64)]
-    line = array_from({"family": "prbs", "order": 2, "degree": 10})
-    assert line.rows == 1
-    for method in METHODS:
-        window = windows_at(line, [0, 0], [1020, 5], (1, 10))
-        assert [(d.row, d.column) for d in decode_exact(line, window, method)] == [
-            (0, 1020),
-            (0, 5),
-        ]
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_all_zero_window_is_no_place(method):
     for name in ("thesis", "one-touch"):

@@ -11,7 +11,6 @@ from reference.polynomials import windows_are_unique
 from generator.array import (
     PROFILES,
     FoldedArray,
-    ProductArray,
     Sequence,
     array_from,
     next_larger,
@@ -191,18 +190,6 @@ def test_product_law_and_sizes():
         array_from({"family": "prpa", "factors": factors, "rows": 16})
     assert array.rank([], []) == 0
     assert array.minimum_distance([0], [0]) == 0
-
-
-def test_large_product_array_is_never_materialised():
-    factors = {"rows": {"degree": 64}, "columns": {"order": 3, "degree": 40}}
-    array = array_from({"family": "prmvpa", "factors": factors})
-    assert isinstance(array, ProductArray)
-    seen = array.symbols(2**63 + np.arange(64, dtype=object)[:, None], np.arange(64) + 10**18)
-    assert seen.shape == (64, 64)
-    pair = array.factors[seen]
-    assert np.array_equal(pair[:, 0, 0], array.row_sequence.symbols([2**63 + k for k in range(64)]))
-    assert array.identifies(*block(64, 40))
-    assert not array.identifies(*block(64, 39))
 
 
 def test_definition_keeps_start_and_field():

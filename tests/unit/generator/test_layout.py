@@ -8,6 +8,7 @@ from generator.errors import LayoutError
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Occupancy
 from generator.layout.placement import CODE_LETTERS, FaceLayout, Layout, Placement, object_code
+from generator.layout.places import array_cells, count_places, count_windows, rank_test
 from generator.polyhedron import shapes
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
@@ -209,3 +210,31 @@ def test_every_cell_has_its_own_code():
     codes = {object_code(layout_at((r, c)), 63, 65) for r in range(63) for c in range(65)}
     assert len(codes) == 63 * 65
     assert "F" not in "".join(codes)
+
+
+def test_rank_test_agrees_with_the_array():
+    array = profile("thesis").array()
+    identifies = rank_test(array)
+    rows, columns = np.mgrid[:6, :2].reshape(2, -1)
+    for _ in range(2):  # the second answer is remembered
+        assert identifies(rows, columns)
+        assert not identifies(rows[:11], columns[:11])
+        assert identifies(columns, rows) == array.identifies(columns, rows)
+
+
+def test_windows_of_masks():
+    mask = np.ones((4, 5), dtype=bool)
+    assert count_windows(mask, (3, 2)) == 2 * 4
+    mask[1, 2] = False
+    assert count_windows(mask, (3, 2)) == 4
+    assert count_windows(mask, (5, 1)) == 0
+    rows, columns = np.nonzero(mask)
+    assert count_places(rows + 7, columns - 9, (3, 2), None) == 4
+
+
+def test_quarter_turns_of_cells_turn_counter_clockwise():
+    cells = np.array([[0, 0], [0, 1], [1, 1]])  # (j up, i right): right, then up
+    rows, columns = array_cells(cells, 0)
+    assert (rows.tolist(), columns.tolist()) == ([0, 0, -1], [0, 1, 1])
+    rows, columns = array_cells(cells, 1)
+    assert (rows.tolist(), columns.tolist()) == ([0, -1, -1], [0, 0, -1])

@@ -58,13 +58,6 @@ def test_the_place_with_most_contact_is_taken():
     assert spot == TorusPosition(6, 4, 0)
 
 
-def test_what_does_not_fit_is_left_and_the_rest_is_placed():
-    spots = place_pieces(
-        torus(6, 6), [(block(7, 1), (0,)), (block(6, 6), (0,)), (block(1, 1), (0,))]
-    )
-    assert spots == [None, TorusPosition(0, 0, 0), None]
-
-
 @pytest.mark.parametrize(("rows", "columns"), [(4095, 4097), (2**32 - 1, 2**32 + 1), (2**63, 5)])
 def test_only_a_corner_of_a_large_array_is_looked_at(rows, columns):
     pieces = [(block(4, 5), TURNS)] * 40
@@ -176,15 +169,6 @@ def test_cells_are_taken_and_freed_one_by_one():
     array = SimpleNamespace(rows=130, columns=150, first=(0, 0))
     assert Occupancy.from_tiles(occupancy.tiles, array).used == len(held)
     assert occupancy.without_cells(rows, columns).tiles == {}
-
-
-def test_more_cells_change_their_own_tiles_alone():
-    before = torus(4095, 4097, cells(0, 0, 640, 640))
-    after = before.with_cells(*cells(60, 640, 8, 8))
-    changed = [at for at in after.tiles if after.tiles[at] is not before.tiles.get(at)]
-    assert sorted(changed) == [(0, 10), (1, 10)]
-    assert before.used == 640**2
-    assert after.used == before.used + 64
 
 
 def test_what_is_opened_of_a_large_array_follows_its_objects():

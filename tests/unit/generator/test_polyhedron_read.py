@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from generator.errors import ShapeError
-from generator.polyhedron import SHAPES, dihedral, face_area, volume
+from generator.polyhedron import SHAPES, volume
 from generator.polyhedron.read import merge, read_shape
 
 SHAPES_FOLDER = Path(__file__).parents[3] / "fixtures" / "shapes"
@@ -51,26 +51,6 @@ def fan(polygon):
 def triangles_of(solid):
     """Triangles of a solid whose faces are convex."""
     return [t for f in solid.faces for t in fan(solid.vertices[list(f.loops[0])])]
-
-
-@pytest.mark.parametrize("name", ["l_bracket.stl", "l_bracket_ascii.stl"])
-def test_l_bracket_with_a_pocket(name):
-    solid = read_shape(SHAPES_FOLDER / name)
-    assert (solid.kind, solid.genus, solid.notes) == ("file", 0, ())
-    assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (20, 30, 13)
-    assert volume(solid) == pytest.approx(94400, rel=1e-12)
-    holed = [k for k, face in enumerate(solid.faces) if len(face.loops) == 2]
-    assert [face_area(solid, k) for k in holed] == [pytest.approx(2400 - 160)]
-    reflex = [k for k in range(30) if dihedral(solid, k) > 3.2]
-    assert len(reflex) == 1 + 4 + 4  # the inner corner; the pocket's floor and its sides
-
-
-def test_cube_with_a_through_hole():
-    solid = read_shape(SHAPES_FOLDER / "cube_with_hole.step")
-    assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (20, 30, 12)
-    assert solid.genus == 1
-    assert volume(solid) == pytest.approx(60**3 - 60 * HEXAGON, rel=1e-12)
-    assert sorted(len(face.loops) for face in solid.faces) == [1] * 10 + [2] * 2
 
 
 def test_unit_of_a_step_file_is_honoured(tmp_path):
@@ -263,25 +243,6 @@ def test_corners_on_other_edges_are_joined(tmp_path):
     assert "not closed" in gap.cause
 
 
-def test_a_slightly_curved_face_stays_blank(tmp_path):
-    # A plate with a bulge of 2 mm over 3000 mm, in steps too small for an edge each.
-    x = np.linspace(0, 3000, 400)
-    top = 2.0 - 2.0 * ((x - 1500) / 1500) ** 2 + 100
-    upper, lower = np.column_stack([x, top]), np.column_stack([x, 0 * x])
-    profile = np.concatenate([lower, upper[::-1]])
-    sides = []
-    for p, q in zip(profile, np.roll(profile, -1, axis=0), strict=True):
-        sides += [((*p, 0), (*q, 0), (*q, 500)), ((*p, 0), (*q, 500), (*p, 500))]
-    caps = []
-    for k in range(399):
-        a, b, c, d = lower[k], lower[k + 1], upper[k + 1], upper[k]
-        caps += [((*a, 500), (*b, 500), (*c, 500)), ((*a, 500), (*c, 500), (*d, 500))]
-        caps += [((*c, 0), (*b, 0), (*a, 0)), ((*d, 0), (*c, 0), (*a, 0))]
-    solid = read_shape(written(tmp_path, "bulge.stl", binary_stl(sides + caps)))
-    assert "1 curved region stays blank" in solid.notes[-1]
-    assert len(solid.faces) - len(solid.blank) == 5
-
-
 def test_step_without_the_kernel_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "OCP", None)  # as if it were not installed
     error = refused(SHAPES_FOLDER / "cube_with_hole.step")
@@ -360,11 +321,3 @@ def test_faces_of_a_file_are_named_with_the_file(tmp_path):
     error = refused(written(tmp_path, "c.stl", binary_stl(found)))
     assert error.place == str(tmp_path / "c.stl")
     assert "face F1: the edge between vertices 4 and 6 runs through it" in error.cause
-
-
-def test_a_solid_that_touches_its_own_face_along_a_line_is_refused(tmp_path):
-    ring = [(0, 0), (60, 0), (60, 60), (30, 0), (0, 60)]
-    found = prism(ring, 40, [(0, 1, 3), (1, 2, 3), (0, 3, 4)])
-    error = refused(written(tmp_path, "c.stl", binary_stl(found)))
-    assert error.place.endswith("face F1")
-    assert "edge between vertices 6 and 7 of other faces lies on it" in error.cause

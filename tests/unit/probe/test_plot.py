@@ -8,8 +8,7 @@ from PIL import Image
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.press import press
-from probe.plot.canvas import HEAT
-from probe.plot.frame import HEIGHT, WIDTH, frame_picture, frames_picture
+from probe.plot.frame import HEAT, HEIGHT, WIDTH, frame_picture, frames_picture
 from probe.plot.touch import MARK, OUTLINE, touch_picture
 from probe.surface.indenters import Washer
 

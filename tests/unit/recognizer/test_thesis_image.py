@@ -1,0 +1,333 @@
+"""The thesis's image: filters, skeletons, symbols, and the grid that they stand on."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from encoded_objects.base.sensor_type import SensorType
+from generator.alphabet import SymbolStyle, alphabet_named
+from recognizer.thesis.filters import magnify_image, median, sobel, subtract_bias
+from recognizer.thesis.grid import grid
+from recognizer.thesis.merge import magnify_samples
+from recognizer.thesis.skeleton import graph, length, points_of_glyph, points_of_skeleton
+from recognizer.thesis.symbols import COUNTS, CUT, Symbol, symbols
+from recognizer.touch.tactile_image import ImageError, tactile_image, touch_image
+
+STEP = 0.4
+PITCH = 12.0
+LABELS = np.array([[0, 1, 1, 0], [1, 1, 0, 0], [0, 1, 0, 1]])
+
+
+# --- filters
+
+
+def noise(seed=0, shape=(16, 16)):
+    return np.random.default_rng(seed).uniform(0, 1, shape)
+
+
+def test_frame_has_x_along_columns_and_y_against_rows():
+    sensor = SensorType()
+    image = touch_image(sensor, noise())
+    assert image.xy_mm(*np.indices((16, 16))) == pytest.approx(sensor.centres_mm(), abs=1e-12)
+    fine = magnify_image(image)
+    assert fine.xy_mm(0, 0) == pytest.approx(image.xy_mm(0, 0))
+    assert fine.xy_mm(60, 60) == pytest.approx(image.xy_mm(15, 15))
+
+
+@pytest.mark.parametrize(
+    ("values", "kwargs", "match"),
+    [
+        (np.zeros(5), {"step_mm": 1}, "shape"),
+        (np.zeros((4, 4)), {"step_mm": 0}, "step"),
+        (np.zeros((4, 4)), {"step_mm": 1, "defined": np.ones((3, 4))}, "mask"),
+        (np.full((4, 4), np.nan), {"step_mm": 1}, r"16 readings.*\(0, 0\)"),
+    ],
+)
+def test_no_image_is_refused(values, kwargs, match):
+    with pytest.raises(ImageError, match=match):
+        tactile_image(values, **kwargs)
+
+
+def test_nan_where_undefined_stays_outside():
+    values, known = noise(), np.ones((16, 16), bool)
+    values[3, 4], known[3, 4] = np.nan, False
+    image = tactile_image(values, step_mm=1.0, defined=known)
+    for made in (subtract_bias(image), median(image), magnify_image(image)):
+        assert np.isfinite(made.values).all()
+    # beside the hole counts what is left
+    assert magnify_image(image).values[12, 19] == pytest.approx(values[3, 5])
+    assert not magnify_image(image).defined[12, 16]
+
+
+def test_bias_is_what_is_read_without_force():
+    image = tactile_image(100 + np.pad(noise(shape=(4, 4)) * 50, 6), step_mm=1.0)
+    over = subtract_bias(image)
+    assert over.values.min() == 0
+    assert over.values[0, 0] == 0
+    assert over.values.max() == pytest.approx(image.values.max() - 100)
+
+
+def test_median_is_that_of_the_neighbourhood():
+    values = noise(1)
+    expected = ndimage.median_filter(values, 3, mode="nearest")
+    assert np.array_equal(median(tactile_image(values, step_mm=1.0)).values, expected)
+
+
+def test_median_over_holes_is_that_of_what_is_known():
+    values, known = noise(2), np.random.default_rng(3).random((16, 16)) > 0.3
+    found = median(tactile_image(values, step_mm=1.0, defined=known)).values
+    padded = np.pad(np.where(known, values, np.nan), 1, mode="edge")
+    for r, c in np.argwhere(known):
+        assert found[r, c] == pytest.approx(np.nanmedian(padded[r : r + 3, c : c + 3]))
+
+
+def test_median_takes_spikes_and_keeps_edges_but_erases_thin_lines():
+    step = np.zeros((16, 16))
+    step[:, 8:] = 1
+    spiked = step.copy()
+    spiked[4, 3] = 9
+    assert np.array_equal(median(tactile_image(spiked, step_mm=1.0)).values, step)
+    line = np.zeros((16, 16))
+    line[:, 8] = 1
+    assert not median(tactile_image(line, step_mm=1.0)).values.any()
+    with pytest.raises(ImageError, match="erases lines"):
+        median(tactile_image(line, step_mm=1.0), thinnest_mm=1.5)
+
+
+def test_magnification_is_the_thesis_convolution():
+    """Zeros between the tactels and H, twice; the last three rows and columns are beyond."""
+    values, h = noise(4), np.outer([0.5, 1.0, 0.5], [0.5, 1.0, 0.5])
+    wanted = values
+    for _ in range(2):
+        wide = np.zeros((2 * len(wanted), 2 * len(wanted)))
+        wide[::2, ::2] = wanted
+        wanted = ndimage.convolve(wide, h, mode="constant")
+    assert magnify_samples(values) == pytest.approx(wanted, abs=1e-12)
+    fine = magnify_image(tactile_image(values, step_mm=1.0))
+    assert fine.values.shape == (61, 61)
+    assert fine.step_mm == 0.25
+    assert fine.values == pytest.approx(wanted[:61, :61], abs=1e-12)
+
+
+def test_sobel_gives_slopes_in_the_image_frame():
+    rows, columns = np.indices((12, 12))
+    image = tactile_image(3 * columns - 5 * rows, step_mm=0.5)
+    x, y = sobel(image)
+    assert x[1:-1, 1:-1] == pytest.approx(np.full((10, 10), 6.0))
+    assert y[1:-1, 1:-1] == pytest.approx(np.full((10, 10), 10.0))
+    values = noise(5)
+    x, y = sobel(tactile_image(values, step_mm=1.0))
+    assert x == pytest.approx(ndimage.sobel(values, axis=1, mode="nearest") / 8)
+    assert y == pytest.approx(-ndimage.sobel(values, axis=0, mode="nearest") / 8)
+
+
+def style(alphabet, pitch=12.0):
+    return SymbolStyle(
+        pitch_mm=pitch, height_mm=1.0, stroke_mm=alphabet.stroke_ratio * pitch, draft_rad=0.17
+    )
+
+
+def drawn(alphabet, placed, size_mm=50.0, pitch=12.0, half_mm=None):
+    """An image of (label, x, y, theta), strokes with soft sides."""
+    n = round(size_mm / STEP)
+    at = (np.arange(n) - (n - 1) / 2) * STEP
+    z = at[None, :] - 1j * at[:, None]
+    half = alphabet.stroke_ratio * pitch / 2 if half_mm is None else half_mm
+    image = np.zeros((n, n))
+    unit = alphabet.reach * pitch
+    for label, x, y, theta in placed:
+        own = (z - complex(x, y)) * np.exp(-1j * theta)
+        for a, b in alphabet.glyphs[label].strokes:
+            p, u = complex(*a) * unit, (complex(*b) - complex(*a)) * unit
+            t = np.clip(((own - p) * u.conjugate()).real / abs(u) ** 2, 0, 1)
+            image = np.maximum(image, np.clip((half + 0.4 - abs(own - p - t * u)) / 0.8, 0, 1))
+    return tactile_image(image, step_mm=STEP)
+
+
+# --- counts -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("thesis-2", [(2, 1, 0), (3, 2, 0)]),  # thesis, figure 6.4
+        ("dense-4", [(2, 1, 0), (3, 3, 0), (3, 2, 0), (2, 2, 0)]),  # figure 6.12
+        ("letters-4", [(2, 1, 0), (3, 3, 0), (3, 2, 0), (2, 2, 0)]),
+    ],
+)
+def test_glyphs_have_the_end_points_and_vertices_of_the_thesis(name, expected):
+    assert [points_of_glyph(glyph).counts for glyph in alphabet_named(name).glyphs] == expected
+
+
+def test_glyphs_of_the_large_alphabet_differ_in_their_counts():
+    counts = [points_of_glyph(glyph).counts for glyph in alphabet_named("dense-8").glyphs]
+    assert len(set(counts)) == 8
+    assert any(loops for _, _, loops in counts)
+
+
+def skeleton(text):
+    return np.array([[c == "#" for c in line] for line in text.split()], bool)
+
+
+T_SHAPE = """
+.........
+.#######.
+....#....
+....#....
+....#....
+....#....
+"""
+
+
+def test_graph_of_a_branching_line():
+    found = graph(skeleton(T_SHAPE))
+    assert sorted(found.degree(node) for node in found.nodes) == [1, 1, 1, 3]
+    assert sum(length(branch.path) for branch in found.branches) == pytest.approx(10, abs=1.5)
+
+
+def test_spurs_are_pruned_and_the_line_runs_through():
+    found = graph(skeleton(T_SHAPE), shortest=4.6)
+    assert len(found.branches) <= 1  # the two arms are shorter than that, the longest stays
+    kept = graph(skeleton("..........\n.########.\n....#.....\n.........."), shortest=2.0)
+    assert len(kept.branches) == 1
+    assert length(kept.branches[0].path) == pytest.approx(7, abs=1)
+
+
+def test_a_ring_is_one_loop_without_ends():
+    ring = skeleton(".....\n..#..\n.#.#.\n..#..\n.....")
+    points = points_of_skeleton(ring, 100.0)
+    assert points.counts == (0, 0, 1)
+
+
+# --- symbols ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["thesis-2", "letters-4"])
+@pytest.mark.parametrize("degrees", [0, 17, 45, 90, 133, 201, 290])
+def test_symbols_are_named_placed_and_turned(name, degrees):
+    alphabet = alphabet_named(name)
+    theta = math.radians(degrees)
+    for label in range(alphabet.order):
+        image = drawn(alphabet, [(label, 1.3, -2.2, theta)], size_mm=24)
+        (found,) = symbols(image, alphabet, style(alphabet))
+        assert found.label == label
+        assert math.hypot(found.x_mm - 1.3, found.y_mm + 2.2) < 0.5
+        assert abs(math.remainder(found.theta_rad - theta, math.tau)) < math.radians(8)
+
+
+def test_no_symbol_is_named_without_one():
+    alphabet = alphabet_named("thesis-2")
+    assert symbols(tactile_image(np.zeros((40, 40)), step_mm=STEP), alphabet, style(alphabet)) == []
+    bar = np.zeros((60, 60))
+    bar[28:32, 10:40] = 1
+    (found,) = symbols(tactile_image(bar, step_mm=STEP), alphabet, style(alphabet))
+    assert (found.label, found.rejected) == (-1, COUNTS)
+
+
+def test_symbols_that_the_image_cuts_are_rejected():
+    alphabet = alphabet_named("thesis-2")
+    image = drawn(alphabet, [(0, 10.5, 0, 0.0)], size_mm=24)
+    (found,) = symbols(image, alphabet, style(alphabet))
+    assert (found.label, found.rejected) == (-1, CUT)
+
+
+def test_right_counts_in_the_wrong_shape_are_rejected():
+    alphabet = alphabet_named("letters-4")
+    wide = drawn(alphabet, [(0, 0, 0, 0.0)], size_mm=40, pitch=22.0, half_mm=0.9)
+    (found,) = symbols(wide, alphabet, style(alphabet))
+    assert (found.label, found.rejected) == (-1, "shape")
+    assert math.isfinite(found.off_mm)  # its counts are those of a glyph
+
+
+# --- grid
+
+
+def symbol(x, y, theta, label=0, off=0.1):
+    rejected = "" if label >= 0 else "counts"
+    return Symbol(label, x, y, theta, (x, y), off, rejected)
+
+
+def laid(labels, theta=0.0, at=(0.0, 0.0), rng=None, place=0.0, turn=0.0):
+    """Symbols of labels (rows, columns), -1 where none is felt, turned by theta."""
+    found = []
+    for (r, c), label in np.ndenumerate(labels):
+        z = complex(c * PITCH, -r * PITCH) * complex(math.cos(theta), math.sin(theta))
+        dx, dy, dt = (0, 0, 0) if rng is None else rng.normal(0, 1, 3) * (place, place, turn)
+        if label >= 0:
+            found.append(symbol(z.real + at[0] + dx, z.imag + at[1] + dy, theta + dt, int(label)))
+    return found
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.4, math.pi / 2, -2.5])
+def test_window_is_read_at_any_turn(theta):
+    found = grid(laid(LABELS, theta, (30.0, -7.0)), PITCH)
+    assert np.array_equal(found.window, LABELS)
+    assert len(found.members) == 12
+    assert found.off_mm < 1e-9
+    # an image point s lies at R s + (x, y): the upper left symbol is the centre of its cell
+    c, s = math.cos(found.theta_rad), math.sin(found.theta_rad)
+    i, j = found.first
+    at = (found.x_mm + c * 30 + s * 7, found.y_mm + s * 30 - c * 7)
+    assert at == pytest.approx(((i + 0.5) * PITCH, (j + 0.5) * PITCH), abs=1e-6)
+
+
+def test_nothing_gives_no_grid():
+    assert grid([], PITCH) is None
+    assert grid([symbol(0, 0, 0.0, label=-1)], PITCH) is None
+
+
+def test_what_stands_or_turns_otherwise_is_expelled():
+    labels = LABELS.copy()
+    labels[1, 1] = -1
+    strangers = [symbol(18, -5, 0.0), symbol(6, 6, 0.0), symbol(12, -12, math.radians(40))]
+    found = grid(laid(labels) + strangers, PITCH)
+    assert np.array_equal(found.window, labels)
+    assert len(found.members) == 11
+
+
+def test_of_two_candidates_the_better_fit_is_chosen():
+    labels = LABELS.copy()
+    labels[0, 1] = -1
+    two = [symbol(12 + 2.0, 0, 0.0, label=0), symbol(12 - 0.5, 0.3, 0.0, label=1)]
+    found = grid(laid(labels) + two, PITCH)
+    assert found.window[0, 1] == 1
+    assert len(found.members) == 12
+
+
+def test_threshold_is_a_share_of_the_pitch():
+    far = [symbol(0, 0, 0.0), symbol(12 + 2.9, 0, 0.0)]
+    assert grid(far, PITCH).window.shape == (1, 2)
+    farther = [symbol(0, 0, 0.0), symbol(12 + 3.1, 0, 0.0)]  # .25 of 12 mm are 3
+    assert len(grid(farther, PITCH).members) == 1
+
+
+def test_symbols_beyond_a_gap_join_the_grid():
+    labels = np.array([[0, 1, -1, 1], [1, 1, -1, 0]])
+    found = grid(laid(labels, 0.3), PITCH)
+    assert np.array_equal(found.window, labels)
+
+
+def test_largest_grid_counts():
+    lone = laid(np.array([[1, 0]]), at=(130.0, 40.0))
+    found = grid(lone + laid(LABELS), PITCH)
+    assert np.array_equal(found.window, LABELS)
+
+
+def test_the_covariance_holds_what_happens():
+    rng, normed = np.random.default_rng(1), []
+    truth = grid(laid(LABELS), PITCH)
+    for _ in range(60):
+        noisy = laid(LABELS, rng=rng, place=0.2, turn=math.radians(4))
+        found = grid(noisy, PITCH)
+        i, j = np.subtract(found.first, truth.first) * PITCH  # cells are numbered from any symbol
+        error = np.array(
+            [
+                found.x_mm - i - truth.x_mm,
+                found.y_mm - j - truth.y_mm,
+                found.theta_rad - truth.theta_rad,
+            ]
+        )
+        normed.append(error @ np.linalg.solve(found.covariance, error))
+    assert 1.5 < np.mean(normed) < 4.5  # chi square of 3 freedoms
