@@ -64,7 +64,7 @@ def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
             fix="press with less force, or nearer to the middle of the face",
         )
     imprint, iterations = bridge(np.maximum(depth, 0.0), sensor.overlay.membrane_mm / step)
-    pixels = _blur(imprint, sensor.overlay.blur_mm / step)
+    pixels = blur(imprint, sensor.overlay.blur_mm / step)
     pixels = pixels.reshape(sensor.rows, FINE, sensor.columns, FINE).mean(axis=(1, 3))
     return Contact(
         pixels * (_bed_n_mm3(sensor) * sensor.pitch_mm**2),
@@ -113,7 +113,8 @@ def _grid(sensor: SensorType, step: float) -> Array:
     return np.stack(np.meshgrid(x, y), axis=-1)
 
 
-def _blur(values: Array, deviation: float) -> Array:
+def blur(values: Array, deviation: float) -> Array:
+    """Return an image (rows, columns) under a bell of a deviation in its steps."""
     if deviation == 0:
         return values
     from scipy.ndimage import gaussian_filter

@@ -30,12 +30,12 @@ class Law(Protocol):
     """How an elastic body answers to compression."""
 
     @property
-    def limit_mm(self) -> float:
+    def length_mm(self) -> float:
         """The compression that no force reaches; inf where there is none."""
         ...
 
     def __call__(self, compression_mm: Array) -> tuple[Array, Array]:
-        """Return force (N) and tangent (N/mm) at each compression below the limit."""
+        """Return force (N) and tangent (N/mm) at each compression below the length."""
         ...
 
 
@@ -43,12 +43,8 @@ class Law(Protocol):
 class Linear:
     """A spring."""
 
-    stiffness: Array | float  #: N/mm; one for all, or so that it spreads over the compressions
-
-    @property
-    def limit_mm(self) -> float:
-        """No limit."""
-        return math.inf
+    stiffness: Array | float  #: N/mm; one for all, or one for each compression
+    length_mm: float = math.inf
 
     def __call__(self, compression_mm: Array) -> tuple[Array, Array]:
         """Return force (N) and tangent (N/mm)."""
@@ -63,11 +59,6 @@ class NeoHooke:
 
     stiffness: Array | float  #: N/mm at no strain: E times area over length
     length_mm: float
-
-    @property
-    def limit_mm(self) -> float:
-        """The length of the column."""
-        return self.length_mm
 
     def __call__(self, compression_mm: Array) -> tuple[Array, Array]:
         """Return force (N) and tangent (N/mm)."""

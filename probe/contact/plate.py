@@ -279,8 +279,8 @@ def newton(problem: PlateProblem, a: Array, tolerance: float) -> tuple[NewtonSta
 
 def _first_state(problem: PlateProblem, a: Array) -> NewtonState:
     """Return the state to begin with: the unknowns, withdrawn to within the laws' limits."""
-    columns, limit = problem.columns, problem.law.limit_mm
-    whole = limit if columns is None else limit + columns.law.limit_mm
+    columns, limit = problem.columns, problem.law.length_mm
+    whole = limit if columns is None else limit + columns.law.length_mm
     pressed = a @ problem.rows + problem.heights
     deepest = float(pressed.max())
     # At least a trace of contact, at most nearly the limit.
@@ -291,7 +291,7 @@ def _first_state(problem: PlateProblem, a: Array) -> NewtonState:
         return _evaluate_at(problem, a, _NONE)
     v = np.maximum.reduceat(pressed, columns.starts) + (back - NEAR_LIMIT * limit)
     v = np.maximum(columns.start_mm, v)
-    return _evaluate_at(problem, a, np.minimum(v, NEAR_LIMIT * columns.law.limit_mm))
+    return _evaluate_at(problem, a, np.minimum(v, NEAR_LIMIT * columns.law.length_mm))
 
 
 def _evaluate_at(problem: PlateProblem, a: Array, v: Array) -> NewtonState:
@@ -415,9 +415,9 @@ def _search_line(problem: PlateProblem, state: NewtonState, da: Array, dv: Array
 def _end(problem: PlateProblem, state: NewtonState, rate: Array, dv: Array) -> float:
     """Return how far along a step the laws' limits lie."""
     fastest = 0.0
-    limit = problem.law.limit_mm
+    limit = problem.law.length_mm
     if limit < math.inf:
         fastest = float((rate / (limit - state.compression)).max())
-    if problem.columns is not None and (limit := problem.columns.law.limit_mm) < math.inf:
+    if problem.columns is not None and (limit := problem.columns.law.length_mm) < math.inf:
         fastest = max(fastest, float((dv / (limit - state.v)).max()))
     return 1 / fastest if fastest > 0 else math.inf

@@ -112,13 +112,11 @@ def same_lattice(a: PlaneLattice, b: PlaneLattice, at: Array, pitch_mm: float) -
     return bool(np.hypot(*off) < 0.2 * pitch_mm and abs(wrap_angle(away[2])) < 0.2)
 
 
-def predict_pose(
-    lattice: PlaneLattice, touch_poses: TouchPoses, touch: int = -1
-) -> tuple[Array, Array]:
+def predict_pose(lattice: PlaneLattice, touch_poses: TouchPoses) -> tuple[Array, Array]:
     """Return T_lattice_touch (3,) of the last touch by its pose in the plane, and its spread."""
-    at = compose_poses(lattice.T_lattice_plane, touch_poses.poses[touch])
+    at = compose_poses(lattice.T_lattice_plane, touch_poses.poses[-1])
     lever = _lever(at[None])[0]
-    turned = _rotate(touch_poses.covariances[touch], lattice.T_lattice_plane)
+    turned = _rotate(touch_poses.covariances[-1], lattice.T_lattice_plane)
     return at, lever @ lattice.covariance @ lever.T + turned
 
 

@@ -211,9 +211,9 @@ def named(scan, face_of, felt):
     """Right, wrong and rejected symbols in view, by the composite alone."""
     encoding, face = face_of
     count, seen = Counter(), in_view(encoding, face, felt)
-    if scan.leading is None:
+    if scan.best is None:
         return count
-    fit, pitch, true = scan.leading.fit, encoding.style.pitch_mm, felt.true[-1]
+    fit, pitch, true = scan.best.fit, encoding.style.pitch_mm, felt.true[-1]
     # the truth says where the lattice's cells lie on the face
     turn = true[2] - fit.theta_rad
     c, s = math.cos(turn), math.sin(turn)
@@ -280,7 +280,7 @@ def classical(lab, felt, name, sigma, tally):
 def counted(found, face_of, felt):
     """Right, wrong and rejected symbols in view, of the thesis's way."""
     encoding, face = face_of
-    symbols = found.reading.symbols
+    symbols = found.symbols
     at = transform_points(
         felt.true[0], np.array([[s.x_mm, s.y_mm] for s in symbols]).reshape(-1, 2)
     )

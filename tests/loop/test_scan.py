@@ -101,7 +101,6 @@ def check(entries, truth, name, face):
     [
         ("thesis", "F4", 3, 10, True),
         ("thesis", "F5", 1012, 13, False),
-        ("thesis", "F5", 1014, 16, False),
         ("product", "F2", 2, 10, True),
         ("product", "F1", 1005, 10, False),
     ],

@@ -19,7 +19,7 @@ from probe.circuit.fsr import GAIN_S, Fsr, conductances, fsr_of
 from probe.circuit.network import loaded_columns
 from probe.contact.contract import Contact, Touch
 from probe.contact.engines import Engine, engine_named
-from probe.contact.gel import depths_mm, gel
+from probe.contact.gel import blur, depths_mm, gel
 from probe.contact.tips import Tips
 from probe.errors import CircuitError
 from probe.simulate.scene import Scene
@@ -154,8 +154,8 @@ class LevelSensor:
             a, b = touch.tilt_x_rad, touch.tilt_y_rad
             rocked = replace(touch, force_n=PEAK * touch.force_n, tilt_x_rad=-a, tilt_y_rad=-b)
             before = contacts.press(surface, sensor, rocked, tips).forces_n
-            _, state = conductances(film, _cross_talk(before, level.cross_talk))
-        conductance, _ = conductances(film, _cross_talk(forces, level.cross_talk), state)
+            _, state = conductances(film, blur(before, level.cross_talk))
+        conductance, _ = conductances(film, blur(forces, level.cross_talk), state)
         share = loaded_columns(conductance, instance.floating_rows(level), level.load_ohm)
         coarse = sensor.full / FULL
         amplification = max(1.0, COUNTS_PER_N / (FULL * level.load_ohm * GAIN_S))
@@ -177,7 +177,7 @@ class LevelSensor:
 
         sensor, level = self.sensor, self.level
         contact = gel(surface, sensor, touch)
-        depth = _cross_talk(depths_mm(sensor, contact.forces_n), level.cross_talk)
+        depth = blur(depths_mm(sensor, contact.forces_n), level.cross_talk)
         shade = gaussian_filter(instance.gains, SHADE_PIXELS, mode="reflect")
         shade = shade / max(float(shade.std()), 1e-12)
         top = max(float(depth.max()), 1e-12)
@@ -219,15 +219,6 @@ def _slip(
                      y_mm=touch.y_mm + way * math.sin(towards))  # fmt: skip
         forces.append(contacts.press(surface, sensor, at, tips).forces_n)
     return np.mean(forces, axis=0), middle
-
-
-def _cross_talk(image: Array, width: float) -> Array:
-    """Return an image (rows, columns) in which neighbours share, a bell of a width in tactels."""
-    if width == 0:
-        return image
-    from scipy.ndimage import gaussian_filter
-
-    return np.asarray(gaussian_filter(image, width, mode="nearest"))
 
 
 def _row_leakage(share: Array, bleed: float) -> Array:

@@ -274,9 +274,8 @@ def _size(pose: Array, more: Array) -> float:
 
 
 def fit_scatter(
-    before: TactelScatter, left: Array, parts: Array, jacobian: Array, known: Array, trust: Array,
-    rounds: int = ROUNDS,
-) -> TactelScatter:  # fmt: skip
+    before: TactelScatter, left: Array, parts: Array, jacobian: Array, known: Array, trust: Array
+) -> TactelScatter:
     """Return the scatter under which residuals are likeliest, drawn towards the usual one.
 
     One part goes with the reading (gains, lengths of tips, noise), the other with the image's slope
@@ -290,7 +289,7 @@ def fit_scatter(
     """
     usual = np.square([USUAL_SCATTER, USUAL_ASIDE_MM])
     now = np.square([before.felt, before.aside_mm])
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         scatter = TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
         weights = scatter.weights(left, parts, trust)
         normal = (jacobian * weights[:, None]).T @ jacobian + known

@@ -57,20 +57,13 @@ class Bank:
         return np.ravel_multi_index((layer + 0 * y, y + down, x + along), shape)
 
 
-def bank_of(
-    template: ResponseTemplate,
-    sensor: SensorType,
-    *,
-    rotations: int = ROTATIONS,
-    shifts: int = SHIFTS,
-    reach: float = REACH,
-) -> Bank:
+def bank_of(template: ResponseTemplate, sensor: SensorType) -> Bank:
     """Return the tables of a search."""
     phases, rim = PHASES, RIM
     across, down = sensor.step_mm
-    turns = np.arange(rotations) * 2 * np.pi / rotations  # an even number
-    half = rotations // 2
-    taps_away = math.ceil(template.half_mm * reach / min(across, down))
+    turns = np.arange(ROTATIONS) * 2 * np.pi / ROTATIONS
+    half = ROTATIONS // 2
+    taps_away = math.ceil(template.half_mm * REACH / min(across, down))
     offset = (np.arange(phases) + 0.5) / phases - 0.5  # of a place from its tactel, tactels
     k = np.arange(-taps_away, taps_away + 1)
     # tactel minus place, sensor frame: [ky, kx, py, px]
@@ -84,7 +77,7 @@ def bank_of(
         value = template.at(u)[..., 0].reshape(len(k) ** 2, phases * phases, template.order)
         responses[0, :, :, i] = value.swapaxes(1, 2)
         responses[1, :, :, i] = responses[0, :, :, i] ** 2
-    lookups, shifts_mm = _lookups(template, sensor, turns, rim, phases, shifts)
+    lookups, shifts_mm = _lookups(template, sensor, turns)
     taps, even, odd = _opposite_pairs(responses)
     shape = (sensor.rows, sensor.columns)
     return Bank(shape, taps_away, rim, taps, even, odd, lookups, turns, shifts_mm)
@@ -108,14 +101,10 @@ def _opposite_pairs(responses: Floats) -> tuple[NDArray[np.int32], Floats, Float
 
 
 def _lookups(
-    template: ResponseTemplate,
-    sensor: SensorType,
-    turns: NDArray[np.float64],
-    rim: int,
-    phases: int,
-    shifts: int,
+    template: ResponseTemplate, sensor: SensorType, turns: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Return the place of each cell of each lattice."""
+    phases, rim, shifts = PHASES, RIM, SHIFTS
     p, (across, down) = template.pitch_mm, sensor.step_mm
     step = (np.arange(shifts) + 0.5) / shifts * p
     shifts_mm = np.stack(np.meshgrid(step, step), axis=-1).reshape(-1, 2)

@@ -6,8 +6,6 @@ import csv
 import json
 import math
 import re
-import sqlite3
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +20,6 @@ from probe.contact.press import press
 from probe.kit import model
 from probe.kit.board import connections, has_board, shore_a, wiring_svg
 from probe.kit.command import run
-from probe.kit.coupon import UNDATED, make_coupon
 from probe.kit.make import bed_for
 from probe.kit.model import mesh_of
 from probe.kit.sheet import PrintedPart
@@ -145,19 +142,6 @@ def test_a_kit_is_made_verified_and_its_coupon_read(tmp_path, capsys):
     answer = Reader(open_lab(database), sensor).read(1000 * forces)
     assert (answer.object, answer.face) == ("Coupon", face)
     assert math.hypot(answer.x_mm - x, answer.y_mm - y) < 0.2
-
-
-def test_a_coupon_is_the_same_on_every_run(tmp_path):
-    sizes, told = kit_sizes(SMALL, 7.0), []
-    for name in ("one", "two"):
-        (tmp_path / name).mkdir()
-        database = tmp_path / name / "coupon.db"
-        make_coupon(sizes, 7.0, "fdm-0.4", database)
-        told.append(database.read_bytes())
-    assert told[0] == told[1]
-    with closing(sqlite3.connect(tmp_path / "one" / "coupon.db")) as connection:
-        ((utc,),) = connection.execute("SELECT utc FROM provenance").fetchall()
-    assert utc == UNDATED
 
 
 @pytest.mark.parametrize("kind", ["pad", "gel"])

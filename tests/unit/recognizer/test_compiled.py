@@ -21,7 +21,7 @@ from recognizer.touch.hypothesis import count_names, find_hypotheses
 from recognizer.touch.lab import EmbossedArray, cell_keys
 from recognizer.touch.options import TIE_NATS
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols import fit, kernels, posterior
+from recognizer.touch.symbols import fit, kernels, posterior, search
 from recognizer.touch.symbols.image import image_of_signal, normalize_image
 from recognizer.touch.symbols.search import bank_of, best_around, score_lattices
 from recognizer.touch.symbols.template import template_of
@@ -185,10 +185,12 @@ def test_cells_score_alike(name):
 
 
 @pytest.mark.parametrize("cells", [5, 36, 300])
-def test_lattices_of_the_coarse_search_are_summed_alike_to_the_bit(cells):
+def test_lattices_of_the_coarse_search_are_summed_alike_to_the_bit(cells, monkeypatch):
     sensor, draw = SensorType(), np.random.default_rng(cells)
     template = template_of(alphabet_named("dense-4"), STYLE, sensor)
-    bank = bank_of(template, sensor, rotations=4, shifts=4)
+    monkeypatch.setattr(search, "ROTATIONS", 4)
+    monkeypatch.setattr(search, "SHIFTS", 4)
+    bank = bank_of(template, sensor)
     none = int(bank.lookups.max())
     bank = replace(bank, lookups=draw.integers(0, none + 1, (4, 16, cells)).astype(np.int32))
     values, weights = draw.random((2, 16, 16)).astype(np.float32)
@@ -200,10 +202,12 @@ def test_lattices_of_the_coarse_search_are_summed_alike_to_the_bit(cells):
     assert found[0].tobytes() == found[1].tobytes()
 
 
-def test_lattices_score_what_their_symbols_do_tactel_by_tactel():
+def test_lattices_score_what_their_symbols_do_tactel_by_tactel(monkeypatch):
     sensor, draw = SensorType(), np.random.default_rng(12)
     template = template_of(alphabet_named("dense-4"), STYLE, sensor)
-    bank = bank_of(template, sensor, rotations=4, shifts=3, reach=3.0)
+    for name, value in (("ROTATIONS", 4), ("SHIFTS", 3), ("REACH", 3.0)):
+        monkeypatch.setattr(search, name, value)
+    bank = bank_of(template, sensor)
     values, weights = draw.random((2, 16, 16))
     felt, trust = values.ravel()[:, None], weights.ravel()[:, None]
     side = 2 * (16 + 2 * bank.rim)  # two places each way for every tactel

@@ -159,23 +159,3 @@ def test_a_lab_says_what_it_holds(lab):
     held = open_lab(lab / "lab.db")
     assert str(held).endswith("lab.db: 1 object, 6 faces, 294 symbols")
     assert repr(Reader(held)) == f"Reader({held}; fsr-16, tab)"
-
-
-def test_a_face_longer_than_half_of_the_array_is_read_from_end_to_end(tmp_path):
-    """51 rows of 5 mm are 255 mm: a place at one end is no place beyond the other."""
-    (tmp_path / "bar.yaml").write_text("name: Bar\nshape: {box: [210, 32, 20]}\n")
-    encode(read_specs([tmp_path / "bar.yaml"]), folder=tmp_path / "out",
-           database=f"sqlite:///{tmp_path / 'lab.db'}", formats=())  # fmt: skip
-    reader = Reader(open_lab(tmp_path / "lab.db"))
-    surface = registered_surface(str(tmp_path / "lab.db"), "Bar", "F1").surface
-    (held,) = reader.lab.arrays
-    faces = [held.face(number) for number in range(len(held.faces))]
-    (bar,) = (face for face in faces if face.face == "F1")
-    long = int(np.argmax(np.ptp(bar.polygon_mm[0], axis=0)))
-    for along in (16.0, 60.0, 105.0, 150.0, 194.0):
-        at = [15.0, 15.0]
-        at[long] = along
-        forces = press(surface, SensorType(), Touch(*at, 0.3, 80.0)).forces_n
-        answer = reader.read(np.rint(100 * forces))
-        assert answer.face == "F1", (along, answer)
-        assert answer.T_face_probe[:2, 3] == pytest.approx(at, abs=0.2)

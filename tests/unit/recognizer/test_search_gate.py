@@ -12,6 +12,7 @@ from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_
 from recognizer.touch.search_gate import (
     GAPS,
     gap_share,
+    is_nearly_chance,
     may_find_more,
     shows_strokes,
 )
@@ -21,17 +22,18 @@ from recognizer.touch.verdict import Evidence
 STROKES = ((np.indices((16, 16)) % 4) < 2).any(axis=0)
 
 
-def reader(small, pitch=7.0, kind="tab", radii=()):
+def reader(small, pitch=7.0, kind="tab", radii=(), flat_too=False):
     embossed = small.two_faces().embossed
     embossed = replace(
         embossed,
         style=SimpleNamespace(pitch_mm=pitch, height_mm=1.0, stroke_mm=1.4),
         radii_mm=radii,
     )
-    sensor = SensorType(overlay=Overlay(kind=kind))
+    arrays = (embossed, replace(embossed, radii_mm=()))[: 1 + flat_too]
     return SimpleNamespace(
-        sensor=sensor, options=ReaderOptions(), lab=SimpleNamespace(arrays=(embossed,))
-    )
+        sensor=SensorType(overlay=Overlay(kind=kind)), options=ReaderOptions(),
+        lab=SimpleNamespace(arrays=arrays),
+    )  # fmt: skip
 
 
 def plate(spread, seed=3):
@@ -59,6 +61,16 @@ def test_an_edge_of_a_plate_is_no_stroke(small):
     assert gap_share(half) < GAPS
 
 
+def test_gaps_tactel_by_tactel():
+    signal = signal_of(np.random.default_rng(5).gamma(0.7, 60.0, (16, 16)) + 8)
+    wide = np.pad(signal.forces, 2, mode="edge")
+    pressed = 0.15 * np.sort(signal.forces, axis=None)[-12:].mean()
+    near = np.array([np.quantile(wide[r : r + 5, c : c + 5], 0.85) for r, c in np.ndindex(16, 16)])
+    adjacent = near > pressed
+    weak = adjacent & (signal.forces.ravel() < 0.35 * near)
+    assert gap_share(signal) == pytest.approx(weak.sum() / adjacent.sum())
+
+
 def touch_of(tactels):
     counts = np.full(256, 8.0)
     counts[np.linspace(0, 255, tactels).round().astype(int)] = 200.0
@@ -83,7 +95,7 @@ def asked(small):
     return ask
 
 
-PAD, ROUND = {"kind": "pad"}, {"radii": (20.0,)}
+PAD, ROUND, SOME_ROUND = {"kind": "pad"}, {"radii": (20.0,)}, {"radii": (20.0,), "flat_too": True}
 
 
 @pytest.mark.parametrize(
@@ -91,6 +103,7 @@ PAD, ROUND = {"kind": "pad"}, {"radii": (20.0,)}
     [
         # 0.44 of the 19.4 tactels of a cell, three times: 25.7; a round face presses a strip
         ({"tactels": 25}, False), ({"tactels": 26}, True), ({"tactels": 25, "lab": ROUND}, True),
+        ({"tactels": 25, "lab": SOME_ROUND}, True),
         # symbols of no registered place
         ({"log_likelihood_ratio": 3.0}, True), ({"log_likelihood_ratio": 2.9}, False),
         # no stroke shows
@@ -136,3 +149,13 @@ def test_an_answer_that_is_refused_is_sought_again_where_little_is_missing(asked
 def test_without_a_hypothesis_the_search_goes_on(small):
     nothing = refusal(0, NOT_ENCODED)
     assert may_find_more(reader(small), touch_of(10), nothing, nothing, None)
+
+
+@pytest.mark.parametrize(
+    ("doubt", "ratio", "again"),
+    [(None, 5.0, False), (1e-5, 5.0, False), (1.01e-5, 5.0, True), (1e-4, 19.9, True),
+     (1e-4, 20.0, False)],
+)  # fmt: skip
+def test_what_chance_nearly_allows_is_confirmed(doubt, ratio, again):
+    judged = replace(refusal(0, ""), object="Thing", doubt=doubt)
+    assert is_nearly_chance(judged, Evidence(ratio, 5, 0)) is again
