@@ -41,12 +41,15 @@ def file_exists_error(out: Path) -> EncodedObjectsError:
 
 
 @contextmanager
-def staged_file(out: Path) -> Iterator[Path]:
-    """Yield a name beside `out` to write to; it becomes `out` when all went well."""
+def staged_file(out: Path, *, replace: bool = True) -> Iterator[Path]:
+    """Yield a name beside `out` to write to; it becomes `out` when all went well.
+
+    Without `replace`, raises `FileExistsError` if `out` has come up meanwhile.
+    """
     draft = out.with_name(f".{out.stem}.{os.getpid()}-{threading.get_ident()}{out.suffix}")
     try:
         yield draft
-        os.replace(draft, out)
+        (os.replace if replace else os.link)(draft, out)
     finally:
         draft.unlink(missing_ok=True)
 

@@ -2,8 +2,8 @@
 
 `one-touch` is the default: its 3x2 window lies under one 25 mm touch. Windows are rows x
 columns. `thesis` and `product` are the thesis's experiments (6.17 to 6.19, figure 5.11). Folds and
-polynomials of `large`, `fine` and the sizes above them leave a touch the fewest rivals, as
-`tests/bench/fold_search.py` found them (docs/folds.md).
+polynomials of `large`, `fine` and the sizes above them leave a touch the fewest rivals of all that
+were tried (docs/folds.md).
 """
 
 from __future__ import annotations

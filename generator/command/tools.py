@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -99,17 +98,11 @@ def _printer_values(printer: Printer) -> dict[str, Any]:
 def _write_new(path: Path, text: str, force: bool) -> None:
     """Write a file whole or not at all; one that is there only with `force`."""
     from encoded_objects.base.document import Problem
+    from encoded_objects.base.files import staged_file
     from generator.spec.problem import SpecError
 
     if path.exists() and not force:
         fix = "choose another name, or replace it with --force"
         raise SpecError([Problem("the file is there already", fix, file=str(path))])
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        beside.write_text(text, encoding="utf-8")
-        if force:
-            beside.replace(path)
-        else:
-            os.link(beside, path)  # fails, unlike a rename, if the file has come up meanwhile
-    finally:
-        beside.unlink(missing_ok=True)
+    with staged_file(path, replace=force) as draft:
+        draft.write_text(text, encoding="utf-8")

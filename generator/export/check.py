@@ -374,7 +374,6 @@ def _plane(normal: Vector, point: Vector) -> Iterator[HalfSpace]:
 
 
 def _half_space_from(normal: Vector, point: Vector) -> HalfSpace:
-    """Return the half space that begins at a point and lies along its normal."""
     return (*normal, -_dot(normal, point))
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -67,6 +67,20 @@ def symbol_triangles(part: Part, mesh: Mesh) -> NDArray[np.bool_]:
             mesh.facets < wrapped.first + len(wrapped.symbols)
         )
     return np.asarray(found)
+
+
+def join_meshes(
+    pieces: Iterable[tuple[NDArray[np.float64], NDArray[np.int64]]],
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices (n, 3) and triangles (m, 3) of pieces as one, without unused vertices."""
+    vertices, triangles, first = [], [], 0
+    for points, index in pieces:
+        used = np.zeros(len(points), np.bool_)
+        used[index] = True
+        vertices.append(points[used])
+        triangles.append((np.cumsum(used) - 1 + first)[index])
+        first += len(vertices[-1])
+    return np.concatenate(vertices), np.concatenate(triangles)
 
 
 def write_stl(_part: Part, mesh: Mesh) -> Iterator[bytes | memoryview]:
@@ -159,8 +173,7 @@ def _faces(
                 for name, number in named_facets(part, alone=True)
             ]
         for name, chosen in groups:
-            used, numbers = np.unique(mesh.triangles[chosen], return_inverse=True)
-            yield name, vertices[used], numbers.reshape(-1, 3), embossed[chosen]
+            yield name, *join_meshes([(vertices, mesh.triangles[chosen])]), embossed[chosen]
 
 
 class _Buffer:

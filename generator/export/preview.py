@@ -96,14 +96,16 @@ def preview_png(
     `answered`: shares of touches answered at once, and within three, by the name of a face: its
     label, and by the first its colour.
     """
-    samples, width, top = SAMPLES, WIDTH, TOP
-    bottom = HEIGHT - BOTTOM
+    samples, width, top, bottom = SAMPLES, WIDTH, TOP, HEIGHT - BOTTOM
     rows = np.linspace(0.0, 1.0, HEIGHT * samples)[:, None]
     above, below = np.array(PAPER_RGB)
     fade = np.rint((1 - rows) * above + rows * below)
     picture = np.repeat(_pack_colours(fade)[:, None], width * samples, axis=1)
     apart = len(parts) > 1
-    closed, moved = _both_scenes(parts, meshes)
+    turned = [part.T_object_part[:3, :3] @ mesh.vertices.T
+              for part, mesh in zip(parts, meshes, strict=True)]  # fmt: skip
+    closed = _scene(parts, meshes, turned, 0.0)
+    moved = _scene(parts, meshes, turned, APART) if apart else closed
     eye = _best_eye(closed.normals)
     views = (_view_of(closed, eye), _view_of(moved, -eye))
     room = (width // 2 - 2 * MARGIN, bottom - top - MARGIN)
@@ -121,15 +123,6 @@ def preview_png(
         later = any(within is not None for _, within in answered.values())
         write_legend(image, fonts[2], within_three=later)
     return _png(np.asarray(image))
-
-
-def _both_scenes(parts: Sequence[Part], meshes: Sequence[Mesh]) -> tuple[Scene, Scene]:
-    """Return the object as it is put together, and with its panels moved apart."""
-    turned = [part.T_object_part[:3, :3] @ mesh.vertices.T
-              for part, mesh in zip(parts, meshes, strict=True)]  # fmt: skip
-    closed = _scene(parts, meshes, turned, 0.0)
-    apart = _scene(parts, meshes, turned, APART) if len(parts) > 1 else closed
-    return closed, apart
 
 
 def _scene(
@@ -229,7 +222,6 @@ def _best_eye(normals: Points) -> Points:
 
 
 def _scale_to_fit(view: View, room: tuple[int, int]) -> float:
-    """Return the pixels for a mm at which a view fills the room."""
     width, height = (view.high - view.low)[:2].tolist()
     return float(min(room[0] / width, room[1] / height))
 
@@ -273,8 +265,7 @@ def _draw_view(
         Label(face, texts[face], middles[face][0], middles[face][1], halves[face])
         for face in facing
     ]
-    step = LABEL_STEP
-    labels = place_labels(seen.coarse(scene.faces, step * SAMPLES), step, wanted)
+    labels = place_labels(seen.coarse(scene.faces, LABEL_STEP * SAMPLES), LABEL_STEP, wanted)
     return [
         replace(label, x=box[0] + label.x, y=box[1] + label.y)
         for label in labels

@@ -71,36 +71,19 @@ def rasterise(points: Floats, triangles: Index, screen: Index) -> DepthBuffer:
     `points`: (3, N) x, y (pixels) and depth (any unit). Triangles run counter-clockwise; others
     turn their back and are left out.
     """
-    height, width = screen.shape
-    buffer = screen.reshape(-1)
-    buffer[:] = -1
+    screen[:] = -1
     low = float(points[2].min(initial=0.0))
     step = max(float(points[2].max(initial=0.0)) - low, 1e-300) / _DEPTH_STEPS
     for start in range(0, len(triangles), _TRIANGLES):
-        _draw(
-            buffer,
-            height,
-            width,
-            points,
-            triangles[start : start + _TRIANGLES],
-            start,
-            low,
-            step,
-        )
+        _draw(screen, points, triangles[start : start + _TRIANGLES], start, low, step)
     return DepthBuffer(screen, low, step)
 
 
 def _draw(
-    buffer: Index,
-    height: int,
-    width: int,
-    points: Floats,
-    triangles: Index,
-    first: int,
-    low: float,
-    step: float,
+    screen: Index, points: Floats, triangles: Index, first: int, low: float, step: float
 ) -> None:
-    """Raise `buffer` where a block of triangles, numbered from `first`, is nearest."""
+    """Raise `screen` where a block of triangles, numbered from `first`, is nearest."""
+    height, width = screen.shape
     x, y = points[0][triangles.T], points[1][triangles.T]
     # With y downwards a triangle that faces the eye has a negative area.
     area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
@@ -121,7 +104,7 @@ def _draw(
     keys = depth.clip(0.0, 2.0 * _DEPTH_STEPS, out=depth).astype(np.int64) << _NUMBER_BITS
     keys += np.repeat(facing + first, count)
     steps = np.repeat(slope_x.astype(np.int64) << _NUMBER_BITS, count)
-    _fill(buffer, rows * width + left, length, keys, steps)
+    _fill(screen.reshape(-1), rows * width + left, length, keys, steps)
 
 
 def _rows(y: Floats, height: int) -> tuple[Index, Index]:

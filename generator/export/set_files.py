@@ -96,7 +96,6 @@ def overview_pdf(
 
 
 def _object_pages(title: str, plates: Sequence[Sequence[PackedPart]]) -> list[Any]:
-    """Return the table of the objects."""
     of: dict[tuple[int, str], list[PackedPart]] = {}
     for row in (row for packed in plates for row in packed):
         of.setdefault((row.order[0], row.object), []).append(row)

@@ -20,8 +20,9 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -32,6 +33,7 @@ from generator.export.bed import BedPlace, Plate, Size, arrange_plates
 from generator.export.colours import BODY_RGB, SYMBOL_RGB, hexadecimal
 from generator.export.fixed_text import number_lines
 from generator.export.formats import ExportedObject, Files
+from generator.export.meshes import join_meshes
 from generator.printers import Printer
 from generator.solid.part import Part
 from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes
@@ -60,57 +62,11 @@ _RELATIONSHIPS = (
 _TO_TRIANGLES, _TO_END = "</vertices><triangles>\n", "</triangles></mesh></object>\n"
 
 
-@dataclass(frozen=True, slots=True)
-class SlicerSettings:
-    """How one plate is printed in filament; lengths in mm."""
+class SlicerSettings(NamedTuple):
+    """How one plate is printed in filament, by the slicer's own names."""
 
-    nozzle_mm: float
-    layer_mm: float
-    first_layer_mm: float
-    bed_mm: Size
-    supports: bool = False  #: a whole body hangs over
-    colour_change_mm: float = 0.0  #: height at which the filament is changed; 0: nowhere
-
-    def entries(self) -> dict[str, str]:
-        """Return the settings under the slicer's own names."""
-        width, depth = (f"{side:g}" for side in self.bed_mm)
-        return {
-            "printer_technology": "FFF",
-            "printer_settings_id": "encoded-objects",
-            "bed_shape": f"0x0,{width}x0,{width}x{depth},0x{depth}",
-            "nozzle_diameter": f"{self.nozzle_mm:g}",
-            "filament_diameter": "1.75",
-            "filament_density": "1.24",
-            "filament_type": "PLA",
-            "first_layer_temperature": "215",
-            "temperature": "210",
-            "first_layer_bed_temperature": "60",
-            "bed_temperature": "60",
-            "layer_height": f"{self.layer_mm:g}",
-            "first_layer_height": f"{self.first_layer_mm:g}",
-            "fill_density": "15%",
-            "support_material": str(int(self.supports)),
-        }
-
-    @property
-    def of_object(self) -> dict[str, str]:
-        """What an object says itself, over any print settings."""
-        return {"layer_height": f"{self.layer_mm:g}", "support_material": str(int(self.supports))}
-
-    def files(self) -> dict[str, str]:
-        """Return what is added to a package."""
-        lines = [f"; {name} = {value}\n" for name, value in self.entries().items()]
-        found = {_SETTINGS: "; made by encoded-objects\n\n" + "".join(lines)}
-        if self.colour_change_mm > 0:
-            # The slicer changes before the layer that ends at or above this height.
-            z = f"{self.colour_change_mm + self.layer_mm:.6g}"
-            found[_COLOUR_CHANGE] = (
-                '<?xml version="1.0" encoding="utf-8"?>\n<custom_gcodes_per_print_z>\n'
-                f'<code print_z="{z}" type="0" extruder="1" color="{hexadecimal(SYMBOL_RGB)}" '
-                'extra="" gcode="M600"/>\n<mode value="SingleExtruder"/>\n'
-                "</custom_gcodes_per_print_z>\n"
-            )
-        return found
+    of_object: tuple[tuple[str, str], ...]  #: of each object, over any print settings
+    files: tuple[tuple[str, str], ...]  #: name and text of those added to a package
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,18 +81,44 @@ class PrintFile:
 def slicer_settings(
     printer: Printer, *, supports: bool, colour_change_mm: float = 0.0
 ) -> SlicerSettings | None:
-    """Return the settings of a plate, or None for a printer without a nozzle."""
+    """Return the settings of a plate, or None for a printer without a nozzle.
+
+    The filament is changed at a height of `colour_change_mm`; 0: nowhere.
+    """
     if not printer.nozzle_mm:
         return None
+    width, depth = (f"{side:g}" for side in printer.bed_mm)
+    own = {"layer_height": f"{printer.layer_mm:g}", "support_material": str(int(supports))}
+    entries = {
+        "printer_technology": "FFF",
+        "printer_settings_id": "encoded-objects",
+        "bed_shape": f"0x0,{width}x0,{width}x{depth},0x{depth}",
+        "nozzle_diameter": f"{printer.nozzle_mm:g}",
+        "filament_diameter": "1.75",
+        "filament_density": "1.24",
+        "filament_type": "PLA",
+        "first_layer_temperature": "215",
+        "temperature": "210",
+        "first_layer_bed_temperature": "60",
+        "bed_temperature": "60",
+        "layer_height": own["layer_height"],
+        "first_layer_height": f"{printer.first_layer_mm:g}",
+        "fill_density": "15%",
+        "support_material": own["support_material"],
+    }
+    lines = [f"; {name} = {value}\n" for name, value in entries.items()]
+    files = {_SETTINGS: "; made by encoded-objects\n\n" + "".join(lines)}
     change = printer.printed_mm(colour_change_mm) if colour_change_mm else 0.0
-    return SlicerSettings(
-        printer.nozzle_mm,
-        printer.layer_mm,
-        printer.first_layer_mm,
-        printer.bed_mm,
-        supports,
-        change,
-    )
+    if change > 0:
+        # The slicer changes before the layer that ends at or above this height.
+        files[_COLOUR_CHANGE] = (
+            '<?xml version="1.0" encoding="utf-8"?>\n<custom_gcodes_per_print_z>\n'
+            f'<code print_z="{change + printer.layer_mm:.6g}" type="0" extruder="1" '
+            f'color="{hexadecimal(SYMBOL_RGB)}" '
+            'extra="" gcode="M600"/>\n<mode value="SingleExtruder"/>\n'
+            "</custom_gcodes_per_print_z>\n"
+        )
+    return SlicerSettings(tuple(own.items()), tuple(files.items()))
 
 
 def write_plates(exported: ExportedObject) -> Files:
@@ -182,22 +164,17 @@ class _BedMesh:
     triangles: NDArray[np.int64]  #: (M, 3)
 
     def vertex_text(self) -> DeflatedText:
-        """Return the elements of its vertices."""
-        return deflate_text(self._vertex_lines())
+        words = ('<vertex x="', '" y="', '" z="', '"/>\n')
+        blocks = range(0, len(self.vertices), _BLOCK)
+        rows = (self.vertices[start : start + _BLOCK] for start in blocks)
+        return deflate_text(number_lines(words, some, PLACES) for some in rows)
 
     def triangle_text(self, first: int = 0, properties: str = "") -> DeflatedText:
         """Return the elements of its triangles, whose vertices are numbered from `first`."""
-        return deflate_text(self._triangle_lines(first, properties))
-
-    def _vertex_lines(self) -> Iterator[bytes]:
-        for start in range(0, len(self.vertices), _BLOCK):
-            some = self.vertices[start : start + _BLOCK]
-            yield number_lines(('<vertex x="', '" y="', '" z="', '"/>\n'), some, PLACES)
-
-    def _triangle_lines(self, first: int, properties: str) -> Iterator[bytes]:
         words = ('<triangle v1="', '" v2="', '" v3="', f'"{properties}/>\n')
-        for start in range(0, len(self.triangles), _BLOCK):
-            yield number_lines(words, self.triangles[start : start + _BLOCK] + first, 0)
+        blocks = range(0, len(self.triangles), _BLOCK)
+        rows = (self.triangles[start : start + _BLOCK] + first for start in blocks)
+        return deflate_text(number_lines(words, some, 0) for some in rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,22 +189,21 @@ class _BedPart:
 
     @property
     def meshes(self) -> tuple[_BedMesh, ...]:
-        """Body and symbols."""
         return (self.body,) if self.symbols is None else (self.body, self.symbols)
 
 
 def _bed_part(part: Part | tuple[str, Mesh]) -> _BedPart:
-    """Return the meshes of a part."""
-    symbols: list[Mesh] = []
+    symbols: list[tuple[NDArray[np.float64], NDArray[np.int64]]] = []
     if isinstance(part, Part):
         name, body = part.name, body_mesh(part)
-        symbols = [mesh for mesh in symbol_meshes(part) if len(mesh.triangles)]
+        stands = symbol_meshes(part)
+        symbols = [(one.vertices, one.triangles) for one in stands if len(one.triangles)]
     else:
         name, body = part
-    own = _BedMesh(f"{name} body", BODY, *_join_meshes([body]))
+    own = _BedMesh(f"{name} body", BODY, *join_meshes([(body.vertices, body.triangles)]))
     points, stuck = own.vertices, None
     if symbols:
-        stuck = _BedMesh(f"{name} symbols", SYMBOLS, *_join_meshes(symbols))
+        stuck = _BedMesh(f"{name} symbols", SYMBOLS, *join_meshes(symbols))
         points = np.vstack([points, stuck.vertices])
     low, high = points.min(axis=0), points.max(axis=0)
     return _BedPart(name, own, stuck, low, (float(high[0] - low[0]), float(high[1] - low[1])))
@@ -244,20 +220,6 @@ def _move_to_bed(mesh: _BedMesh, part: _BedPart, place: BedPlace) -> _BedMesh:
         corner = (x, y)
     shift = np.array([place.x_mm - corner[0], place.y_mm - corner[1], -z])
     return _BedMesh(mesh.name, mesh.material, points + shift, mesh.triangles)
-
-
-def _join_meshes(meshes: Sequence[Mesh]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return vertices and triangles of meshes as one, with the vertices that a triangle uses."""
-    vertices, triangles = [], []
-    first = 0
-    for mesh in meshes:
-        used = np.zeros(len(mesh.vertices), np.bool_)
-        used[mesh.triangles] = True
-        numbers = np.cumsum(used) - 1 + first
-        vertices.append(mesh.vertices[used])
-        triangles.append(numbers[mesh.triangles])
-        first += len(vertices[-1])
-    return np.concatenate(vertices), np.concatenate(triangles)
 
 
 @dataclass(slots=True)
@@ -295,7 +257,7 @@ def _plate_packages(
         model.add(f"</resources>\n<build>\n{''.join(model.items)}</build>\n</model>\n")
     more = {_CONFIG: _volume_settings(parts, plate, settings)}
     if settings is not None:
-        more |= settings.files()
+        more |= dict(settings.files)
     return _package(components.pieces), _package(volumes.pieces, more)
 
 
@@ -352,7 +314,7 @@ def _volume_settings(
     parts: Sequence[_BedPart], plate: Plate, settings: SlicerSettings | None
 ) -> str:
     """Return PrusaSlicer's settings of a plate: the ranges of triangles that are volumes."""
-    own = {} if settings is None else settings.of_object
+    own = {} if settings is None else dict(settings.of_object)
     text = [f"{_XML}<config>\n"]
     for number, place in enumerate(plate.places, 2):
         part = parts[place.part]

@@ -371,18 +371,13 @@ def _seen_whole(
 ) -> NDArray[np.bool_]:
     """Return which cells in reach of each pose bear a symbol seen whole, (P, rows, columns)."""
     free = np.array(view.half_mm) - view.symbol_half_mm
-    place = face.placement
-    c, s = np.cos(place.rotation_rad), np.sin(place.rotation_rad)
-    x, y = centre.T
-    # Of the sensor's centre, cells from the anchor on: a cell's centre has whole numbers.
-    column = (c * x - s * y + place.x_mm) / pitch - 0.5
-    row = -(s * x + c * y + place.y_mm) / pitch - 0.5
+    row, column = _cells_at(face, pitch, centre)
     reach = math.floor(float(np.hypot(*np.maximum(free, 0.0))) / pitch + 0.5)
     steps = np.arange(-reach, reach + 1)
     rows, columns = (np.rint(at).astype(np.int64)[:, None] + steps for at in (row, column))
     along = ((columns - column[:, None]) * pitch)[:, None, :]
     down = ((rows - row[:, None]) * pitch)[:, :, None]
-    c, s = (f(turn + place.rotation_rad)[:, None, None] for f in (np.cos, np.sin))
+    c, s = (f(turn + face.placement.rotation_rad)[:, None, None] for f in (np.cos, np.sin))
     bears, low = _bearing(face, pitch)
     i, j = rows - low[0], columns - low[1]
     there = [(n >= 0) & (n < size) for n, size in zip((i, j), bears.shape, strict=True)]
@@ -392,13 +387,19 @@ def _seen_whole(
     return np.asarray(shown & (np.abs(across) <= free[0]) & (np.abs(up) <= free[1]))
 
 
-def _bearing(face: FaceLayout, pitch_mm: float) -> tuple[NDArray[np.bool_], tuple[int, int]]:
-    """Return which cells of a face's box bear symbols; its least row and column from the anchor."""
+def _cells_at(face: FaceLayout, pitch_mm: float, points: Points) -> tuple[Points, Points]:
+    """Return row and column of points (n, 2) from the anchor on: whole at a cell's centre."""
     place = face.placement
     c, s = np.cos(place.rotation_rad), np.sin(place.rotation_rad)
-    x, y = face.centres_mm.T
-    column = np.rint((c * x - s * y + place.x_mm) / pitch_mm - 0.5).astype(np.int64)
-    row = np.rint(-(s * x + c * y + place.y_mm) / pitch_mm - 0.5).astype(np.int64)
+    x, y = points.T
+    column = (c * x - s * y + place.x_mm) / pitch_mm - 0.5
+    return -(s * x + c * y + place.y_mm) / pitch_mm - 0.5, column
+
+
+def _bearing(face: FaceLayout, pitch_mm: float) -> tuple[NDArray[np.bool_], tuple[int, int]]:
+    """Return which cells of a face's box bear symbols; its least row and column from the anchor."""
+    cells = _cells_at(face, pitch_mm, face.centres_mm)
+    row, column = (np.rint(at).astype(np.int64) for at in cells)
     low = int(row.min(initial=0)), int(column.min(initial=0))
     size = int(row.max(initial=0)) - low[0] + 1, int(column.max(initial=0)) - low[1] + 1
     bears = np.zeros(size, dtype=bool)

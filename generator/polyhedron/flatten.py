@@ -39,13 +39,13 @@ def flatten_faces(
     faces = [loops for loops in faces if len(loops) > 1 or len(loops[0]) > 3]
     if not faces:
         return vertices.copy(), 0.0  # a triangle is planar
-    face_of, vertex_of = _incidences(faces)
+    pairs = [(f, v) for f, loops in enumerate(faces) for loop in loops for v in loop]
+    face_of, vertex_of = np.array(pairs, dtype=np.intp).T
     moved = vertices
     best = np.abs(_residual(vertices, faces, face_of, vertex_of)[0]).max()
     large = len(face_of) > DENSE_EQUATIONS
-    if best <= (PLANAR_ENOUGH if large else PLANAR_EXACTLY) * size:
-        return vertices.copy(), 0.0
-    if len(face_of) > MOST_EQUATIONS:
+    enough = (PLANAR_ENOUGH if large else PLANAR_EXACTLY) * size
+    if best <= enough or len(face_of) > MOST_EQUATIONS:
         return vertices.copy(), 0.0
     for _ in range(FLATTEN_STEPS):
         trial = _step(moved, faces, face_of, vertex_of, size)
@@ -60,14 +60,6 @@ def flatten_faces(
     if distance > 1e-3 * size or (large and best > PLANAR_ENOUGH * size):
         return vertices.copy(), 0.0
     return moved.copy(), distance
-
-
-def _incidences(
-    faces: Sequence[Sequence[Sequence[int]]],
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    pairs = [(f, v) for f, loops in enumerate(faces) for loop in loops for v in loop]
-    face_of, vertex_of = np.array(pairs, dtype=np.intp).T
-    return face_of, vertex_of
 
 
 def _residual(

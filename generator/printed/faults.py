@@ -198,7 +198,6 @@ def _with_ringing(path: Toolpath, amplitude: float) -> Toolpath:
 
 
 def _with_jitter(path: Toolpath, spread: float, rng: np.random.Generator) -> Toolpath:
-    """Shift each layer by an amount of its own."""
     levels, layer = np.unique(np.round(path.end_mm[:, 2] / LEVEL_MM), return_inverse=True)
     by = np.zeros((len(levels), 3))
     by[:, :2] = rng.normal(0.0, spread, (len(levels), 2))

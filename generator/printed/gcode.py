@@ -433,7 +433,6 @@ def _text(content: bytes, name: str) -> str:
 
 
 def _toolpath(machine: Machine, dialect: str) -> Toolpath:
-    """Return the moves that a machine made."""
     rows = np.array(machine.rows, np.float64).reshape(-1, COLUMNS)
     diameter = machine.filament if machine.filament > 0 else FILAMENT_MM
     area = math.pi * diameter**2 / 4

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.files import staged_file
 from generator.errors import PrintError
 from generator.printed.gcode import Toolpath, read_gcode
 from generator.printers import Printer
@@ -295,9 +296,8 @@ def _run(file: Path, settings: str, middle: str, gcode: Path) -> None:
         ]  # fmt: skip
         _call(command, written, file, "part", cwd=folder, env=_ENVIRONMENT)
         # The folder may be on another disk than where the slicer wrote.
-        undone = gcode.with_name(f"{gcode.name}.{os.getpid()}.writing")
-        shutil.copyfile(written, undone)
-        undone.replace(gcode)
+        with staged_file(gcode) as draft:
+            shutil.copyfile(written, draft)
 
 
 def _call(command: Sequence[str], written: Path, file: Path, what: str, **more: Any) -> None:

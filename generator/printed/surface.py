@@ -12,7 +12,6 @@ processes of a machine share one copy.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.files import staged_file
 from generator.errors import PrintError
 
 Floats = NDArray[np.float64]
@@ -133,12 +133,10 @@ def write_surface(
         "moved_mm": list(moved_mm),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
-    written = path.with_name(f"{path.name}.{os.getpid()}.writing")
-    with written.open("wb") as file:
-        np.save(file, levels)
-    written.replace(path.with_name(f"{path.name}.npy"))
-    written.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
-    written.replace(path.with_name(f"{path.name}.json"))
+    with staged_file(path.with_name(f"{path.name}.npy")) as draft:
+        np.save(draft, levels)
+    with staged_file(path.with_name(f"{path.name}.json")) as draft:
+        draft.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
 
 def is_written(path: Path) -> bool:

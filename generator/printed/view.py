@@ -112,7 +112,6 @@ def heights_from_above(
 
 
 def _lay(heights: NDArray[np.float32], beads: Beads, low: Floats, step: float) -> None:
-    """Raise the heights where beads of one layer are higher."""
     ny, nx = heights.shape
     a, b = beads.start_mm - low, beads.end_mm - low
     half = beads.width_mm / 2

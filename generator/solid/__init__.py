@@ -3,10 +3,9 @@
 from generator.solid.analytic import round_volume
 from generator.solid.closed import prove_closed
 from generator.solid.measure import box, volume
-from generator.solid.panels import Panels, panels
-from generator.solid.part import Embossing, Facet, Part
+from generator.solid.panels import panels
+from generator.solid.part import Part
 from generator.solid.plate import (
-    cut_corners,
     plain_panels,
     symbol_clearance_mm,
     top_inset_mm,
@@ -16,14 +15,10 @@ from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes, triangle
 from generator.solid.whole import emboss_whole
 
 __all__ = [
-    "Embossing",
-    "Facet",
     "Mesh",
-    "Panels",
     "Part",
     "body_mesh",
     "box",
-    "cut_corners",
     "emboss_whole",
     "panels",
     "plain_panels",

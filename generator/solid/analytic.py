@@ -290,7 +290,6 @@ def _with_symbols(
     layout: FaceLayout,
     tiers: tuple[Tiers, ...],
 ) -> AnalyticFace:
-    """Bend the symbols of a face onto it."""
     place = RoundSurfaceMap(face, development(polyhedron, surface))
     R = turn(-layout.placement.rotation_rad)
     labels = layout.labels.tolist()
@@ -357,7 +356,6 @@ def bend_problem(
 
 
 def _widens_outwards(development: Development) -> bool:
-    """Whether the facets widen as they rise."""
     d = development
     T = d.T_object_flat[0]
     across = T[:3, :2] @ (d.low[1] - d.low[0])

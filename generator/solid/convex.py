@@ -38,10 +38,8 @@ class ConvexPieces:
     depth_mm: float  #: how far one of them stands out of the body, at most
 
 
-def convex_pieces(
-    vertices: Points, triangles: Index, *, depth_mm: float = DEPTH_MM, most: int = _MOST
-) -> ConvexPieces:
-    """Return at most `most` convex pieces of a closed mesh, the largest first.
+def convex_pieces(vertices: Points, triangles: Index) -> ConvexPieces:
+    """Return the convex pieces of a closed mesh, the largest first.
 
     Raises `SolidError` if the triangles close no body.
     """
@@ -60,7 +58,7 @@ def convex_pieces(
 
     waiting = [entry(piece) for piece in body.decompose()]
     heapq.heapify(waiting)
-    while waiting[0][0] < -depth_mm and len(waiting) < most:
+    while waiting[0][0] < -DEPTH_MM and len(waiting) < _MOST:
         halves = _best_cut(waiting[0][3], waiting[0][2], _APART * flat)
         if len(halves) < 2:
             break

@@ -177,7 +177,6 @@ class _Cuts:
         return (outer[0], *(loop for loop in found if loop is not outer[0]))
 
     def lids(self) -> list[Loop]:
-        """Return the loops that close the body in the plane."""
         return [tuple(cycle) for cycle in _cycles(self.lid_next)]
 
     def _chains(self, loop: Loop) -> list[Loop]:
@@ -221,7 +220,6 @@ def _cycles(following: dict[int, int]) -> list[list[int]]:
 
 
 def _edges(facets: Sequence[Facet]) -> list[tuple[int, int]]:
-    """Return all directed edges."""
     return [edge for facet in facets for edge in directed_edges(facet.loops)]
 
 

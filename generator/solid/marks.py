@@ -176,7 +176,6 @@ def _broken(name: str, face: str) -> list[tuple[str, ...]]:
 
 
 def _lines_of(block: TextBox, lines: Sequence[str]) -> list[TextBox]:
-    """Return the lines of a block, from the top."""
     pen, up = block.pen, turn(block.angle)[:, 1]
     top = block.half[1]
     found = []

@@ -93,7 +93,6 @@ def _clip_ears(rings: Sequence[Ring], points: Ring, flat: float) -> Index:
 
 
 def _covers(rings: Sequence[Ring], points: Ring, triangles: Index) -> bool:
-    """Whether triangles cover the area between rings exactly once."""
     areas = triangle_areas(points[triangles])
     size = float(np.ptp(points, axis=0).max()) ** 2
     wanted = sum(signed_area(ring) for ring in rings)
@@ -242,13 +241,13 @@ class SymbolSolid:
 
 
 @lru_cache(maxsize=256)  # some 10 KB each
-def template_of(tiers: Tiers, pitch_mm: float) -> SymbolSolid:
+def template_of(tiers: Tiers, pitch_mm: float = 0.0, *, closed: bool = False) -> SymbolSolid:
     """Return the template of a symbol on a facet.
 
     With a pitch it holds the facet inside its lattice square, corners counter-clockwise from the
-    lower left; with pitch 0 the foot is cut out of the facet.
+    lower left; with pitch 0 the foot is cut out of the facet, or closes a solid of its own.
     """
-    points, rings = _number_points(tiers)
+    rings = number_rings(tuple(tuple(map(len, tier)) for tier in tiers.rings))
     base = np.zeros((0, 3), dtype=np.int64)
     if pitch_mm > 0:
         h = pitch_mm / 2
@@ -256,30 +255,27 @@ def template_of(tiers: Tiers, pitch_mm: float) -> SymbolSolid:
         foot = [ring[::-1] for ring in tiers.rings[0]]
         numbers = [np.arange(4), *(4 + ring[::-1] for ring in rings[0])]
         base = triangulate_rings([square, *foot], np.concatenate(numbers), "a symbol's square")
-    own = np.concatenate([_sides(rings), _top(tiers, rings)])
-    return SymbolSolid(points, own, base, tuple(rings[0]))
+    top = triangulate_rings(tiers.rings[-1], np.concatenate(rings[-1]), "a symbol's top")
+    own = [_sides(rings), top]
+    if closed:
+        bottom = triangulate_rings(tiers.rings[0], np.concatenate(rings[0]), "a symbol's foot")
+        own.append(bottom[:, ::-1])
+    return SymbolSolid(outline_points(tiers), np.concatenate(own), base, tuple(rings[0]))
 
 
 @lru_cache(maxsize=256)
-def closed_template(tiers: Tiers) -> SymbolSolid:
-    """Return the template of a symbol as a solid of its own, with its foot as a bottom."""
-    points, rings = _number_points(tiers)
-    bottom = triangulate_rings(tiers.rings[0], np.concatenate(rings[0]), "a symbol's foot")[:, ::-1]
-    own = np.concatenate([_sides(rings), _top(tiers, rings), bottom])
-    return SymbolSolid(points, own, np.zeros((0, 3), dtype=np.int64), tuple(rings[0]))
+def outline_points(tiers: Tiers) -> NDArray[np.float64]:
+    """Return all points of an outline, (n, 3) mm in the symbol's axes, ring after ring."""
+    levels = zip(tiers.z_mm, tiers.rings, strict=True)
+    return np.concatenate(
+        [np.c_[ring, np.full(len(ring), z)] for z, rings in levels for ring in rings]
+    )
 
 
-def _number_points(tiers: Tiers) -> tuple[NDArray[np.float64], list[list[Index]]]:
-    """Return all points, and the numbers of each tier's rings."""
-    points, numbers, count = [], [], 0
-    for z, rings in zip(tiers.z_mm, tiers.rings, strict=True):
-        tier = []
-        for ring in rings:
-            points.append(np.c_[ring, np.full(len(ring), z)])
-            tier.append(np.arange(count, count + len(ring)))
-            count += len(ring)
-        numbers.append(tier)
-    return np.concatenate(points), numbers
+def number_rings(sizes: tuple[tuple[int, ...], ...]) -> list[list[Index]]:
+    """Return the numbers of the points, [tier][ring] (k,), of rings of these sizes."""
+    ends = itertools.accumulate(size for tier in sizes for size in tier)
+    return [[np.arange(-size, 0) + next(ends) for size in tier] for tier in sizes]
 
 
 def _sides(numbers: list[list[Index]]) -> Index:
@@ -290,11 +286,6 @@ def _sides(numbers: list[list[Index]]) -> Index:
             ahead_a, ahead_b = np.roll(a, -1), np.roll(b, -1)
             found += [np.stack([a, ahead_a, ahead_b], 1), np.stack([a, ahead_b, b], 1)]
     return np.concatenate(found)
-
-
-def _top(tiers: Tiers, numbers: list[list[Index]]) -> Index:
-    """Return the triangles of the last tier."""
-    return triangulate_rings(tiers.rings[-1], np.concatenate(numbers[-1]), "a symbol's top")
 
 
 @dataclass(frozen=True, slots=True)
@@ -365,7 +356,6 @@ class _MeshBuilder:
         return first
 
     def facet(self, facet: int) -> None:
-        """Triangulate a facet and all that stands on it."""
         plain = self.part.facets[facet].loops
         if len(plain) == 1 and len(plain[0]) == 3 and facet not in self.on:
             self.found.append((np.array(plain, dtype=np.int64), facet, -1, None))
@@ -433,7 +423,6 @@ class _MeshBuilder:
         return cuts
 
     def mesh(self) -> Mesh:
-        """Put everything together."""
         sizes = [len(found) for found, *_ in self.found]
         none = np.zeros((0, 3))
         return Mesh(
@@ -457,10 +446,9 @@ class _MeshBuilder:
     def _template(
         self, embossing: Embossing, label: int, pitch: float, closed: bool
     ) -> SymbolSolid:
-        """Return the template of a label."""
         tiers = embossing.tiers[label]
         try:
-            return closed_template(tiers) if closed else template_of(tiers, pitch)
+            return template_of(tiers, pitch, closed=closed)
         except SolidError as error:
             error.place = self.part.facets[embossing.facet].name
             raise

@@ -14,7 +14,7 @@ along one, and no piece is thinner.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -152,19 +152,12 @@ class CutSymbol:
     crossed: dict[int, list[int]] = field(default_factory=dict)  #: line -> points of the foot
 
 
-def cut_symbol(
-    strip: Strip, rings: list[list[Points]], z_mm: list[float], centre: Points, place: str
-) -> CutSymbol:
-    """Cut a symbol along the lines between facets; `place` names it in errors.
+class Knife:
+    """Cuts one symbol along the lines between facets; `place` names it in errors.
 
     `rings`: [tier][ring] (k, 2) in the plane, outer counter-clockwise, holes clockwise; `centre`
     (2,) of the symbol, inside a facet.
     """
-    return _Knife(strip, rings, z_mm, centre, place).cut()
-
-
-class _Knife:
-    """Cuts one symbol."""
 
     def __init__(
         self, strip: Strip, rings: list[list[Points]], z_mm: list[float], centre: Points, place: str
@@ -198,12 +191,7 @@ class _Knife:
                     made.sides += self._convex([a[k], a[j], b[j], b[k]])
         made.tops = list(self._pieces(cycles[-1]))
         made.feet = list(self._pieces(cycles[0]))
-        for cycle in cycles[0]:
-            for start, end in self._edges(cycle):
-                made.outline.setdefault(self._facet_between(start, end), []).append((start, end))
-            for number in cycle:
-                if made.line[number] >= 0:
-                    made.crossed.setdefault(made.line[number], []).append(number)
+        made.outline, made.crossed = self._outline(cycles[0])
         return made
 
     def _numbered(self, ring: Points, z: float) -> list[int]:
@@ -212,11 +200,8 @@ class _Knife:
         facet = np.full(len(ring), self.first)
         for line in self.lines:
             beside = self.strip.beside(line, ring)
-            off = np.where(
-                beside < 0.0,
-                np.minimum(beside, -NUDGE_MM),
-                np.maximum(beside, NUDGE_MM),
-            )
+            least = np.maximum(np.abs(beside), NUDGE_MM)
+            off = np.where(beside < 0.0, -least, least)
             ring += (off - beside)[:, None] * self.strip.right[line]
             facet = np.where(off > 0.0, line, facet)
         first = len(self.made.flat)
@@ -251,14 +236,10 @@ class _Knife:
         return self.on_edge[start, end]
 
     def _cycle(self, corners: list[int]) -> list[int]:
-        """Return corners and cut points around a ring."""
         cycle = []
         for start, end in pairwise([*corners, corners[0]]):
             cycle += [start, *self._between(start, end)]
         return cycle
-
-    def _edges(self, cycle: list[int]) -> Iterator[tuple[int, int]]:
-        return pairwise([*cycle, cycle[0]])
 
     def _facet_between(self, start: int, end: int) -> int:
         """Return the facet that an uncut edge lies in."""
@@ -284,19 +265,26 @@ class _Knife:
             found.append((facet, piece))
         return found
 
-    def _pieces(self, cycles: list[list[int]]) -> Iterator[tuple[int, tuple[Loop, ...]]]:
-        """Yield the pieces of a level area."""
-        made = self.made
+    def _outline(
+        self, cycles: list[list[int]]
+    ) -> tuple[dict[int, list[tuple[int, int]]], dict[int, list[int]]]:
+        """Return the edges of cycles by facet, and the points where they cross lines by line."""
         edges: dict[int, list[tuple[int, int]]] = {}
         crossed: dict[int, list[int]] = {}
         for cycle in cycles:
-            for start, end in self._edges(cycle):
+            for start, end in pairwise([*cycle, cycle[0]]):
                 edges.setdefault(self._facet_between(start, end), []).append((start, end))
             for number in cycle:
-                if made.line[number] >= 0:
-                    crossed.setdefault(made.line[number], []).append(number)
+                if self.made.line[number] >= 0:
+                    crossed.setdefault(self.made.line[number], []).append(number)
+        return edges, crossed
+
+    def _pieces(self, cycles: list[list[int]]) -> Iterator[tuple[int, tuple[Loop, ...]]]:
+        """Yield the pieces of a level area."""
+        made = self.made
+        edges, crossed = self._outline(cycles)
         for line, numbers in crossed.items():
-            ordered = up_the_line(self.strip, line, numbers, made)
+            ordered = up_the_line(self.strip, line, numbers, made.flat)
             for low, high in zip(ordered[::2], ordered[1::2], strict=True):
                 edges.setdefault(line - 1, []).append((low, high))
                 edges.setdefault(line, []).append((high, low))
@@ -306,9 +294,11 @@ class _Knife:
                 yield facet, loops
 
 
-def up_the_line(strip: Strip, line: int, numbers: list[int], made: CutSymbol) -> list[int]:
+def up_the_line(
+    strip: Strip, line: int, numbers: list[int], flat: Sequence[Points] | Mapping[int, Points]
+) -> list[int]:
     """Return points of a line from the lowest to the highest."""
-    heights = strip.along(line, np.array([made.flat[k] for k in numbers])).tolist()
+    heights = strip.along(line, np.array([flat[k] for k in numbers])).tolist()
     return [number for _, number in sorted(zip(heights, numbers, strict=True))]
 
 
@@ -346,7 +336,7 @@ def wrapped_onto(
     ):
         symbol = f"r{row}c{column}"
         rings = [[ring @ R.T + centre for ring in tier] for tier in tiers[label].rings]
-        cut = cut_symbol(strip, rings, list(tiers[label].z_mm), centre, f"{name}/{symbol}")
+        cut = Knife(strip, rings, list(tiers[label].z_mm), centre, f"{name}/{symbol}").cut()
         cuts.append(cut)
         names.append(symbol)
         firsts.append(body.count)
@@ -358,7 +348,6 @@ def wrapped_onto(
 
 
 def _lift(strip: Strip, cut: CutSymbol) -> Points:
-    """Return the points of a symbol on the solid."""
     flat, z = np.array(cut.flat), np.array(cut.z_mm)
     facet, line = np.array(cut.facet), np.array(cut.line)
     points = np.empty((len(flat), 3))
@@ -393,10 +382,7 @@ def _cut_strip(
     for line, rim in enumerate(rims):
         flat |= rim
         low, high = rim
-        inner = crossed.get(line, [])
-        if inner:
-            heights = strip.along(line, np.array([flat[k] for k in inner])).tolist()
-            inner = [k for _, k in sorted(zip(heights, inner, strict=True))]
+        inner = up_the_line(strip, line, crossed[line], flat) if line in crossed else []
         chains.append([low, *inner, high])
     for number, facet in enumerate(surface.facets):
         if number not in edges and not {number, number + 1} & set(crossed):

@@ -30,9 +30,8 @@ from generator.printed.prints import (
 from generator.printed.slicer import DEFAULT, find_slicer, slicer_version
 from generator.printed.surface import is_written, read_surface
 from probe.errors import SurfaceError
-from probe.simulate.registered import face_of, registered_object
+from probe.simulate.registered import face_of, face_scene, registered_object
 from probe.simulate.scene import Scene
-from probe.surface.polygon import polygon
 
 PROFILE = DEFAULT  #: of prints where none is named
 
@@ -163,12 +162,5 @@ def printed_scene(listing: str, database: str, object_name: str, face: str) -> S
             place=listing,
         )
     held = registered_object(database, object_name)
-    found = face_of(held, face)
-    return Scene(
-        surface=read_surface(surface_path(prints.folder, key)),
-        region=polygon(found.polygon_mm),
-        name=f"{object_name}/{face}, printed",
-        object_name=object_name,
-        face=face,
-        T_object_surface=found.T_object_face,
-    )
+    surface = read_surface(surface_path(prints.folder, key))
+    return face_scene(held, face_of(held, face), surface, f"{object_name}/{face}, printed")

@@ -8,7 +8,7 @@ without the gap along their edges. A part is the surface of its STL file; a roun
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -60,7 +60,7 @@ def scene_of_face(database: str, held: RegisteredObject, face: str = "") -> Scen
     """Return a face of an object that was read before; raises as `registered_surface`."""
     found = face_of(held, face)
     if found.round is None:
-        return _scene(held, found, _surface(held, found), f"{held.entry.name}/{found.name}")
+        return face_scene(held, found, _surface(held, found), f"{held.entry.name}/{found.name}")
     for part in held.parts:
         if part.format == "stl":
             return round_part(part_path(normal_url(database), part.file), held, part, found).scene()
@@ -86,18 +86,15 @@ def scene_of_part(path: Path, held: RegisteredObject, part: RegisteredPart, face
     if up.round is not None:
         return round_part(path, held, part, up).scene()
     T_face_part = np.linalg.inv(up.T_object_face) @ part.T_object_part
-    return _scene(held, up, part_mesh(path, T_face_part), f"{path.name}/{up.name}")
+    return face_scene(held, up, part_mesh(path, T_face_part), f"{path.name}/{up.name}")
 
 
-def _scene(held: RegisteredObject, face: RegisteredFace, surface: HeightMap, name: str) -> Scene:
-    return Scene(
-        surface=surface,
-        region=polygon(face.polygon_mm),
-        name=name,
-        object_name=held.entry.name,
-        face=face.name,
-        T_object_surface=face.T_object_face,
-    )
+def face_scene(
+    held: RegisteredObject, face: RegisteredFace, surface: HeightMap, name: str
+) -> Scene:
+    """Return the scene of a surface that is a face of an object, in the face frame."""
+    region = polygon(face.polygon_mm)
+    return Scene(surface, region, name, held.entry.name, face.name, face.T_object_face)
 
 
 def registered_object(database: str, name: str) -> RegisteredObject:
@@ -108,7 +105,7 @@ def registered_object(database: str, name: str) -> RegisteredObject:
         known = object_names(connection)
         if not name and len(known) == 1:
             return read_object(connection, known[0])
-    shown = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
+    shown = _first_names(known, 12)
     raise SurfaceError(
         f"no object is called '{name}'" if name else f"{len(known)} objects, none is named",
         fix=f"registered objects: {shown or 'none yet'}",
@@ -147,10 +144,9 @@ def face_of(held: RegisteredObject, name: str = "") -> RegisteredFace:
     for face in held.faces:
         if face.name == name or (not name and face.placement is not None):
             return face
-    shown = ", ".join(face.name for face in held.faces[:12])
     raise SurfaceError(
         f"no face is called '{name}'" if name else "no face bears symbols",
-        fix=f"faces: {shown}" + (", ..." if len(held.faces) > 12 else ""),
+        fix=f"faces: {_first_names([face.name for face in held.faces], 12)}",
         place=held.entry.name,
     )
 
@@ -169,12 +165,16 @@ def _registered_part(
     same_name = [held for held in known if Path(held[1].file).name == path.name]
     for name, part in same_path + same_name:
         return named or registered_object(database, name), part
-    shown = ", ".join(Path(part.file).name for _, part in known[:8])
+    shown = _first_names([Path(part.file).name for _, part in known], 8)
     raise SurfaceError(
         f"{path.name} is not registered in {database}",
-        fix=f"its STL parts: {shown or 'none'}{', ...' if len(known) > 8 else ''}",
+        fix=f"its STL parts: {shown or 'none'}",
         place=str(path),
     )
+
+
+def _first_names(names: Sequence[str], most: int) -> str:
+    return ", ".join(names[:most]) + (", ..." if len(names) > most else "")
 
 
 def _face_up(held: RegisteredObject, part: RegisteredPart, name: str) -> RegisteredFace:
@@ -198,13 +198,9 @@ def _surface(held: RegisteredObject, face: RegisteredFace) -> FaceSurface:
         c, s = math.cos(place.rotation_rad), math.sin(place.rotation_rad)
         at = cells.centres_mm @ np.array([[c, s], [-s, c]]) + (place.x_mm, place.y_mm)
         columns, rows = np.rint(at / (pitch, -pitch) - 0.5).T
-        lattice = LatticeSurface(
-            template(symbols, pitch),
-            list_lookup(rows, columns, cells.labels),
-            place.rotation_rad,
-            place.x_mm,
-            place.y_mm,
-        )
+        look_up = list_lookup(rows, columns, cells.labels)
+        at = place.rotation_rad, place.x_mm, place.y_mm
+        lattice = LatticeSurface(template(symbols, pitch), look_up, *at)
     return FaceSurface(lattice, polygon(face.polygon_mm), _surrounding_mesh(held, face, symbols))
 
 

@@ -80,15 +80,9 @@ class RoundPart:
         a, b, c = corners.transpose(1, 0, 2)
         seen = np.cross(b - a, c - a) @ T_object_plane[:3, 2] > 0
         T_plane_object = np.linalg.inv(T_object_plane)
-        return Scene(
-            surface=mesh(corners[seen], T_plane_object, place=self.name),
-            region=self.region,
-            name=self.name,
-            object_name=self.object_name,
-            face=self.face.name,
-            T_object_surface=T_object_plane,
-            scene_at=self.under,
-        )
+        surface = mesh(corners[seen], T_plane_object, place=self.name)
+        return Scene(surface, self.region, self.name, self.object_name, self.face.name,
+                     T_object_plane, self.under)  # fmt: skip
 
     def scene(self) -> Scene:
         """Return the face, as a touch of its middle meets it."""
@@ -114,12 +108,5 @@ def round_part(
         raise SurfaceError(f"{name} is flat", fix="touch it as a flat face")
     T = part.T_object_part
     corners = written_triangles(file) @ T[:3, :3].T + T[:3, 3]
-    return RoundPart(
-        corners_mm=corners,
-        low_mm=corners.min(axis=1),
-        high_mm=corners.max(axis=1),
-        face=face,
-        region=polygon([face.round.outline_mm]),
-        name=name,
-        object_name=held.entry.name,
-    )
+    low, high, region = corners.min(axis=1), corners.max(axis=1), polygon([face.round.outline_mm])
+    return RoundPart(corners, low, high, face, region, name, held.entry.name)

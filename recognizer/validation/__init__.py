@@ -8,7 +8,7 @@
     trial        touch -> answer -> verdict, a row
     run          which touches are left;  workers  who does them;  files  where they go
     results      rows -> shares and errors (statistics);  studies, extremes  add theirs
-    report       results -> page (pictures, flat_faces);  provenance  where they come from
+    report       results, where they come from, page (pictures, flat_faces)
     compare      two runs, or the worlds of several;  repeat  one touch again
     dataset      touches with their truth, for training;  printing  printed surfaces
     pipeline     all of it in order: `validate`;  command  validate-set

@@ -18,8 +18,7 @@ from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from recognizer.validation.campaign import PRINTED, campaign_of, series_of
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import done_shards, write_json
-from recognizer.validation.provenance import circumstances
-from recognizer.validation.report import require_report, write_results
+from recognizer.validation.report import circumstances, require_report, write_results
 from recognizer.validation.run import (
     RECORD,
     TouchProgress,

@@ -20,9 +20,12 @@ from generator.export.meshes import stl_chunks
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import place_object
 from generator.pipeline.plan import ObjectPlan, plan_object
-from generator.printed import PROFILES, deposit, face_surface, print_faults, slice_part
 from generator.printed.check import check_png
+from generator.printed.deposit import deposit
+from generator.printed.faults import print_faults
+from generator.printed.slicer import PROFILES, slice_part
 from generator.printed.survey import LOST, SURVIVES, survey_face
+from generator.printed.view import face_surface
 from generator.solid.part import Part
 from generator.solid.triangulate import triangles
 from generator.spec.read import read_specs

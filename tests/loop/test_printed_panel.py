@@ -15,17 +15,12 @@ import trimesh
 from reference.cube_panels import cube_panels
 
 from generator.export.meshes import stl_chunks
-from generator.printed import (
-    PROFILES,
-    Deposit,
-    PrintedSurface,
-    SlicedPart,
-    deposit,
-    face_surface,
-    print_faults,
-    slice_part,
-)
+from generator.printed.deposit import Deposit, deposit
+from generator.printed.faults import print_faults
+from generator.printed.slicer import PROFILES, SlicedPart, slice_part
+from generator.printed.surface import PrintedSurface
 from generator.printed.survey import SURVIVES, survey_face
+from generator.printed.view import face_surface
 from generator.solid.measure import symbol_volume
 from generator.solid.part import Part
 from generator.solid.triangulate import triangles

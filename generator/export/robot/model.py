@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 
 from generator.errors import SolidError
 from generator.export.colours import BODY_RGB, RGB, SYMBOL_RGB
+from generator.export.meshes import join_meshes
 from generator.layout.placement import Layout
 from generator.polyhedron import Polyhedron, face_frame
 from generator.solid import Mesh, Part, body_mesh, emboss_whole, symbol_meshes
 from generator.solid.convex import DEPTH_MM, ConvexPieces, convex_pieces
 from generator.solid.measure import inertia_of
 from generator.solid.part import to_part, transform, turn
-from generator.solid.triangulate import closed_template
+from generator.solid.triangulate import template_of
 
 Floats = NDArray[np.float64]
 M = 1e-3  #: metres in a millimetre
@@ -125,9 +126,9 @@ def _visuals(name: str, parts: Sequence[Part]) -> Iterator[ModelMesh]:
         own = body_mesh(part)
         bodies.append((transform(T, own.vertices), own.triangles))
         symbols += [(transform(T, mesh.vertices), mesh.triangles) for mesh in symbol_meshes(part)]
-    yield _mesh_of(f"{name}-visual-body", bodies, BODY_RGB)
+    yield _joined(f"{name}-visual-body", bodies, BODY_RGB)
     if symbols:
-        yield _mesh_of(f"{name}-visual-symbols", symbols, SYMBOL_RGB)
+        yield _joined(f"{name}-visual-symbols", symbols, SYMBOL_RGB)
 
 
 def _body_pieces(name: str, polyhedron: Polyhedron) -> tuple[list[ModelMesh], tuple[str, ...]]:
@@ -161,7 +162,7 @@ def _placed_symbols(name: str, parts: Sequence[Part]) -> Iterator[PlacedMesh]:
             centres = to_part(embossing, embossing.centres_mm, 0.0)
             for label, centre in zip(embossing.labels.tolist(), centres, strict=True):
                 if label not in pieces:
-                    solid = closed_template(embossing.tiers[label])
+                    solid = template_of(embossing.tiers[label], closed=True)
                     found = convex_pieces(solid.points, solid.own)
                     pieces[label] = _piece_meshes(f"{name}-symbol-{label}", found)
                 T_part_symbol[:3, 3] = centre
@@ -189,17 +190,11 @@ def _frames(name: str, polyhedron: Polyhedron) -> Iterator[FaceFrame]:
             yield FaceFrame(face, f"{name}-{face}", T)
 
 
-def _mesh_of(
+def _joined(
     name: str, pieces: Sequence[tuple[Floats, NDArray[np.int64]]], colour: RGB
 ) -> ModelMesh:
-    """Return one mesh, m, of pieces in mm; corners that no triangle needs are left out."""
-    vertices, triangles, count = [], [], 0
-    for points, index in pieces:
-        used, numbers = np.unique(index, return_inverse=True)
-        vertices.append(points[used])
-        triangles.append(numbers.reshape(-1, 3) + count)
-        count += len(used)
-    return ModelMesh(name, M * np.concatenate(vertices), np.concatenate(triangles), colour)
+    vertices, triangles = join_meshes(pieces)
+    return ModelMesh(name, M * vertices, triangles, colour)
 
 
 def mesh_files(model: RobotModel) -> Iterator[tuple[str, Iterator[bytes]]]:

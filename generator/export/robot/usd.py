@@ -93,7 +93,6 @@ def _collision(placed: PlacedMesh, name: str) -> Iterator[str]:
 
 
 def _mesh(mesh: ModelMesh, name: str, more: str, schemas: str = "") -> Iterator[str]:
-    """Yield a mesh: flat triangles, nothing subdivided."""
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     yield (
         f'        def Mesh "{name}"{schemas}\n        {{\n'

@@ -203,14 +203,12 @@ def _mesh_element(parent: Element, *, uri: str = "", filename: str = "") -> None
 
 
 def _document(root: Element) -> bytes:
-    """Return an XML file, indented."""
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
 def _write(suffix: str, content: Callable[[RobotModel], bytes], exported: ExportedObject) -> Files:
-    """Yield the meshes and the file."""
     yield from mesh_files(exported.robot)
     yield exported.name + suffix, content(exported.robot)
 

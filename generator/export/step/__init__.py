@@ -38,9 +38,9 @@ from generator.export.step.entities import (
     write_style,
     write_units,
 )
-from generator.export.step.symbol import KINDS, outline_points, symbol_entities, symbol_template
+from generator.export.step.symbol import KINDS, symbol_entities, symbol_template
 from generator.solid.part import Embossing, Part, turn
-from generator.solid.triangulate import Mesh
+from generator.solid.triangulate import Mesh, outline_points
 
 _GZIP_LEVEL = 6
 _ASSEMBLY_ENTITIES = 40  # for each part, besides its own

@@ -12,7 +12,6 @@ from generator.export.step.entities import (
     Entities,
     reference_list,
     step_string,
-    triple,
     unit,
 )
 from generator.solid.part import AnalyticFace, Part, Rim
@@ -35,8 +34,7 @@ class StepBody:
         self.points: dict[int, str] = {}
         self.corners: dict[int, str] = {}
         for vertex in self._used():
-            point = f"CARTESIAN_POINT('',{triple(self.vertices[vertex], PLACES)})"
-            self.points[vertex] = entities.add(point)
+            self.points[vertex] = entities.point(self.vertices[vertex])
         for vertex, point in self.points.items():
             self.corners[vertex] = entities.add(f"VERTEX_POINT('',{point})")
         self.edges: dict[tuple[int, int], str] = {}
@@ -51,7 +49,7 @@ class StepBody:
     def faces(self) -> NDArray[np.int64]:
         """Write the planar facets, with all footprints cut out; return their numbers."""
         numbers = []
-        add, direction = self.entities.add, self.entities.direction
+        add = self.entities.add
         for number in self.planar:
             facet = self.part.facets[number]
             corners = self.vertices[list(facet.loops[0])]
@@ -59,10 +57,7 @@ class StepBody:
             normal = unit(np.cross(corners - corners[0], following - corners[0]).sum(axis=0))
             longest = int(np.argmax(np.linalg.norm(following - corners, axis=1)))
             along = unit(following[longest] - corners[longest])
-            placement = add(
-                f"AXIS2_PLACEMENT_3D('',{self._on(facet.loops[0])},"
-                f"{direction(normal)},{direction(along)})"
-            )
+            placement = self.entities.placement(self._on(facet.loops[0]), normal, along)
             plane = add(f"PLANE('',{placement})")
             numbers.append(self.entities.next)
             bounds = reference_list(self.bounds[number])
@@ -79,7 +74,7 @@ class StepBody:
             line = add(f"LINE('',{self.points[low]},{along})")
             edge = add(f"EDGE_CURVE('',{self.corners[low]},{self.corners[high]},{line},.T.)")
             self.edges[low, high] = edge
-        return add(f"ORIENTED_EDGE('',*,*,{edge},.{'T' if start < end else 'F'}.)")
+        return self.entities.oriented(edge, forward=start < end)
 
     def arc(self, face: AnalyticFace, rim: Rim, *, forward: bool) -> str:
         """Return the oriented arc of a rim, forward: to the right on its face."""
@@ -88,15 +83,13 @@ class StepBody:
         if edge is None:
             T = face.T_part_axis
             centre = np.round(T[:3, 3] + rim.height_mm * T[:3, 2], PLACES)
-            point = add(f"CARTESIAN_POINT('',{triple(centre, PLACES)})")
-            z, x = self.entities.direction(T[:3, 2]), self.entities.direction(T[:3, 0])
-            placement = add(f"AXIS2_PLACEMENT_3D('',{point},{z},{x})")
+            placement = self.entities.placement(self.entities.point(centre), T[:3, 2], T[:3, 0])
             circle = add(f"CIRCLE('',{placement},{rim.radius_mm:.{PLACES}f})")
             ends = f"{self.corners[rim.vertices[0]]},{self.corners[rim.vertices[-1]]}"
             sense = "T" if face.angle_rad > 0 else "F"
             edge = add(f"EDGE_CURVE('',{ends},{circle},.{sense}.)")
             self.arcs[rim.vertices] = edge
-        return add(f"ORIENTED_EDGE('',*,*,{edge},.{'T' if forward else 'F'}.)")
+        return self.entities.oriented(edge, forward=forward)
 
     def rim_edge(self, rim: Rim, *, forward: bool) -> str:
         """Return the oriented arc of a rim, forward: to the right on the face that it is of."""
@@ -131,7 +124,6 @@ class StepBody:
         return sorted(used)
 
     def _on(self, loop: tuple[int, ...]) -> str:
-        """Return a point of a loop."""
         return next(self.points[vertex] for vertex in loop if vertex in self.points)
 
     def _bound(self, loop: tuple[int, ...], kind: str) -> str:
@@ -144,6 +136,4 @@ class StepBody:
                 oriented.append(self.line(*step))
             elif step in ((v := rim[1].vertices)[:2], v[-1:] + v[-2:-1]):
                 oriented.append(self.arc(*rim, forward=step == v[:2]))
-        add = self.entities.add
-        edge_loop = add(f"EDGE_LOOP('',({reference_list(oriented)}))")
-        return add(f"{kind}('',{edge_loop},.T.)")
+        return self.entities.bound(oriented, kind)

@@ -19,7 +19,6 @@ from generator.export.step.entities import (
     Entities,
     reference_list,
     step_string,
-    triple,
     unit,
 )
 from generator.solid.part import AnalyticFace, BentSymbol, transform
@@ -70,15 +69,10 @@ class _RoundFace:
         if high.radius_mm > 0.0:
             edges.append(body.rim_edge(high, forward=False))
         edges.append(body.line(high.vertices[0], low.vertices[0]))
-        own = self.bound(edges, "FACE_OUTER_BOUND")
+        own = self.file.bound(edges, "FACE_OUTER_BOUND")
         for symbol in face.symbols:
             _RoundSymbol(self, symbol).write()
         self.add_face([own, *self.bounds], 0.0, step_string(face.name))
-
-    def bound(self, edges: list[str], kind: str) -> str:
-        """Write a bound of oriented edges."""
-        loop = self.file.add(f"EDGE_LOOP('',({reference_list(edges)}))")
-        return self.file.add(f"{kind}('',{loop},.T.)")
 
     def add_face(self, bounds: list[str], z_mm: float, name: str) -> int:
         """Write a face on the surface moved outward by z."""
@@ -93,15 +87,13 @@ class _RoundFace:
         return number
 
     def surface(self, z_mm: float) -> str:
-        """Return the surface moved outward by z."""
         found = self.surfaces.get(z_mm)
         if found is None:
             face, add = self.face, self.file.add
             T = face.T_part_axis
-            point = add(f"CARTESIAN_POINT('',{triple(np.round(T[:3, 3], PLACES), PLACES)})")
+            point = self.file.point(np.round(T[:3, 3], PLACES))
             widening = T[:3, 2] if face.slope >= 0.0 else -T[:3, 2]
-            z, x = self.file.direction(widening), self.file.direction(T[:3, 0])
-            placement = add(f"AXIS2_PLACEMENT_3D('',{point},{z},{x})")
+            placement = self.file.placement(point, widening, T[:3, 0])
             (at_origin,) = face.radius_at(np.zeros(1), np.array([z_mm])).tolist()
             radius = f"{at_origin:.{PLACES}f}"
             if face.slope == 0.0:
@@ -118,14 +110,15 @@ class _RoundSymbol:
 
     def __init__(self, on: _RoundFace, symbol: BentSymbol) -> None:
         self.on, self.symbol = on, symbol
-        self.add = on.file.add
+        self.file, self.add = on.file, on.file.add
         T = on.face.T_part_axis
         self.places = [
             [[np.round(transform(T, edge), _PLACES) for edge in ring] for ring in tier]
             for tier in symbol.rings
         ]
         self.points = [
-            [[self.point(edge[0]) for edge in ring] for ring in tier] for tier in self.places
+            [[on.file.point(edge[0], _PLACES) for edge in ring] for ring in tier]
+            for tier in self.places
         ]
         self.corners = [
             [[self.add(f"VERTEX_POINT('',{point})") for point in ring] for ring in tier]
@@ -156,22 +149,23 @@ class _RoundSymbol:
         self.colour(on.add_face(bounds, heights[-1], f"{self.name}/top"))
 
     def sides(self, tier: int, ring: int) -> None:
-        """Write the sides between two tiers."""
         low, high = self.edges[tier][ring], self.edges[tier + 1][ring]
         risers = []
         for k in range(len(low)):
             a, b = self.places[tier][ring][k][0], self.places[tier + 1][ring][k][0]
-            along = self.on.file.vector(unit(b - a))
+            along = self.file.vector(unit(b - a))
             line = self.add(f"LINE('',{self.points[tier][ring][k]},{along})")
             ends = f"{self.corners[tier][ring][k]},{self.corners[tier + 1][ring][k]}"
             risers.append(self.add(f"EDGE_CURVE('',{ends},{line},.T.)"))
         for k in range(len(low)):
             j = (k + 1) % len(low)
             edges = [
-                self.oriented(low[k], True), self.oriented(risers[j], True),
-                self.oriented(high[k], False), self.oriented(risers[k], False),
+                self.file.oriented(edge, forward=forward)
+                for edge, forward in (
+                    (low[k], True), (risers[j], True), (high[k], False), (risers[k], False)
+                )
             ]  # fmt: skip
-            bound = self.on.bound(edges, "FACE_OUTER_BOUND")
+            bound = self.file.bound(edges, "FACE_OUTER_BOUND")
             surface = self.side_surface(tier, ring, k)
             self.colour(self.on.add_any_face([bound], surface, f"{self.name}/side"))
 
@@ -187,10 +181,8 @@ class _RoundSymbol:
                 abs(float((b - a) @ normal)) < _PLANAR_MM
                 and abs(float((c - a) @ normal)) < _PLANAR_MM
             ):
-                placement = self.add(
-                    f"AXIS2_PLACEMENT_3D('',{self.points[tier][ring][k]},"
-                    f"{self.on.file.direction(normal)},{self.on.file.direction(unit(b - a))})"
-                )
+                at = self.points[tier][ring][k]
+                placement = self.file.placement(at, normal, unit(b - a))
                 return self.add(f"PLANE('',{placement})")
         rows = list(zip(self.control_points(*below), self.control_points(*above), strict=True))
         grid = ",".join(f"({low},{high})" for low, high in rows)
@@ -201,11 +193,12 @@ class _RoundSymbol:
         )
 
     def control_points(self, tier: int, ring: int, k: int) -> tuple[str, ...]:
-        """Return all control points of an edge."""
         inner = self.controls.get((tier, ring, k))
         points = self.points[tier][ring]
         if inner is None:
-            inner = tuple(self.point(place) for place in self.places[tier][ring][k][1:])
+            inner = tuple(
+                self.file.point(place, _PLACES) for place in self.places[tier][ring][k][1:]
+            )
         return (points[k], *inner, points[(k + 1) % len(points)])
 
     def curve(self, tier: int, ring: int, k: int) -> str:
@@ -216,9 +209,9 @@ class _RoundSymbol:
         off = np.linalg.norm(np.cross(own[k][1:] - a, unit(b - a)), axis=1)
         ends = f"{self.corners[tier][ring][k]},{self.corners[tier][ring][j]}"
         if off.max() < _STRAIGHT_MM:
-            line = f"LINE('',{self.points[tier][ring][k]},{self.on.file.vector(unit(b - a))})"
+            line = f"LINE('',{self.points[tier][ring][k]},{self.file.vector(unit(b - a))})"
             return self.add(f"EDGE_CURVE('',{ends},{self.add(line)},.T.)")
-        self.controls[tier, ring, k] = tuple(self.point(p) for p in own[k][1:])
+        self.controls[tier, ring, k] = tuple(self.file.point(p, _PLACES) for p in own[k][1:])
         through = self.control_points(tier, ring, k)
         n = len(through)
         spline = self.add(
@@ -228,18 +221,10 @@ class _RoundSymbol:
         return self.add(f"EDGE_CURVE('',{ends},{spline},.T.)")
 
     def ring(self, tier: int, ring: int, *, forward: bool, kind: str) -> str:
-        """Write a bound along a ring."""
         edges = self.edges[tier][ring]
         order = edges if forward else edges[::-1]
-        return self.on.bound([self.oriented(edge, forward) for edge in order], kind)
-
-    def oriented(self, edge: str, forward: bool) -> str:
-        return self.add(f"ORIENTED_EDGE('',*,*,{edge},.{'T' if forward else 'F'}.)")
-
-    def point(self, place: Points) -> str:
-        return self.add(f"CARTESIAN_POINT('',{triple(place, _PLACES)})")
+        return self.file.bound([self.file.oriented(edge, forward=forward) for edge in order], kind)
 
     def colour(self, face: int) -> None:
-        """Give a face the symbols' colour."""
-        self.on.coloured.append(self.on.file.next)
+        self.on.coloured.append(self.file.next)
         self.add(f"STYLED_ITEM('',({self.on.style}),#{face})")

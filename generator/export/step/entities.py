@@ -60,6 +60,24 @@ class Entities:
         """Return the vector of length 1 with these components, as `unit_text` writes them."""
         return self._once(f"VECTOR('',{self.direction_along(components)},1.)")
 
+    def point(self, place: NDArray[np.float64], places: int = PLACES) -> str:
+        """Write a point (3,), mm."""
+        return self.add(f"CARTESIAN_POINT('',{triple(place, places)})")
+
+    def placement(self, point: str, z: NDArray[np.float64], x: NDArray[np.float64]) -> str:
+        """Write a frame at a point with axes z and x, (3,)."""
+        axes = f"{self.direction(z)},{self.direction(x)}"
+        return self.add(f"AXIS2_PLACEMENT_3D('',{point},{axes})")
+
+    def oriented(self, edge: str, *, forward: bool) -> str:
+        """Write an edge as a loop runs along it."""
+        return self.add(f"ORIENTED_EDGE('',*,*,{edge},.{'T' if forward else 'F'}.)")
+
+    def bound(self, edges: list[str], kind: str) -> str:
+        """Write a bound of oriented edges."""
+        loop = self.add(f"EDGE_LOOP('',({reference_list(edges)}))")
+        return self.add(f"{kind}('',{loop},.T.)")
+
     def reserve(self, count: int) -> int:
         """Return the first of `count` numbers that the caller writes himself."""
         first = self.next
@@ -187,10 +205,7 @@ def write_units(entities: Entities) -> str:
 def write_origin(entities: Entities) -> str:
     """Write the frame that parts are given in."""
     point = entities.add("CARTESIAN_POINT('',(0.,0.,0.))")
-    x, z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    return entities.add(
-        f"AXIS2_PLACEMENT_3D('',{point},{entities.direction(z)},{entities.direction(x)})"
-    )
+    return entities.placement(point, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
 
 
 def write_style(entities: Entities, colour_rgb: RGB) -> str:
@@ -262,6 +277,5 @@ def write_assembly_product(
 
 
 def _placement(entities: Entities, T: NDArray[np.float64]) -> str:
-    point = entities.add(f"CARTESIAN_POINT('',{triple(np.round(T[:3, 3], PLACES), PLACES)})")
-    z, x = entities.direction(T[:3, 2]), entities.direction(T[:3, 0])
-    return entities.add(f"AXIS2_PLACEMENT_3D('',{point},{z},{x})")
+    point = entities.point(np.round(T[:3, 3], PLACES))
+    return entities.placement(point, T[:3, 2], T[:3, 0])

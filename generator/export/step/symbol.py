@@ -28,6 +28,7 @@ from generator.export.fixed_text import (
     with_references,
 )
 from generator.export.step.entities import Entities, unit, unit_text
+from generator.solid.triangulate import number_rings, outline_points
 
 KINDS = ("top", "side", "inside")  #: of a symbol's faces; "inside": the facet within a ring
 
@@ -47,17 +48,6 @@ class SymbolTemplate:
     footprint: int  #: bound of the facet
     faces: NDArray[np.int64]
     coloured: NDArray[np.int64]  #: styled items
-
-
-@lru_cache(maxsize=128)
-def outline_points(tiers: Tiers) -> NDArray[np.float64]:
-    """Return all points of an outline, (n, 3) mm in the symbol's axes, tier by tier."""
-    blocks = [
-        np.column_stack([ring, np.full(len(ring), z)])
-        for z, rings in zip(tiers.z_mm, tiers.rings, strict=True)
-        for ring in rings
-    ]
-    return np.concatenate(blocks)
 
 
 def symbol_entities(tiers: Tiers) -> int:
@@ -179,7 +169,7 @@ class _SymbolBuilder:
             self.add(f"CARTESIAN_POINT('',({self.coordinates}))")
         for i in range(n):
             self.add("VERTEX_POINT('',", i, ")")
-        rings = self.rings()
+        rings = [[ring.tolist() for ring in tier] for tier in number_rings(self.sizes)]
         outer, *holes = rings[0]
         footprint = self.bound(outer[::-1], "FACE_BOUND")
         for hole in holes:
@@ -196,17 +186,6 @@ class _SymbolBuilder:
             np.array(self.coloured, np.int64),
         )
         return _SymbolTopology(symbol, tuple(self.referred), np.array(self.quads, np.int64))
-
-    def rings(self) -> list[list[list[int]]]:
-        """Return the numbers of the points, [tier][ring][point]."""
-        rings: list[list[list[int]]] = []
-        first = 0
-        for tier in self.sizes:
-            rings.append([])
-            for size in tier:
-                rings[-1].append(list(range(first, first + size)))
-                first += size
-        return rings
 
     def add(self, *terms: _Term) -> int:
         """Write one entity from literal text and references; return its number."""
@@ -244,11 +223,9 @@ class _SymbolBuilder:
         return self.add(f"{kind}('',", self.add(*terms), ",.T.)")
 
     def flat(self, loops: list[list[int]], kind: str) -> None:
-        """Write a face parallel to the facet."""
         self.face(loops, self.normal, self.along, kind)
 
     def sides(self, low: list[int], high: list[int]) -> None:
-        """Write the quadrilaterals between two rings."""
         for i, point in enumerate(low):
             j = (i + 1) % len(low)
             number = len(self.quads)

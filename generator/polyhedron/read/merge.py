@@ -51,13 +51,13 @@ def merge_triangles(soup: Soup) -> tuple[Floats, Faces]:
         faces.setdefault(int(group[soup.face[loop[0]]]), []).append(
             tuple(corners[start:] + corners[:start])
         )
-    used, number = np.unique([v for f in faces.values() for r in f for v in r], return_inverse=True)
-    renumber = dict(
-        zip((int(v) for f in faces.values() for r in f for v in r), number, strict=True)
-    )
+    used = np.unique([v for loops in faces.values() for loop in loops for v in loop]).astype(int)
     return soup.points[used], [
-        tuple(tuple(int(renumber[v]) for v in loop) for loop in _outer_first(soup.points, faces[g]))
-        for g in sorted(faces)
+        tuple(
+            tuple(np.searchsorted(used, loop).tolist())
+            for loop in _outer_first(soup.points, faces[face])
+        )
+        for face in sorted(faces)
     ]
 
 

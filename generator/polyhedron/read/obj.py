@@ -61,20 +61,16 @@ def _point(words: list[str], place: str) -> tuple[float, ...]:
         x, y, z = (float(word) for word in words[:3])  # a weight or colours may follow
     except ValueError:
         shown = " ".join(words)[:60]
-        wrong = [word for word in words[:3] if not _is_number(word)]
-        why = f"'{wrong[0][:20]}' is no number" if wrong else "it has three numbers"
+        why = "it has three numbers"
+        for word in words[2::-1]:
+            try:
+                float(word)
+            except ValueError:
+                why = f"'{word[:20]}' is no number"
         raise ShapeError(f"'v {shown}' is not a point: {why}", fix=_AGAIN, place=place) from None
     if not np.isfinite((x, y, z)).all():
         raise ShapeError("a coordinate is not a number", fix=_AGAIN, place=place)
     return x, y, z
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _loop(words: list[str], count: int, place: str) -> tuple[int, ...]:

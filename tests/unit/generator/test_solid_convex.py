@@ -10,6 +10,7 @@ from manifold3d import Manifold
 
 from generator.errors import SolidError
 from generator.export.robot.model import quaternion, roll_pitch_yaw
+from generator.solid import convex
 from generator.solid.convex import convex_pieces
 from generator.solid.measure import inertia_of
 
@@ -45,14 +46,16 @@ def test_bodies_apart_are_pieces_of_their_own():
     assert volumes(found) == pytest.approx([27, 8])
 
 
-def test_a_ring_is_cut_until_no_piece_stands_out_far():
+def test_a_ring_is_cut_until_no_piece_stands_out_far(monkeypatch):
     ring = Manifold.cylinder(10, 20, circular_segments=48)
     ring -= Manifold.cylinder(10, 15, circular_segments=48)
     for depth in (2.0, 0.5):
-        found = convex_pieces(*mesh_of(ring), depth_mm=depth)
+        monkeypatch.setattr(convex, "DEPTH_MM", depth)
+        found = convex_pieces(*mesh_of(ring))
         assert found.depth_mm <= depth
         assert ring.volume() < sum(volumes(found)) < ring.volume() * (1 + depth / 5)
-    coarse = convex_pieces(*mesh_of(ring), most=3)
+    monkeypatch.setattr(convex, "_MOST", 3)
+    coarse = convex_pieces(*mesh_of(ring))
     assert 3 <= len(coarse.pieces) <= 4  # the last cut may leave more than two
     assert coarse.depth_mm > 2
 

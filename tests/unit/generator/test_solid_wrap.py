@@ -22,7 +22,7 @@ from generator.solid import body_mesh, emboss_whole, prove_closed, symbol_meshes
 from generator.solid.analytic import bend_problem
 from generator.solid.closed import edges_once
 from generator.solid.measure import symbol_volume
-from generator.solid.wrapped import NUDGE_MM, cut_symbol, strip_of
+from generator.solid.wrapped import NUDGE_MM, Knife, strip_of
 
 STYLE = SymbolStyle()
 TIERS = outlines(alphabet_named("dense-4"), STYLE)
@@ -100,7 +100,7 @@ def test_pieces_of_a_symbol_cover_it_wherever_it_stands(x, y, rotation, label):
     R = np.array([[np.cos(rotation), -np.sin(rotation)], [np.sin(rotation), np.cos(rotation)]])
     centre = np.array([x, y])
     rings = [[ring @ R.T + centre for ring in tier] for tier in TIERS[label].rings]
-    cut = cut_symbol(strip, rings, list(TIERS[label].z_mm), centre, "here")
+    cut = Knife(strip, rings, list(TIERS[label].z_mm), centre, "here").cut()
     flat = np.array(cut.flat)
     for pieces, tier in ((cut.feet, rings[0]), (cut.tops, rings[-1])):
         area = sum(signed_area(flat[list(loop)]) for _, loops in pieces for loop in loops)
