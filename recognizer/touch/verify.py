@@ -49,7 +49,7 @@ from recognizer.touch.symbols.image import Image, bend_image
 
 STEPS = 4  #: of damped least squares, of a place with known symbols
 
-# Of round faces (`tests/bench/round_faces.py`).
+# Of round faces; docs/recognizer.md has what they read.
 CURVATURES = 2  #: curvatures that an image is read under
 THOROUGH_CURVATURES = 5  #: in the second search, ...
 #: ... each with this effort: several curvatures do what several gains do on a flat face

@@ -26,7 +26,7 @@ class PoseGrid:
     """Along each side of one cell: 24 x 24 places, .3 mm apart at a pitch of 7 mm."""
     turns: int = 90
     """Over half a circle, 2 degrees apart. With 48 places and 180 turns no share of
-    `tests/bench/folds.py` moves by more than .003."""
+    `docs/folds.md` moves by more than .003."""
 
 
 POSES = PoseGrid()

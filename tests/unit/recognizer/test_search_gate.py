@@ -11,6 +11,7 @@ from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW, refusal
 from recognizer.touch.search_gate import (
     GAPS,
+    MARGIN,
     gap_share,
     is_nearly_chance,
     may_find_more,
@@ -22,17 +23,19 @@ from recognizer.touch.verdict import Evidence
 STROKES = ((np.indices((16, 16)) % 4) < 2).any(axis=0)
 
 
-def reader(small, pitch=7.0, kind="tab", radii=(), flat_too=False):
+def reader(small, pitch=7.0, kind="tab", radii=(), second=None):
+    """A reader of one array, or of another flat one of a `second` pitch as well."""
     embossed = small.two_faces().embossed
-    embossed = replace(
-        embossed,
-        style=SimpleNamespace(pitch_mm=pitch, height_mm=1.0, stroke_mm=1.4),
-        radii_mm=radii,
-    )
-    arrays = (embossed, replace(embossed, radii_mm=()))[: 1 + flat_too]
+    arrays = [
+        replace(
+            embossed, radii_mm=bent,
+            style=SimpleNamespace(pitch_mm=pitch_mm, height_mm=1.0, stroke_mm=1.4),
+        )
+        for pitch_mm, bent in ((pitch, radii), (second, ())) if pitch_mm
+    ]  # fmt: skip
     return SimpleNamespace(
         sensor=SensorType(overlay=Overlay(kind=kind)), options=ReaderOptions(),
-        lab=SimpleNamespace(arrays=arrays),
+        lab=SimpleNamespace(arrays=tuple(arrays)),
     )  # fmt: skip
 
 
@@ -51,7 +54,9 @@ def test_a_plate_shows_no_strokes_and_symbols_do(small):
     assert shows_strokes(reader(small), symbols)
 
 
-@pytest.mark.parametrize("given", [{"kind": "pad"}, {"pitch": 4.5}, {"pitch": 12.0}])
+@pytest.mark.parametrize(
+    "given", [{"kind": "pad"}, {"pitch": 4.5}, {"pitch": 12.0}, {"second": 4.5}, {"second": 12.0}]
+)
 def test_where_gaps_were_not_measured_nothing_is_refused(small, given):
     assert shows_strokes(reader(small, **given), plate(0.05))
 
@@ -62,12 +67,15 @@ def test_an_edge_of_a_plate_is_no_stroke(small):
 
 
 def test_gaps_tactel_by_tactel():
-    signal = signal_of(np.random.default_rng(5).gamma(0.7, 60.0, (16, 16)) + 8)
-    wide = np.pad(signal.forces, 2, mode="edge")
-    pressed = 0.15 * np.sort(signal.forces, axis=None)[-12:].mean()
+    rng = np.random.default_rng(5)
+    trust = (rng.random((16, 16)) > 0.2).astype(float)
+    signal = replace(signal_of(rng.gamma(0.7, 60.0, (16, 16)) + 8), trust=trust)
+    forces = signal.forces * trust
+    wide = np.pad(forces, 2, mode="edge")
+    pressed = 0.15 * np.sort(forces, axis=None)[-12:].mean()
     near = np.array([np.quantile(wide[r : r + 5, c : c + 5], 0.85) for r, c in np.ndindex(16, 16)])
-    adjacent = near > pressed
-    weak = adjacent & (signal.forces.ravel() < 0.35 * near)
+    adjacent = (near > pressed) & (trust.ravel() > 0)
+    weak = adjacent & (forces.ravel() < 0.35 * near)
     assert gap_share(signal) == pytest.approx(weak.sum() / adjacent.sum())
 
 
@@ -81,12 +89,12 @@ def touch_of(tactels):
 def asked(small):
     """Ask for a wide search after a first try; four symbols and 48 cells: three name one."""
 
-    def ask(*, tactels=160, reason=NOT_ENCODED, judged=None, lab=None, **speaks):
+    def ask(*, tactels=160, reason=NOT_ENCODED, judged=None, lab=None, order=4, **speaks):
         answer = refusal(0, reason)
         if not reason:
             answer = replace(answer, object="Thing")
         found = SimpleNamespace(
-            embossed=small.two_faces().embossed,
+            embossed=replace(small.two_faces().embossed, array=SimpleNamespace(order=order)),
             evidence=replace(Evidence(5.0, 5, 0, explained=0.9), **speaks),
         )
         given = answer if judged is None else judged
@@ -95,7 +103,7 @@ def asked(small):
     return ask
 
 
-PAD, ROUND, SOME_ROUND = {"kind": "pad"}, {"radii": (20.0,)}, {"radii": (20.0,), "flat_too": True}
+PAD, ROUND, SOME_ROUND = {"kind": "pad"}, {"radii": (20.0,)}, {"radii": (20.0,), "second": 7.0}
 
 
 @pytest.mark.parametrize(
@@ -104,6 +112,7 @@ PAD, ROUND, SOME_ROUND = {"kind": "pad"}, {"radii": (20.0,)}, {"radii": (20.0,),
         # 0.44 of the 19.4 tactels of a cell, three times: 25.7; a round face presses a strip
         ({"tactels": 25}, False), ({"tactels": 26}, True), ({"tactels": 25, "lab": ROUND}, True),
         ({"tactels": 25, "lab": SOME_ROUND}, True),
+        ({"tactels": 26, "lab": {"second": 7.9}}, True),  # the smaller symbols are fewer tactels
         # symbols of no registered place
         ({"log_likelihood_ratio": 3.0}, True), ({"log_likelihood_ratio": 2.9}, False),
         # no stroke shows
@@ -117,6 +126,8 @@ PAD, ROUND, SOME_ROUND = {"kind": "pad"}, {"radii": (20.0,)}, {"radii": (20.0,),
         # an image that is explained shows no more
         ({"reason": AMBIGUOUS, "inliers": 2}, False), ({"reason": AMBIGUOUS, "inliers": 3}, True),
         ({"reason": TOO_FEW, "inliers": 3}, False),
+        ({"reason": AMBIGUOUS, "inliers": 5, "order": 2}, False),  # six of two kinds name a cell
+        ({"reason": NOT_ENCODED, "inliers": 5, "order": 2}, True),
         # many symbols are sure anywhere; few are confirmed where that was not measured
         *(({"reason": "", "inliers": 11, "lab": lab}, False) for lab in ({}, ROUND, PAD)),
         *(
@@ -136,7 +147,7 @@ def test_which_touches_are_searched_widely(asked, given, wide):
     [
         (refusal(0, BY_CHANCE, doubt=1.0e-3), True),
         (refusal(0, BY_CHANCE, doubt=1.1e-3), False),
-        (refusal(0, AMBIGUOUS, margin=12.0), True),
+        (refusal(0, AMBIGUOUS, margin=MARGIN), True),
         (refusal(0, AMBIGUOUS, margin=11.9), False),
         (refusal(0, TOO_FEW, margin=30.0), False),
     ],
