@@ -45,45 +45,28 @@ def test_a_frame_waits_for_its_neighbour():
     assert order.settle(0) is None
 
 
-def test_packets_that_are_no_frames_confirm_too():
+@pytest.mark.parametrize(
+    ("packets", "seen", "lost", "doubtful"),
+    [
+        # packets that are no frames confirm too
+        ([packet(0), ident(1, 5000), packet(1), packet(2)], [0, 1, 2], 0, 0),
+        ([packet(0), StatisticsPacket(1, 0, 1, 0, 0, 0), packet(7)], [0, 7], 6, 0),
+        # failed blocks account for a gap
+        ([packet(0), 20, packet(2), 530, 9, packet(5), 1060, packet(8)], [0, 2, 5, 8], 5, 0),
+        # head of 1 and tail of 2, with a check sum that is right by chance
+        ([packet(0), packet(1), packet(3), packet(4)], [0, 3, 4], 2, 1),
+        # more is lost than failed
+        ([packet(0), 530, packet(3), packet(4)], [3, 4], 0, 1),
+        # a wrong number, a wrong time, and one frame of another start
+        ([packet(0), packet(1), packet(40_000, 20_000), packet(3), packet(4)], [0, 3, 4], 2, 2),
+        ([packet(0), packet(1), packet(2, 3 * 10**9), packet(3), packet(4)], [0, 3, 4], 2, 2),
+        ([packet(50), packet(51), packet(3, 30), packet(53), packet(54)], [50, 53, 54], 2, 2),
+    ],
+)
+def test_frames_that_no_neighbour_confirms_stay_out(packets, seen, lost, doubtful):
     order = FrameOrder()
-    assert numbers(order, [packet(0), ident(1, 5000), packet(1), packet(2)]) == [0, 1, 2]
-    order = FrameOrder()
-    assert numbers(order, [packet(0), StatisticsPacket(1, 0, 1, 0, 0, 0), packet(7)]) == [0, 7]
-    assert (order.lost, order.doubtful) == (6, 0)
-
-
-def test_failed_blocks_account_for_a_gap():
-    order = FrameOrder()
-    assert numbers(order, [packet(0), 20, packet(2), 530, 9, packet(5), 1060, packet(8)]) == [
-        0,
-        2,
-        5,
-        8,
-    ]
-    assert (order.lost, order.doubtful) == (5, 0)
-
-
-def test_bytes_that_vanish_without_a_failed_block_make_the_frame_doubtful():
-    # Head of 1 and tail of 2, with a check sum that is right by chance.
-    order = FrameOrder()
-    assert numbers(order, [packet(0), packet(1), packet(3), packet(4)]) == [0, 3, 4]
-    assert (order.lost, order.doubtful) == (2, 1)
-
-
-def test_more_lost_than_failed_makes_the_frame_doubtful():
-    order = FrameOrder()
-    assert numbers(order, [packet(0), 530, packet(3), packet(4)]) == [3, 4]
-    assert order.doubtful == 1
-
-
-@pytest.mark.parametrize("wrong", [packet(40_000, 2 * STEP_US), packet(2, 3_000_000_000)])
-def test_a_wrong_number_or_time_is_not_handed_on(wrong):
-    order = FrameOrder()
-    seen = numbers(order, [packet(0), packet(1), wrong, packet(3), packet(4)])
-    assert seen == [0, 3, 4]
-    assert order.doubtful == 2
-    assert order.reboots == 0
+    assert numbers(order, packets) == seen
+    assert (order.lost, order.doubtful, order.reboots) == (lost, doubtful, 0)
 
 
 def test_numbers_and_times_unwrap():
@@ -145,13 +128,6 @@ def test_a_number_that_goes_back_while_the_clock_goes_on_is_a_start_too():
     after = run(order, [packet(i, (1000 + i) * STEP_US) for i in range(3)])
     assert after == [(i, (1000 + i) * STEP_US) for i in range(3)]
     assert (order.reboots, order.lost) == (1, 0)
-
-
-def test_one_stray_frame_is_no_reboot():
-    order = FrameOrder()
-    seen = numbers(order, [packet(500), packet(501), packet(3, 30), packet(503), packet(504)])
-    assert seen == [500, 503, 504]
-    assert order.reboots == 0
 
 
 def wire(seq: int, value: int | None = None) -> bytes:

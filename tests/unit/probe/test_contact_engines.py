@@ -17,7 +17,7 @@ from probe.contact.contract import Contact, Touch, WristStiffness
 from probe.contact.engines import ENGINES, Engine, EngineEntry, engine_named
 from probe.contact.mujoco import AROUND_MM, DEEP_MM, STIFFER, mesh_under
 from probe.contact.tips import Tips
-from probe.errors import ContactError, ProbeError
+from probe.errors import ProbeError
 from probe.simulate.scene import bare_scene
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.sensor import LevelSensor
@@ -161,8 +161,3 @@ def test_a_third_engine_is_one_module_and_one_line(monkeypatch):
     assert (contact.level, contact.z_mm) == ("third", 0.25)
     assert np.ptp(counts.astype(int)) <= 2  # every tactel bears half a newton; the board rounds
     assert counts.min() > 60
-
-
-def test_an_unknown_engine_is_named_with_those_there_are():
-    with pytest.raises(ContactError, match="own, mujoco"):
-        engine_named("bullet")

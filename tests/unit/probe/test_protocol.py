@@ -32,10 +32,6 @@ def wire(payload: bytes) -> bytes:
     return cobs.encode(payload + struct.pack("<H", crc_hqx(payload, 0xFFFF)))
 
 
-def test_the_check_sum_is_ccitt_false():
-    assert crc_hqx(b"123456789", 0xFFFF) == 0x29B1
-
-
 def test_frame_bytes_are_those_of_the_format():
     block = encode(FRAME)
     assert block.count(0) == 1
@@ -154,14 +150,6 @@ def test_commands_for_a_sensor_or_bits_that_a_probe_does_not_have():
         sensor_command(8)
     with pytest.raises(PortError, match="12 bits"):
         bits_command(12)
-
-
-def test_blocks_end_at_zeros():
-    splitter = Splitter()
-    assert splitter.feed(b"ab") == []
-    assert splitter.feed(b"c\0\0de\0f") == [b"abc", b"de"]
-    assert splitter.feed(b"\0") == [b"f"]
-    assert splitter.feed(b"") == []
 
 
 def test_a_block_without_end_is_cut_and_stays_too_long():

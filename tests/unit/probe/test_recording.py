@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import h5py
@@ -159,27 +157,6 @@ def test_two_recorders_cannot_write_one_file_and_a_closed_one_takes_no_frames(tm
         recorder.append(frames(1)[0])
 
 
-def test_an_error_of_the_caller_keeps_the_frames(tmp_path):
-    def careless():
-        with Recorder(tmp_path / "touch.h5") as recorder:
-            recorder.append(frames(1)[0])
-            raise KeyError
-
-    with pytest.raises(KeyError):
-        careless()
-    assert len(Recording(tmp_path / "touch.h5")) == 1
-
-
-def test_hdf5_is_not_loaded_before_a_file_is_opened():
-    modules = "record read repair table imported"
-    code = "import sys\n" + "".join(f"import probe.recording.{name}\n" for name in modules.split())
-    code += "print(sorted({'h5py', 'scipy'} & set(sys.modules)))"
-    answer = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert answer.stdout == "[]\n"
-
-
 def test_others_files_that_are_no_recording_are_told_apart(tmp_path):
     refused(tmp_path, "Is a directory; this is a folder")
     refused(foreign(tmp_path / "b.h5", data=COUNTS, more=1), "/frames, but data, more; import")
@@ -209,35 +186,6 @@ def test_attributes_of_others_are_kept_and_a_user_block_does_not_matter(tmp_path
     assert superblock_of(path).whole
     assert recording.origin.sensor == "mat 3"
     assert dict(recording.origin.more) == {"piece": 4, "format": "own"}
-
-
-@pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
-def test_a_truncated_recording_gives_the_frames_that_are_there(tmp_path, share):
-    path = tmp_path / "touch.h5"
-    given = frames(600)
-    record(path, given)
-    whole = path.read_bytes()
-    path.write_bytes(whole[: int(share * len(whole))])
-    refused(path, rf"truncated: {int(share * len(whole))} of {len(whole)} bytes")
-    result = repair(path)
-    assert result.path == path
-    assert result.frames + result.lost == 600
-    assert result.frames >= share * 600 - 2 * 64
-    left = list(Recording(path).frames())
-    assert len(left) == result.frames
-    assert all(same(frame, given[frame.seq]) for frame in left)
-    assert Recording(path).origin.more["frames_lost"] == result.lost
-    assert (tmp_path / "touch.damaged.h5").read_bytes() == whole[: int(share * len(whole))]
-    assert names(tmp_path) == ["touch.damaged.h5", "touch.h5"]
-
-
-def test_a_recording_of_which_nothing_is_left(tmp_path):
-    path = record(tmp_path / "touch.h5", frames(600)).files[0]
-    for size in (2000, 40):
-        path.write_bytes(path.read_bytes()[:size])
-        with pytest.raises(RecordingError, match=r"damaged|no frame in it can be read"):
-            repair(path)
-        assert names(tmp_path) == ["touch.h5"]
 
 
 def test_others_files_stay_beside_the_repaired_one(tmp_path):

@@ -67,23 +67,6 @@ def test_sixteen_images_have_time_first(tmp_path):
     ).all()
 
 
-def test_of_several_arrays_one_must_be_named(tmp_path):
-    path = tmp_path / "a.npz"
-    np.savez(path, left=COUNTS, right=COUNTS[:5], time=np.arange(70))
-    refused(path, r"several arrays .* left \(70, 16, 16\), right \(5, 16, 16\); .*--dataset")
-    refused(path, "no array of images 'up' in it, but left", dataset="up")
-    assert len(import_array(path, tmp_path / "out.h5", dataset="right")) == 5
-
-
-def test_an_array_named_frames_is_meant(tmp_path):
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        file["background"] = COUNTS
-        file["frames"] = COUNTS[:7] / 4
-    recording = import_array(tmp_path / "a.h5", tmp_path / "out.h5")
-    assert len(recording) == 7
-    assert recording.origin.more["imported_array"] == "frames"
-
-
 def test_values_that_are_no_numbers_are_refused(tmp_path):
     for bad in (np.nan, np.inf):
         values = COUNTS.astype(np.float32)
@@ -129,9 +112,3 @@ def test_files_without_images_are_refused(tmp_path):
         (tmp_path / name).write_bytes(content)
     for name in ("d.npy", "h.mat", "e.mat", "f.mat", "g.bin"):
         refused(tmp_path / name, "damaged|no HDF5 file|empty")
-
-
-@pytest.mark.parametrize("rate", [0.0, -1.0, np.inf, np.nan])
-def test_rates_are_above_0(tmp_path, rate):
-    np.save(tmp_path / "a.npy", COUNTS)
-    refused(tmp_path / "a.npy", "frames per second above 0", rate_hz=rate)

@@ -6,7 +6,6 @@ import json
 import struct
 import zlib
 
-import h5py
 import numpy as np
 import pytest
 
@@ -79,16 +78,6 @@ def test_a_torn_record_ends_it(journal, cut):
     content[-1 - cut] ^= 1  # of the last whole record
     journal.write_bytes(content)
     check(Recording(journal).frames(), 149)
-
-
-def test_repair_makes_hdf5_of_it(journal):
-    result = repair(journal.with_name("touch.h5"))
-    assert (result.path.name, result.frames, result.lost) == ("touch.h5", 200, 0)
-    assert not journal.exists()
-    check(Recording(result.path).frames(), 200)
-    with h5py.File(result.path) as file:
-        assert file["frames"].shape == (200, 6, 5)
-        assert (file.attrs["force_n"], file.attrs["sensor"]) == (80.0, "bench 1")
 
 
 def test_a_damaged_record_costs_its_block(journal):

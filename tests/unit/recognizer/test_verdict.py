@@ -131,6 +131,10 @@ def test_the_answer_of_several_touches(confirmed, outliers, sd_mm, reason):
     assert reject_joined(CUBE, confirmed, outliers, 3, sd_mm) == reason
 
 
+def test_limits_of_margins_are_reached_but_for_rounding():
+    assert (TEN, FOURTEEN) == (10.0 - 1e-4, 14.0 - 1e-4)
+
+
 def test_one_touch_alone_is_one_that_agrees():
     few = replace(GOOD, touches=2)
     assert reject_reason(few, TEN, LIMITS) == TOO_FEW  # one of two: no more than half
