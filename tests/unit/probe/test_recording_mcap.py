@@ -123,10 +123,7 @@ def test_images_that_are_none_are_refused_and_nothing_is_left(tmp_path, options,
     assert [p.name for p in tmp_path.iterdir()] == ["robot.mcap"]
 
 
-def test_files_that_are_none_are_refused(tmp_path, recording):
-    (tmp_path / "text.mcap").write_text("no messages here")
-    with pytest.raises(RecordingError, match="no MCAP file"):
-        import_mcap(tmp_path / "text.mcap", tmp_path / "r.h5")
+def test_a_file_without_images_is_refused(tmp_path):
     stream = io.BytesIO()
     writer = Writer(stream)
     writer.write_message(
@@ -137,12 +134,6 @@ def test_files_that_are_none_are_refused(tmp_path, recording):
     (tmp_path / "pose.mcap").write_bytes(stream.getvalue())
     with pytest.raises(RecordingError, match="no sensor_msgs/msg/Image in it, but geometry_msgs"):
         import_mcap(tmp_path / "pose.mcap", tmp_path / "r.h5")
-    export_mcap(recording, tmp_path / "a.mcap")
-    cut = (tmp_path / "a.mcap").read_bytes()[:-2000]
-    (tmp_path / "cut.mcap").write_bytes(cut)
-    with pytest.raises(RecordingError):
-        import_mcap(tmp_path / "cut.mcap", tmp_path / "r.h5")
-    assert not (tmp_path / "r.h5").exists()
 
 
 def test_a_covariance_is_in_metres():

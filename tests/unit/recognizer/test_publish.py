@@ -11,15 +11,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mcap_ros2.decoder import DecoderFactory
-from rosbags.typesys import Stores, get_typestore
 
 from encoded_objects.base.errors import EncodedObjectsError
 from probe.frame import frame_from
-from probe.recording.ros import DEFINITIONS, IMAGE, POSE_WITH_COVARIANCE, cdr_bytes, image_message
 from recognizer.command.answers import Answer
 from recognizer.command.publish import PublishSink, endpoint_of
-from recognizer.command.ros import object_message
 from recognizer.touch.recognition import Recognition
 
 RNG = np.random.default_rng(4)
@@ -111,17 +107,17 @@ def test_images_at_the_sensors_rate_and_answers_at_once(published):
 
 def test_a_slow_client_misses_images_and_no_answer(published):
     sink, port = published
-    client = Client(port, 60, hold=0.02)
-    for i in range(6000):
+    client = Client(port, 30, hold=0.01)
+    for i in range(3000):
         sink.frame(frame_from(np.full((16, 16), i), t_ns=i, seq=i))
         if i % 100 == 0:
             sink.answer(answer_of(i))
         if i % 20 == 0:
             time.sleep(0.001)
     told = client.told()
-    assert {seq for seq, _ in told["answers"]} == set(range(0, 6000, 100))
-    assert told["images"] < 3000
-    print("slow client: images", told["images"], "of 6000")
+    assert {seq for seq, _ in told["answers"]} == set(range(0, 3000, 100))
+    assert told["images"] < 1500
+    print("slow client: images", told["images"], "of 3000")
 
 
 def test_a_client_that_comes_late_gets_the_answers_before(published):
@@ -130,29 +126,6 @@ def test_a_client_that_comes_late_gets_the_answers_before(published):
         sink.answer(answer_of(i))
     time.sleep(0.2)
     assert sorted({seq for seq, _ in Client(port, 5).told()["answers"]}) == list(range(5))
-
-
-def test_images_and_objects_are_cdr_as_ros_has_it():
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    frame = frame_from(COUNTS, t_ns=3_000_000_007, seq=1)
-    answer = answer_of(8)
-    for kind, fields in (
-        (IMAGE, image_message(frame)),
-        (POSE_WITH_COVARIANCE, object_message(answer.found, None, 40)),
-    ):
-        data = cdr_bytes(kind, fields)
-        message = store.deserialize_cdr(data, kind)
-        assert message.header.frame_id == "sensor"
-        again = bytes(store.serialize_cdr(message, kind))
-        assert data == again[: len(data)]
-        schema = SimpleNamespace(
-            name=kind, data=DEFINITIONS[kind].encode(), encoding="ros2msg", id=1
-        )
-        decoded = DecoderFactory().decoder_for("cdr", schema)(data)
-        if kind == IMAGE:
-            assert np.array_equal(np.frombuffer(bytes(decoded.data), "<f4"), COUNTS.ravel())
-        else:
-            assert list(decoded.pose.covariance) == fields["pose"]["covariance"]
 
 
 @pytest.mark.parametrize(
