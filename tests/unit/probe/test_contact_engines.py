@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from manifold3d import Manifold
-from reference.indenters import Formula
+from reference.indenters import Formula, block
 from scipy.optimize import brentq
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
@@ -27,14 +27,6 @@ from probe.surface.mesh import mesh
 RIGID = WristStiffness(math.inf, math.inf)
 TIPS = Tips(points=7)
 SENSOR = SensorType()
-
-
-def block(low, high):
-    """Return the triangles of a box, counter-clockwise from outside."""
-    corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)], float)
-    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-    faces = [f for a, b, c, d in quads for f in ((a, b, c), (a, c, d))]
-    return corners[np.array(faces)]
 
 
 def plate_with_bars(wide=0.0):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from reference.indenters import half_plane, sphere
+from reference.indenters import block, half_plane, sphere
 from reference.mesh_heights import heights_by_numpy, heights_over
 from shapely.geometry import MultiPoint
 
@@ -80,17 +80,8 @@ HOLE = np.array([[4.0, 4], [4, 6], [6, 6], [6, 4]])
 HOOK = np.array([[0.0, 0], [10, 0], [10, 10], [7, 10], [7, 3], [0, 3]])
 
 
-def box(low, high):
-    """Twelve triangles of a closed box, counter-clockwise from outside."""
-    x0, y0, z0 = low
-    x1, y1, z1 = high
-    p = np.array([[x, y, z] for z in (z0, z1) for y in (y0, y1) for x in (x0, x1)])
-    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-    return p[[t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]]
-
-
 def test_box_has_its_top_inside_and_nothing_beside():
-    part = mesh(box((0, 0, -1), (4, 3, 2)))
+    part = mesh(block((0, 0, -1), (4, 3, 2)))
     assert part.top_mm == 2.0
     assert len(part.corners) == 2  # of a closed mesh, walls and underside are left out
     points = np.array([[0.0, 0], [4, 3], [2, 1.5], [1, 0], [4.0001, 1], [2, -1e-9], [99, 99]])
@@ -99,14 +90,14 @@ def test_box_has_its_top_inside_and_nothing_beside():
 
 
 def test_the_highest_of_several_bodies_counts_whatever_their_sense():
-    bodies = np.concatenate([box((0, 0, 0), (4, 4, 1)), box((1, 1, 0), (2, 2, 3))[:, ::-1]])
+    bodies = np.concatenate([block((0, 0, 0), (4, 4, 1)), block((1, 1, 0), (2, 2, 3))[:, ::-1]])
     part = mesh(bodies)  # one of them inside out: no triangle is left out for its sense
     assert part.heights_mm(np.array([[0.5, 0.5], [1.5, 1.5]])).tolist() == [1.0, 3.0]
 
 
 def test_frames_move_the_part_under_the_sensor():
     T = np.array([[0.0, 0, 1, 5], [0, 1, 0, 6], [-1, 0, 0, 7], [0, 0, 0, 1]])
-    part = mesh(box((0, 0, 0), (1, 2, 3)), T)
+    part = mesh(block((0, 0, 0), (1, 2, 3)), T)
     assert part.top_mm == 7.0
     assert part.heights_mm(np.array([[6.5, 7.0], [4.9, 7.0]])).tolist() == [7.0, -np.inf]
 
@@ -236,7 +227,7 @@ def scattered(rng):
     "triangles",
     [
         scattered(np.random.default_rng(8)),
-        np.concatenate([box((0, 0, -1), (4, 3, 0)), box((1, 1, -0.5), (2, 2, 0.7))]),
+        np.concatenate([block((0, 0, -1), (4, 3, 0)), block((1, 1, -0.5), (2, 2, 0.7))]),
         np.c_[np.concatenate([SQUARE, HOLE]), np.arange(8.0)][triangulate([SQUARE, HOLE])],
     ],
     ids=["scattered", "bodies", "square with a hole"],

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import pytest
+from reference.indenters import block
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.circuit.network import loaded_columns
@@ -262,13 +263,7 @@ def test_faces_lie_beside_each_other_and_the_sensor_near_both(first, second, see
 
 
 def test_two_bodies_are_one():
-    a, b = np.zeros(3), np.array([10.0, 10.0, 10.0])
-    corners = np.array([[(a, b)[i][0], (a, b)[j][1], (a, b)[k][2]]
-                        for i in (0, 1) for j in (0, 1) for k in (0, 1)])  # fmt: skip
-    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    cube = np.array(
-        [[corners[f[i]] for i in three] for f in faces for three in ((0, 1, 2), (0, 2, 3))]
-    )
+    cube = block((0, 0, 0), (10, 10, 10))
     place = FramePlace(22.0, 0.0, -0.5, math.pi / 2)  # from x = 12 to 22
     both = AdjacentParts(mesh(cube), mesh(cube), place)
     solid = both.solid_mm

@@ -52,7 +52,6 @@ from recognizer.scan.mosaic.pose_graph import (
 )
 from recognizer.scan.mosaic.register import APART, CONSTANT, NOISE, register_patches
 from recognizer.scan.mosaic.search import KnownRaster, cross_correlate, peaks, points_mm
-from recognizer.thesis.merge import product_shift
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
 
@@ -193,14 +192,6 @@ def test_peaks_lie_between_cells():
     ((row, column, _),) = peaks(hill, 3)
     assert (row, column) == pytest.approx((3.3, 6.2))
     assert peaks(-hill, 3) == []  # highest on the rim
-
-
-def test_the_thesis_s_product_finds_whole_tactels():
-    image = np.zeros((24, 24))
-    rows, columns = np.random.default_rng(0).integers(0, 24, (2, 40))
-    image[rows, columns] = 5.0
-    shift = product_shift(image[4:20, 2:18], image[7:23, 4:20], (1.5, -2.5), 1.0)
-    assert shift.tolist() == [2.0, -3.0]  # right, and down the rows
 
 
 # --- one touch as an image ------------------------------------------------------------------
