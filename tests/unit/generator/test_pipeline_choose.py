@@ -149,20 +149,17 @@ def test_each_face_is_told_with_the_least_size_that_shows_a_place(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("settings", "cause", "fix"),
+    ("settings", "said"),
     [
-        ("cube: 60 mm}\ncopies: 12\nprofile: one-touch\n", "array 63x65 is full",
-         "set profile: auto"),
+        ("cube: 60 mm}\ncopies: 12\nprofile: one-touch\n",
+         r"(?s)array 63x65 is full.*fix: .*set profile: auto"),
         ("cylinder: {diameter: 40 mm, height: 30 mm}}\nprint: {parts: panels}\n",
-         "a round face cannot be printed as a flat", ""),
+         r":3:16: error: a round face cannot be printed as a flat"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_made_is_refused_where_it_is_asked_for(tmp_path, settings, cause, fix):
-    with pytest.raises(SpecError, match=cause) as caught:
+def test_what_cannot_be_made_is_refused_where_it_is_asked_for(tmp_path, settings, said):
+    with pytest.raises(SpecError, match=said):
         dry(tmp_path, f"name: A\nshape: {{{settings}")
-    (problem,) = caught.value.problems
-    assert problem.mark.line == 3 or fix
-    assert fix in problem.fix
 
 
 @pytest.mark.parametrize("copies", [1, 3])
