@@ -8,7 +8,7 @@ import httpx
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from bench_page import PATIENCE_MS, opened, press_known_loads, rest, shown, touched, until
+from bench_page import PATIENCE_MS, opened, rest, shown, touched, until
 from playwright.sync_api import expect
 
 from probe.recording.read import Recording
@@ -33,16 +33,6 @@ def asked_and_read(page):
     return asked, [float(value) for value in read.groups()]
 
 
-def test_live_image_moves_and_the_figures_are_told(page):
-    expect(page.get_by_test_id("state")).to_contain_text("probe is there")
-    expect(page.get_by_test_id("calibration-age")).to_have_text("none")
-    before, frames = heat(page), page.evaluate("bench.frames")
-    until(page, f"bench.frames > {frames + 20}")
-    assert heat(page) != before  # noise alone moves it
-    rate = float(page.get_by_test_id("rate").inner_text().split()[0])
-    assert 20 < rate < 300
-
-
 def test_a_click_touches_there_and_the_face_is_lit(page):
     said = touched(page)
     face = page.get_by_test_id("touch-face").input_value()
@@ -56,7 +46,7 @@ def test_a_click_touches_there_and_the_face_is_lit(page):
 
 def test_a_click_on_a_round_face_touches_there(page):
     shown(page, "Cylinder")
-    for place in ((0.5, 0.5), (0.42, 0.55), (0.46, 0.6)):
+    for place in ((0.5, 0.5), (0.42, 0.55)):
         said = touched(page, *place)
         assert said.startswith("Cylinder"), said
         assert np.allclose(*asked_and_read(page), atol=0.5)
@@ -129,18 +119,6 @@ def test_keys_turn_the_part_and_touch_it(page):
     assert page.get_by_test_id("answer").inner_text().startswith(f"Cube {face}")
 
 
-def test_a_touch_beyond_the_edge_says_why_it_is_not_answered(page):
-    page.get_by_test_id("touch-face").select_option("F1")
-    answers = page.evaluate("bench.answers")
-    page.locator("#touch-x").fill("-9")
-    page.locator("#touch-y").fill("30")
-    page.get_by_test_id("touch-go").click()
-    until(page, f"bench.answers > {answers}")
-    said = page.get_by_test_id("answer").inner_text()
-    assert said.startswith("Not recognised:")
-    assert page.get_by_test_id("part").get_attribute("data-lit") == ""
-
-
 def test_filters_and_overlays(page):
     touched(page)
     seen = {}
@@ -159,8 +137,10 @@ def test_unplug_and_replug_are_said_plainly(page):
     state = page.get_by_test_id("state")
     expect(state).to_contain_text("probe is gone", timeout=PATIENCE_MS)
     expect(state).to_contain_text("probe is there", timeout=PATIENCE_MS)
-    frames = page.evaluate("bench.frames")
+    before, frames = heat(page), page.evaluate("bench.frames")
     until(page, f"bench.frames > {frames + 10}")
+    assert heat(page) != before  # noise alone moves it
+    assert 20 < float(page.get_by_test_id("rate").inner_text().split()[0]) < 300
     assert touched(page).startswith("Cube")
     expect(page.get_by_test_id("notices")).to_contain_text("the probe is back")
 
@@ -195,18 +175,6 @@ def test_record_and_replay(page, lab):
     expect(page.get_by_test_id("state")).to_contain_text("probe is there", timeout=PATIENCE_MS)
 
 
-def test_calibrate_step_by_step(page, lab):
-    press_known_loads(page)
-    page.locator("#guide-close").click()
-    expect(page.get_by_test_id("calibration-age")).to_contain_text("fresh")
-    rest(page)
-    assert touched(page).startswith("Cube")
-    expect(page.locator("#scale")).to_contain_text("N")
-    page.get_by_test_id("calibrations").select_option("")
-    expect(page.get_by_test_id("calibration-age")).to_have_text("none")
-    assert list((lab / "recordings").glob("calibration-*.json"))
-
-
 def test_loads_that_tell_too_little_are_refused_where_it_is_asked(page):
     page.get_by_test_id("calibrate").click()
     page.get_by_test_id("guide-loads").fill("80")
@@ -238,12 +206,14 @@ def test_files_and_pictures_can_be_had(page, lab):
     assert np.loadtxt(download.value.path(), delimiter=",").shape == (16, 16)
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(1440, "light"), (1440, "dark"), (390, "light")])
+@pytest.mark.parametrize(("width", "scheme"), [(1440, "dark"), (390, "light")])
 def test_axe_finds_nothing(browser, bench, width, scheme):
     with opened(
         browser, bench, viewport={"width": width, "height": 900}, color_scheme=scheme,
         bypass_csp=True,  # for axe's own script
     ) as page:  # fmt: skip
+        paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert (int(re.search(r"\d+", paper).group()) < 40) == (scheme == "dark")
         rest(page)
         touched(page)
         assert violations(page) == []  # in contact
@@ -264,15 +234,6 @@ def violations(page):
     """Return what axe-core finds, and where."""
     found = Axe().run(page).response["violations"]
     return [(one["id"], [node["html"] for node in one["nodes"]]) for one in found]
-
-
-def test_fits_a_narrow_dark_screen(page):
-    page.emulate_media(color_scheme="dark")
-    page.set_viewport_size({"width": 1024, "height": 768})
-    assert page.evaluate("document.documentElement.scrollWidth") <= 1024
-    paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
-    assert all(int(v) < 40 for v in re.findall(r"\d+", paper)[:3])
-    page.emulate_media(color_scheme="light")
 
 
 def test_the_answer_is_on_the_first_screen(page):
@@ -308,6 +269,7 @@ def test_where_to_touch_next_is_said_and_done(page):
     page.get_by_test_id("touch-go").click()
     until(page, f"bench.answers > {answers}")
     assert page.get_by_test_id("answer").inner_text().startswith("Not recognised:")
+    assert page.get_by_test_id("part").get_attribute("data-lit") == ""
     expect(page.get_by_test_id("next")).to_contain_text(re.compile("Next: .* mm (right|left)"))
     rest(page)
     for _ in range(2):

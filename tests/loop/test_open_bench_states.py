@@ -31,7 +31,7 @@ def process_of(lab, port=0):
     )  # fmt: skip
 
 
-def test_a_killed_server_is_said_and_one_that_comes_back_is_found(browser, lab):
+def test_a_silent_and_a_killed_server_are_said_and_one_that_comes_back_is_found(browser, lab):
     page = browser.new_page(viewport={"width": 1440, "height": 900})
     with process_of(lab) as (address, first):
         page.goto(address)
@@ -41,8 +41,13 @@ def test_a_killed_server_is_said_and_one_that_comes_back_is_found(browser, lab):
             assert touched(page, *place).startswith("Cube")
             rest(page)
         assert page.evaluate("bench.touch") == 2
+        state, frames = page.get_by_test_id("state"), page.evaluate("bench.frames")
+        first.send_signal(signal.SIGSTOP)  # no word that it has gone, as with a cut cable
+        until(page, "document.body.dataset.line === 'gone'")
+        expect(state).to_contain_text("open-bench does not answer")
+        first.send_signal(signal.SIGCONT)
+        until(page, f"document.body.dataset.line === 'there' && bench.frames > {frames + 20}")
         first.send_signal(signal.SIGKILL)
-        state = page.get_by_test_id("state")
         expect(state).to_contain_text("open-bench does not answer", timeout=PATIENCE_MS)
         expect(state).to_contain_text("looked for")
         assert page.evaluate("document.getElementById('touch').inert")  # nothing to be clicked
@@ -74,18 +79,6 @@ def test_offline_is_said_and_overcome(page):
     page.context.set_offline(False)
     until(page, "document.body.dataset.line === 'there'")
     assert touched(page).startswith("Cube")
-
-
-def test_a_line_that_falls_silent_is_given_up_and_opened_again(browser, lab):
-    with process_of(lab) as (address, process), opened(browser, address) as page:
-        frames = page.evaluate("bench.frames")
-        process.send_signal(signal.SIGSTOP)  # no word that it has gone, as with a cut cable
-        until(page, "document.body.dataset.line === 'gone'")
-        expect(page.get_by_test_id("state")).to_contain_text("open-bench does not answer")
-        process.send_signal(signal.SIGCONT)
-        until(page, f"document.body.dataset.line === 'there' && bench.frames > {frames + 20}")
-        shown(page, "Cube")
-        assert touched(page).startswith("Cube")
 
 
 def test_a_locked_database_is_said_and_touches_are_still_read(page, lab):
@@ -151,6 +144,14 @@ def test_a_phone_touches_by_a_tap(browser, bench):
             .map((one) => one.outerHTML)"""
         )
         assert small == []
+        cut = page.evaluate(
+            """() => [...document.querySelectorAll('button, select, input, h2')]
+            .filter((one) => one.checkVisibility() && one.type !== 'file'
+              && !one.closest('#touch-list')
+              && (one.getBoundingClientRect().left < 0 || one.getBoundingClientRect().right > 390))
+            .map((one) => one.outerHTML)"""
+        )
+        assert cut == []
 
 
 def test_4k_uses_the_screen_and_text_grows(browser, bench):

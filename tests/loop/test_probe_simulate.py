@@ -19,9 +19,7 @@ from probe.errors import SurfaceError
 from probe.recording.read import Recording
 from probe.simulate.registered import registered_object, registered_surface
 from probe.simulate.scene import TouchRanges, pose_of, random_touches
-from probe.simulate.source import frames_of, options_of
 from probe.simulate.target import part_surface, surface_of
-from probe.simulate.written import part_mesh
 
 SET = """
 objects:
@@ -157,43 +155,6 @@ def test_pose_of_a_touch_carries_sensor_points_onto_the_tips_plane(lab):
     zeta = contact.z_mm + contact.tilt_x_rad * points[:, 1] - contact.tilt_y_rad * points[:, 0]
     assert np.abs(here[:, 2] - zeta).max() < 1e-3
     assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3))
-
-
-def test_stream_comes_down_holds_and_lifts_at_places_inside_the_face(lab):
-    options = {"rate": "20", "period": "1", "noise": "quiet", "accuracy": "tabs", "seed": "4"}
-    frames = list(itertools.islice(frames_of(f"{lab / 'lab.db'}#Cube", options), 60))
-    assert [frame.seq for frame in frames] == list(range(60))
-    assert np.diff([frame.t_ns for frame in frames]).tolist() == [50_000_000] * 59
-    total = np.array([frame.counts.sum() for frame in frames], float).reshape(3, 20)
-    idle = total[:, -4:]
-    assert np.ptp(idle) == 0
-    assert (total[:, 3:13].min(axis=1) > 3 * idle.max()).all()
-    assert not np.array_equal(frames[8].counts, frames[28].counts)  # it moved on
-    again = itertools.islice(frames_of(f"{lab / 'lab.db'}#Cube", options), 60)
-    assert all(np.array_equal(a.counts, b.counts) for a, b in zip(frames, again, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("options", "match"),
-    [
-        ({"spin": "1"}, "no option 'spin'.*accuracy"),
-        ({"force": "-1"}, "0 or more"),
-        ({"rate": "0"}, "above 0"),
-        ({"x": "left"}, "a number"),
-        ({"noise": "loud"}, "typical or quiet"),
-    ],
-)
-def test_options_that_mean_nothing_are_refused(options, match):
-    with pytest.raises(SurfaceError, match=match):
-        options_of(options)
-
-
-def test_part_alone_needs_no_database(tmp_path, lab):
-    copy = tmp_path / "part.stl"
-    copy.write_bytes(file_of(lab, "Cube-F1").read_bytes())
-    frame = next(frames_of(str(copy), {"accuracy": "tabs"}))
-    assert frame.counts.shape == (16, 16)
-    assert np.array_equal(part_mesh(copy).corners, surface_of(str(copy)).surface.corners)
 
 
 @pytest.mark.parametrize("kind", ["raster", "kinesthetic"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,3 +40,10 @@ def paraboloid(radius_mm: float) -> Formula:
 def half_plane(floor_mm: float = -math.inf) -> Formula:
     """Return a flat face that ends at a straight edge: matter where x <= 0."""
     return Formula(lambda x, y: np.where(x <= 0, 0.0, floor_mm))
+
+
+def block(low: Sequence[float], high: Sequence[float]) -> np.ndarray:
+    """Return the twelve triangles (12, 3, 3) of a box, counter-clockwise from outside."""
+    corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)], float)
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    return corners[[t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]]

@@ -100,9 +100,12 @@ def test_objects_come_over_as_they_are(new_database, file, ours, theirs):
     sound(there)
     again = import_objects(there, str(file))
     assert (again.copied, again.known, again.refused) == ((), ("Cube", "Tetra"), ())
-    # The array goes on where the imported objects end.
-    make(there, "New", solid=cube(30.0))
+    make(there, "New", solid=cube(30.0))  # where the imported objects end
     sound(there)
+    assert export_objects(there, file, force=True).copied == ("Cube", "New", "Other", "Tetra")
+    back = import_objects(here, str(file))
+    assert (back.copied, back.known) == (("New", "Other"), ("Cube", "Tetra"))
+    sound(here)
 
 
 def test_files_of_parts_are_named_from_the_other_databases_folder(tmp_path):
@@ -116,19 +119,6 @@ def test_files_of_parts_are_named_from_the_other_databases_folder(tmp_path):
     assert held(str(tmp_path / "lab.db"), "Cube").parts[0].file == "a/out/F1.stl"
 
 
-def test_who_imports_first_makes_beside_and_can_give_back(new_database, lab_url, file):
-    theirs = new_database("sqlite")
-    make(theirs, "Cube")
-    export_objects(theirs, file)
-    import_objects(lab_url, str(file))
-    make(lab_url, "Other")
-    done = export_objects(lab_url, file, force=True)
-    assert done.copied == ("Cube", "Other")
-    done = import_objects(theirs, str(file))
-    assert (done.copied, done.known) == (("Other",), ("Cube",))
-    sound(theirs)
-
-
 def test_an_object_on_cells_that_are_held_is_refused_by_name(new_database, lab_url, file):
     theirs = new_database("sqlite")
     make(theirs, "Cube")
@@ -137,9 +127,6 @@ def test_an_object_on_cells_that_are_held_is_refused_by_name(new_database, lab_u
     make(lab_url, "Other")
     with pytest.raises(DatabaseError, match="nothing was imported: 'Cube' needs") as caught:
         import_objects(lab_url, str(file))
-    assert "cells that 'Other' holds here" in str(caught.value)
-    assert "make 'Cube' again here" in caught.value.fix
-    assert "have arrays of their own" in caught.value.fix
     assert "Tetra" not in str(caught.value)
     assert names(lab_url) == ["Other"]
     done = import_objects(lab_url, str(file), skip_refused=True)
@@ -153,7 +140,7 @@ def test_an_object_on_cells_that_are_held_is_refused_by_name(new_database, lab_u
     sound(lab_url)
 
 
-def test_a_name_that_is_held_is_refused_and_can_be_changed(new_database, lab_url, file):
+def test_a_name_that_is_held_can_be_changed(new_database, lab_url, file):
     theirs = new_database("sqlite")
     make(theirs, "Cube")
     export_objects(theirs, file)
@@ -161,11 +148,9 @@ def test_a_name_that_is_held_is_refused_and_can_be_changed(new_database, lab_url
     with pytest.raises(DatabaseError, match="'Cube' is the name of another object") as caught:
         import_objects(lab_url, str(file))
     assert "--rename 'Cube=NEW'" in caught.value.fix
-    assert import_objects(lab_url, str(file), renamed={"Cube": "Their cube"}).copied == (
-        "Their cube",
-    )
-    known = import_objects(lab_url, str(file), renamed={"Cube": "Their cube"}).known
-    assert known == ("Their cube",)
+    for outcome in ("copied", "known"):
+        done = import_objects(lab_url, str(file), renamed={"Cube": "Their cube"})
+        assert getattr(done, outcome) == ("Their cube",)
     assert names(lab_url) == ["Cube", "Their cube"]
     sound(lab_url)
 
@@ -178,15 +163,13 @@ def test_only_named_objects_go_out_and_come_in(new_database, file):
         export_objects(here, file, names=["Ball"])
     assert not file.exists()
     export_objects(here, file, names=["Tetra"])
-    assert names(str(file)) == ["Tetra"]
     with pytest.raises(DatabaseError, match="no object is called 'Cube'"):
         import_objects(there, str(file), names=["Cube"])
     assert not database_exists(there)
-    make(there, "Other", profile="thesis", solid=tetrahedron(150.0))
     assert import_objects(there, str(file), names=["Tetra"]).copied == ("Tetra",)
 
 
-def test_an_export_replaces_no_file_unless_told(new_database, file):
+def test_a_failed_export_leaves_what_is_there(new_database, file):
     here = new_database("sqlite")
     make(here, "Cube")
     file.write_text("notes")
@@ -194,13 +177,11 @@ def test_an_export_replaces_no_file_unless_told(new_database, file):
         export_objects(here, file)
     assert file.read_text() == "notes"
     export_objects(here, file, force=True)
-    assert names(str(file)) == ["Cube"]
     with pytest.raises(DatabaseError, match="into itself"):
         export_objects(str(file), file, force=True)
     with pytest.raises(DatabaseError, match="into itself"):
         import_objects(str(file), str(file))
-    with pytest.raises(DatabaseError, match="mkdir"):
-        export_objects(here, file.parent / "no" / "x.db")
+    assert names(str(file)) == ["Cube"]
     assert [path.name for path in file.parent.iterdir()] == ["exchange.db"]
 
 
@@ -254,24 +235,6 @@ def test_a_damaged_file_brings_nothing_in(exported, file, what):
     assert not database_exists(there)
 
 
-def test_what_is_no_database_of_objects_is_refused(new_database, file, tmp_path):
-    there = new_database("sqlite")
-    with pytest.raises(DatabaseError, match="does not exist"):
-        import_objects(there, str(file))
-    file.write_bytes(b"solid cube\n" * 999)
-    with pytest.raises(DatabaseError, match="not a database"):
-        import_objects(there, str(file))
-    file.write_bytes(b"")
-    with pytest.raises(DatabaseError, match="no objects are registered"):
-        import_objects(there, str(file))
-    open_database(str(tmp_path / "whole.db"))
-    whole = (tmp_path / "whole.db").read_bytes()
-    file.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(DatabaseError, match=r"damaged|not a database|another program"):
-        import_objects(there, str(file))
-    assert not database_exists(there)
-
-
 def test_a_file_of_the_first_version_is_imported_and_not_changed(lab_url, tmp_path, caplog):
     file = tmp_path / "old.db"
     shutil.copy(FIRST, file)
@@ -296,7 +259,6 @@ def test_retired_objects_keep_their_cells_and_are_not_made_again(lab_url):
     assert "--undo" in caught.value.fix
     before = held(lab_url, "Cube")
     make(lab_url, "Tetra")
-    sound(lab_url)
     with write_transaction(engine) as connection:
         assert restore(connection, "Cube").retired_utc == ""
     after = held(lab_url, "Cube")
@@ -306,8 +268,3 @@ def test_retired_objects_keep_their_cells_and_are_not_made_again(lab_url):
         assert remove(connection, "Cube").symbols == before.entry.symbols
         assert find_object(connection, "Cube") is None
     sound(lab_url)
-    with (
-        write_transaction(engine) as connection,
-        pytest.raises(DatabaseError, match="called 'Cube'"),
-    ):
-        retire(connection, "Cube")

@@ -1,6 +1,8 @@
-"""Opening: what is made, what is refused, and in which words."""
+"""Opening: what is made, what is refused, in which words; older schema versions become today's."""
 
 import os
+import shutil
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -9,14 +11,22 @@ import time
 from pathlib import Path
 
 import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
 from sqlalchemy import select, text
 
 from generator.array.lab_key import read_lab_key
+from generator.database import migrate, tables
+from generator.database.cells import occupied_cells
 from generator.database.lab import lab_key
+from generator.database.migrations import v3
 from generator.database.open import database_exists, normal_url, open_database
+from generator.database.read import list_objects
 from generator.database.tables import SCHEMA_VERSION, meta, metadata
 from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError
+
+EARLIER = Path(__file__).parents[3] / "fixtures" / "database"
 
 
 def refused(url, **options):
@@ -84,76 +94,48 @@ def test_a_new_database_has_all_tables_and_its_version(tmp_path):
         connection.execute(text("DELETE FROM meta"))
 
 
-def test_an_empty_file_becomes_a_database(tmp_path):
-    path = tmp_path / "lab.db"
-    path.touch()
-    assert "no objects are registered here" in refused(path, writable=False)
-    assert path.stat().st_size == 0
-    open_database(str(path))
-    assert path.stat().st_size > 0
-
-
 def test_a_database_exists_once_it_was_made(tmp_path):
     path = tmp_path / "lab.db"
+    assert "does not exist" in refused(path, writable=False)
     assert not database_exists(str(path))
+    assert list(tmp_path.iterdir()) == []  # a reader makes nothing
     path.touch()
+    assert "no objects are registered here" in refused(path, writable=False)
     assert not database_exists(str(path))
     assert path.stat().st_size == 0
-    open_database(str(path))
+    open_database(str(path))  # an empty file becomes a database
     assert database_exists(str(path))
     path.write_bytes(b"solid" * 1000)
     with pytest.raises(DatabaseError, match="not a database"):
         database_exists(str(path))
     with pytest.raises(DatabaseError, match="does not exist"):
         database_exists(str(tmp_path / "missing" / "lab.db"))
-
-
-def test_a_reader_makes_nothing(tmp_path):
-    assert "does not exist" in refused(tmp_path / "lab.db", writable=False)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_places_that_hold_no_database(tmp_path):
-    assert "mkdir" in refused(tmp_path / "missing" / "lab.db")
     assert "a folder" in refused(tmp_path)
-    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("size", [100, 4096, 12288, 40000])
+def test_a_truncated_database_is_refused_and_left_alone(tmp_path, size):
+    path = tmp_path / "lab.db"
+    open_database(str(path))
+    os.truncate(path, size)
+    before = path.read_bytes()
+    said = refused(path)
+    assert "damaged" in said or "not a database" in said or "another program" in said
+    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize(
-    "content", [b"solid cube\nendsolid\n" * 200, b"\x00" * 5000, b"name: Cube\n"]
+    "schema",
+    ["objects (x)", "meta (version)", "meta (key TEXT, value TEXT)"],
 )
-def test_a_file_that_is_no_database_is_left_alone(tmp_path, content):
-    path = tmp_path / "lab.db"
-    path.write_bytes(content)
-    assert "not a database" in refused(path)
-    assert path.read_bytes() == content
-
-
-def test_a_truncated_database_is_refused(tmp_path):
-    whole = tmp_path / "whole.db"
-    open_database(str(whole))
-    path = tmp_path / "lab.db"
-    for size in (100, 4096, 12288, 40000):
-        path.write_bytes(whole.read_bytes()[:size])
-        said = refused(path)
-        assert "damaged" in said or "not a database" in said or "another program" in said
-
-
-def test_another_programs_database_is_left_alone(tmp_path):
-    for schema in (
-        "CREATE TABLE bookmarks (url TEXT)",
-        "CREATE TABLE objects (x)",
-        "CREATE TABLE meta (version)",
-        "CREATE TABLE meta (key TEXT, value TEXT)",
-    ):
-        path = tmp_path / "other.db"
-        path.unlink(missing_ok=True)
-        connection = sqlite3.connect(path)
-        connection.execute(schema)
-        connection.close()
-        before = path.read_bytes()
-        assert "another program" in refused(path)
-        assert path.read_bytes() == before
+def test_another_programs_database_is_left_alone(tmp_path, schema):
+    path = tmp_path / "other.db"
+    with sqlite3.connect(path) as connection:
+        connection.execute(f"CREATE TABLE {schema}")
+    connection.close()
+    before = path.read_bytes()
+    assert "another program" in refused(path)
+    assert path.read_bytes() == before
 
 
 @pytest.fixture
@@ -188,19 +170,15 @@ def test_a_read_only_place_is_refused_for_writing_alone(unprivileged):
         assert len(connection.execute(select(meta)).all()) == 3
 
 
-def test_a_writer_waits_for_its_turn_and_no_longer(tmp_path):
-    engine = open_database(str(tmp_path / "lab.db"))
-    hasty = open_database(str(tmp_path / "lab.db"), wait_s=0.05)
-    with write_transaction(engine):
-        with read_transaction(hasty) as connection:  # readers go on
-            connection.execute(select(meta)).all()
-        with (
-            pytest.raises(DatabaseError, match="keep the database locked"),
-            write_transaction(hasty),
-        ):
-            pass
-    with write_transaction(hasty):
-        pass
+def test_an_older_database_that_may_not_be_written_says_what_to_do(unprivileged):
+    path = unprivileged / "lab.db"
+    shutil.copy(EARLIER / "v1.db", path)
+    path.chmod(0o444)
+    unprivileged.chmod(0o555)
+    with pytest.raises(DatabaseError, match="schema version 1, must be brought to 3") as caught:
+        open_database(str(path), writable=False)
+    assert "encode-object list" in caught.value.fix
+    assert path.read_bytes() == (EARLIER / "v1.db").read_bytes()
 
 
 def test_many_may_make_a_database_at_once(tmp_path):
@@ -280,3 +258,133 @@ def test_a_server_that_is_not_reached_says_why(guarded_server, url, cause, fix):
 def test_the_right_password_opens_the_server(guarded_server):
     with pytest.raises(DatabaseError, match="no objects are registered"):
         open_database(f"postgresql://lab:right@{guarded_server}/postgres", writable=False)
+
+
+# Earlier schema versions; that all their rows are there afterwards, tests/corpora hold.
+
+NAMES = ["Cube", "Prism", "Small box-1", "Small box-2"]
+
+
+def of_version(number, lab_url):
+    """Put a database of an earlier version: the committed file, or the committed dump."""
+    if "://" not in lab_url:
+        shutil.copy(EARLIER / f"v{number}.db", lab_url)
+        return lab_url
+    import psycopg
+
+    with psycopg.connect(lab_url, autocommit=True) as connection:
+        connection.execute((EARLIER / f"v{number}.sql").read_bytes())
+    return lab_url
+
+
+@pytest.fixture
+def first_version(lab_url):
+    return of_version(1, lab_url)
+
+
+@pytest.fixture
+def first_file(tmp_path):
+    return Path(of_version(1, str(tmp_path / "lab.db")))
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_the_migrated_schema_is_the_one_that_new_databases_get(version, lab_url, new_database):
+    earlier = of_version(version, lab_url)
+    for url in (earlier, new_database("sqlite")):
+        with read_transaction(open_database(url)) as connection:
+            context = MigrationContext.configure(connection, opts={"compare_type": False})
+            assert compare_metadata(context, tables.metadata) == []
+    if "://" in earlier:
+        return
+    with sqlite3.connect(earlier) as old, sqlite3.connect(url) as new:
+        for table in tables.metadata.tables:
+            listed = f'PRAGMA table_info("{table}")'
+            columns = [sorted(row[1:] for row in c.execute(listed)) for c in (old, new)]
+            assert columns[0] == columns[1]
+
+
+def test_a_copy_is_never_written_over_another_one(first_file):
+    (first_file.parent / "lab.v1.db").write_text("something else")
+    open_database(str(first_file))
+    assert (first_file.parent / "lab.v1.db").read_text() == "something else"
+    assert database_exists(str(first_file.parent / "lab.v1-2.db"))
+
+
+def test_a_migration_that_fails_changes_nothing(first_version, monkeypatch):
+    class NoMemoryError(Exception):
+        pass
+
+    def failing(connection):
+        done(connection)
+        raise NoMemoryError
+
+    done = v3.upgrade
+    monkeypatch.setattr(v3, "upgrade", failing)
+    before = None if "://" in first_version else Path(first_version).read_bytes()
+    with pytest.raises(NoMemoryError):
+        open_database(first_version)
+    if before is not None:
+        assert Path(first_version).read_bytes() == before
+        assert os.listdir(Path(first_version).parent) == ["lab.db"]
+    monkeypatch.undo()
+    with read_transaction(open_database(first_version)) as connection:
+        assert [entry.name for entry in list_objects(connection)] == NAMES
+
+
+def test_no_copy_no_migration(first_file, monkeypatch):
+    def full(path, copy):
+        raise sqlite3.OperationalError("database or disk is full")
+
+    monkeypatch.setattr(migrate, "snapshot", full)
+    before = first_file.read_bytes()
+    with pytest.raises(DatabaseError, match=r"no copy can be made .* disk is full"):
+        open_database(str(first_file))
+    assert first_file.read_bytes() == before
+    assert os.listdir(first_file.parent) == ["lab.db"]
+
+
+def forked(action):
+    """Run an action in a process of its own, forked from this one; return its number."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            action()
+            code = 0
+        finally:
+            os._exit(code)
+    return child
+
+
+def test_a_migration_killed_before_its_commit_leaves_the_old_version(first_version, monkeypatch):
+    done = v3.upgrade
+
+    def killing(connection):
+        done(connection)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(v3, "upgrade", killing)
+        _, status = os.waitpid(forked(lambda: open_database(first_version)), 0)
+    assert os.WTERMSIG(status) == signal.SIGKILL
+    with read_transaction(open_database(first_version)) as connection:  # migrates at last
+        assert [entry.name for entry in list_objects(connection)] == NAMES
+        assert len(occupied_cells(connection, 1)[0]) == 176
+
+
+def test_many_may_open_an_older_database_at_once(first_version, monkeypatch):
+    done = v3.upgrade
+    upgraded, note = os.pipe()
+
+    def noting(connection):
+        done(connection)
+        os.write(note, b"1")
+
+    monkeypatch.setattr(v3, "upgrade", noting)
+    several = [forked(lambda: open_database(first_version)) for _ in range(3)]
+    assert [os.waitpid(child, 0)[1] for child in several] == [0, 0, 0]
+    os.close(note)
+    assert os.read(upgraded, 100) == b"1"
+    os.close(upgraded)
+    if "://" not in first_version:
+        assert sorted(os.listdir(Path(first_version).parent)) == ["lab.db", "lab.v1.db"]

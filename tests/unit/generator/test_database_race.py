@@ -40,10 +40,6 @@ def registration(name, layout, **spec):
     )  # fmt: skip
 
 
-def no_pause():
-    return np.random.default_rng(1)
-
-
 def test_the_loser_of_a_race_places_anew(lab_url):
     """Both choose their cells before their turn: the same ones."""
     engine = open_database(lab_url)
@@ -75,11 +71,21 @@ def test_the_loser_of_a_race_places_anew(lab_url):
     assert len(np.unique(cells[:, :2], axis=0)) == sum(entry.symbols for entry in entries) > 40
 
 
-def test_a_lost_race_leaves_nothing_behind(lab_url):
-    engine = open_database(lab_url)
+@pytest.fixture
+def engine(lab_url):
+    return open_database(lab_url)
+
+
+@pytest.fixture
+def first(engine):
+    """The layout of an object that is there already."""
     with write_transaction(engine) as connection:
-        first = placed(connection)
-        register(connection, registration("first", first))
+        layout = placed(connection)
+        register(connection, registration("first", layout))
+    return layout
+
+
+def test_a_lost_race_leaves_nothing_behind(engine, first):
     seen = []
 
     def work(connection):
@@ -87,15 +93,11 @@ def test_a_lost_race_leaves_nothing_behind(lab_url):
         layout = first if len(seen) < 3 else placed(connection)
         return register(connection, registration("second", layout))
 
-    retry_on_conflict(engine, work, rng=no_pause())
+    retry_on_conflict(engine, work, rng=np.random.default_rng(1))
     assert seen == [["first"]] * 3
 
 
-def test_who_always_loses_gives_up_and_says_why(lab_url):
-    engine = open_database(lab_url)
-    with write_transaction(engine) as connection:
-        first = placed(connection)
-        register(connection, registration("first", first))
+def test_who_always_loses_gives_up_and_says_why(engine, first):
     tries = []
 
     def work(connection):
@@ -103,14 +105,13 @@ def test_who_always_loses_gives_up_and_says_why(lab_url):
         return register(connection, registration("second", first))
 
     with pytest.raises(WriteConflictError, match="another object holds") as caught:
-        retry_on_conflict(engine, work, tries=3, rng=no_pause())
+        retry_on_conflict(engine, work, tries=3, rng=np.random.default_rng(1))
     assert len(tries) == 3
     assert caught.value.exit_code == 4
     assert caught.value.fix
 
 
-def test_errors_that_are_no_race_are_not_tried_again(lab_url):
-    engine = open_database(lab_url)
+def test_errors_that_are_no_race_are_not_tried_again(engine):
     tries = []
 
     def work(connection):

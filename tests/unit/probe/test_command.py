@@ -135,13 +135,10 @@ def test_info_of_a_probe(asked):
 
 def test_record_ends_by_frames_and_by_seconds(asked, tmp_path):
     out = tmp_path / "a.h5"
-    code, text, err = asked("record", "sim:?rate=500", "-o", out, "--frames", "40", "--json")
-    assert (code, err) == (0, "")
+    code, text, _ = asked("record", "sim:?rate=500", "-o", out, "--frames", "40", "--json")
     told = json.loads(text)
-    assert (told["frames"], told["ended"], told["lost"]) == (40, "frames", 0)
-    frames = list(Recording(out).frames())
-    assert [f.seq - frames[0].seq for f in frames] == list(range(40))
-    assert Recording(out).origin.sensor == "sim/0"
+    assert (code, told["frames"], told["ended"], told["lost"]) == (0, 40, "frames", 0)
+    assert len(Recording(out)) == 40
     code, text, _ = asked("record", "sim:?rate=500", "-o", out, "--seconds", "0.2", "--replace")
     assert code == 0
     assert "100 frames in 0.20 s (500.0 a second), lost 0" in text
@@ -251,32 +248,6 @@ def test_bias_warns_of_drift_with_code_1(asked, bench):
     assert "warning: " in err
     assert "calibrate again" in err
     assert json.loads(asked(*words, "--json")[1])["shift_counts"] > 20
-
-
-def test_simulate_gives_recording_picture_and_truth(asked, tmp_path):
-    out, png, truth = tmp_path / "a.h5", tmp_path / "a.png", tmp_path / "a.json"
-    words = ["simulate", "washer", "--x", "1.5", "--theta", "10", "--force", "80", "--frames", "3",
-             "--touches", "2", "--seed", "4"]  # fmt: skip
-    code, text, err = asked(*words, "-o", out, "--png", png, "--truth", truth, "--json")
-    told = json.loads(text)
-    assert (code, err) == (0, "")
-    assert (told["touches"], told["frames"], told["overlay"]) == (2, 6, "tab")
-    assert told["first"]["felt_n"] == pytest.approx(80, abs=1e-3)
-    held = Recording(out)
-    assert (len(held), held.origin.sensor) == (6, "simulated/tab")
-    assert held.block().counts.max() >= told["first"]["peak_counts"]
-    assert not any("mm" in name for name in held.origin.more), "the truth is not in the recording"
-    kept = json.loads(truth.read_text())["touches"]
-    assert [one["seq"] for one in kept] == [0, 3]
-    assert [one["x_mm"] for one in kept] == [1.5, 1.5]
-    assert [one["theta_deg"] for one in kept] == pytest.approx([10, 10])
-    assert kept[0]["y_mm"] != kept[1]["y_mm"]
-    assert png.read_bytes().startswith(b"\x89PNG")
-
-    asked(*words, "-o", tmp_path / "b.h5")
-    again = Recording(tmp_path / "b.h5").block().counts
-    assert (again == held.block().counts).all()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.h5", "a.json", "a.png", "b.h5"]
 
 
 def test_touch_i_is_the_same_among_any_number_of_touches(asked, tmp_path):

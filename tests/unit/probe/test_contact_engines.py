@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from manifold3d import Manifold
-from reference.indenters import Formula
+from reference.indenters import Formula, block
 from scipy.optimize import brentq
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
@@ -17,7 +17,7 @@ from probe.contact.contract import Contact, Touch, WristStiffness
 from probe.contact.engines import ENGINES, Engine, EngineEntry, engine_named
 from probe.contact.mujoco import AROUND_MM, DEEP_MM, STIFFER, mesh_under
 from probe.contact.tips import Tips
-from probe.errors import ContactError, ProbeError
+from probe.errors import ProbeError
 from probe.simulate.scene import bare_scene
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.sensor import LevelSensor
@@ -27,14 +27,6 @@ from probe.surface.mesh import mesh
 RIGID = WristStiffness(math.inf, math.inf)
 TIPS = Tips(points=7)
 SENSOR = SensorType()
-
-
-def block(low, high):
-    """Return the triangles of a box, counter-clockwise from outside."""
-    corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)], float)
-    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-    faces = [f for a, b, c, d in quads for f in ((a, b, c), (a, c, d))]
-    return corners[np.array(faces)]
 
 
 def plate_with_bars(wide=0.0):
@@ -161,8 +153,3 @@ def test_a_third_engine_is_one_module_and_one_line(monkeypatch):
     assert (contact.level, contact.z_mm) == ("third", 0.25)
     assert np.ptp(counts.astype(int)) <= 2  # every tactel bears half a newton; the board rounds
     assert counts.min() > 60
-
-
-def test_an_unknown_engine_is_named_with_those_there_are():
-    with pytest.raises(ContactError, match="own, mujoco"):
-        engine_named("bullet")

@@ -15,8 +15,6 @@ from probe.command.live import KEYS, render_frame
 from probe.command.live_state import LiveState
 from probe.frame import frame_from
 from probe.protocol import IdentPacket
-from probe.recording.files import next_free
-from probe.recording.read import Recording
 
 COUNTS = ClientStatistics(frames=120, rate=99.9, lost=3, failed=1, reopenings=1)
 IDENT = IdentPacket(seq=0, t_us=0, settling_us=10.0, baud=1_000_000, sensor=2, name="FSR-uno")
@@ -89,24 +87,6 @@ def test_newtons_with_a_calibration(state):
     state.toggle_bias()
     state.take(frames_of(*loads[40][:BIAS_FRAMES]))
     assert "calibrate again" in state.notice
-
-
-def test_recordings_and_images_get_the_next_free_name(state, tmp_path):
-    for number in (1, 2):
-        state.toggle_recording("sim/0")
-        state.take(frames_of(flat(5), flat(6)))
-        assert f"REC live-00{number}.h5, 2 frames" in shown(state)
-        state.toggle_recording("sim/0")
-        assert state.notice == f"live-00{number}.h5: 2 frames"
-    assert Recording(tmp_path / "live-002.h5").origin.sensor == "sim/0"
-    assert [int(f.counts[0, 0]) for f in Recording(tmp_path / "live-001.h5").frames()] == [5, 6]
-    state.save()
-    assert (np.load(tmp_path / "image-001.npy") == 6).all()
-    assert (tmp_path / "image-001.png").read_bytes().startswith(b"\x89PNG")
-    state.end_recording()  # without one
-    assert next_free(tmp_path, "image", ".png").name == "image-002.png"
-    names = sorted(path.name for path in tmp_path.iterdir())
-    assert names == ["image-001.npy", "image-001.png", "live-001.h5", "live-002.h5"]
 
 
 @pytest.mark.parametrize("colours", [True, False])

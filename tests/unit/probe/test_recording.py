@@ -1,9 +1,10 @@
-"""Frames -> files -> frames: names, series, files of others, damaged ones and their repair."""
+"""Frames -> files -> frames: names, series, damaged ones and their repair; the journal."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import json
+import struct
+import zlib
 from pathlib import Path
 
 import h5py
@@ -12,7 +13,7 @@ import pytest
 from recorded import frames, pose_at, record, same
 
 from probe.errors import RecordingError
-from probe.frame import Frame
+from probe.frame import Frame, frame_from
 from probe.recording.guard import superblock_of
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
@@ -159,27 +160,6 @@ def test_two_recorders_cannot_write_one_file_and_a_closed_one_takes_no_frames(tm
         recorder.append(frames(1)[0])
 
 
-def test_an_error_of_the_caller_keeps_the_frames(tmp_path):
-    def careless():
-        with Recorder(tmp_path / "touch.h5") as recorder:
-            recorder.append(frames(1)[0])
-            raise KeyError
-
-    with pytest.raises(KeyError):
-        careless()
-    assert len(Recording(tmp_path / "touch.h5")) == 1
-
-
-def test_hdf5_is_not_loaded_before_a_file_is_opened():
-    modules = "record read repair table imported"
-    code = "import sys\n" + "".join(f"import probe.recording.{name}\n" for name in modules.split())
-    code += "print(sorted({'h5py', 'scipy'} & set(sys.modules)))"
-    answer = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert answer.stdout == "[]\n"
-
-
 def test_others_files_that_are_no_recording_are_told_apart(tmp_path):
     refused(tmp_path, "Is a directory; this is a folder")
     refused(foreign(tmp_path / "b.h5", data=COUNTS, more=1), "/frames, but data, more; import")
@@ -211,35 +191,6 @@ def test_attributes_of_others_are_kept_and_a_user_block_does_not_matter(tmp_path
     assert dict(recording.origin.more) == {"piece": 4, "format": "own"}
 
 
-@pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
-def test_a_truncated_recording_gives_the_frames_that_are_there(tmp_path, share):
-    path = tmp_path / "touch.h5"
-    given = frames(600)
-    record(path, given)
-    whole = path.read_bytes()
-    path.write_bytes(whole[: int(share * len(whole))])
-    refused(path, rf"truncated: {int(share * len(whole))} of {len(whole)} bytes")
-    result = repair(path)
-    assert result.path == path
-    assert result.frames + result.lost == 600
-    assert result.frames >= share * 600 - 2 * 64
-    left = list(Recording(path).frames())
-    assert len(left) == result.frames
-    assert all(same(frame, given[frame.seq]) for frame in left)
-    assert Recording(path).origin.more["frames_lost"] == result.lost
-    assert (tmp_path / "touch.damaged.h5").read_bytes() == whole[: int(share * len(whole))]
-    assert names(tmp_path) == ["touch.damaged.h5", "touch.h5"]
-
-
-def test_a_recording_of_which_nothing_is_left(tmp_path):
-    path = record(tmp_path / "touch.h5", frames(600)).files[0]
-    for size in (2000, 40):
-        path.write_bytes(path.read_bytes()[:size])
-        with pytest.raises(RecordingError, match=r"damaged|no frame in it can be read"):
-            repair(path)
-        assert names(tmp_path) == ["touch.h5"]
-
-
 def test_others_files_stay_beside_the_repaired_one(tmp_path):
     path = foreign(tmp_path / "a.h5", frames=COUNTS, seq=np.arange(500), notes="keep me")
     assert repair(path).frames == 500
@@ -260,3 +211,123 @@ def test_a_table_that_cannot_be_made_leaves_nothing(tmp_path):
         export_csv(path, tmp_path / "old.csv")
     assert (tmp_path / "old.csv").read_text() == "old"
     assert names(tmp_path) == ["old.csv", "touch.h5"]
+
+
+IMAGES = np.random.default_rng(3).integers(0, 65536, (200, 6, 5)).astype(np.uint16)
+HEAD = {
+    "version": 1, "tool_version": "0", "piece": 1, "shape": [6, 5], "sensor": "", "more": {},
+    "calibration": "", "units": "counts", "sensor_type": "",
+}  # fmt: skip
+
+
+@pytest.fixture
+def journal(tmp_path):
+    """The part file of a writer that was killed after 200 frames, every third with a pose."""
+    path = tmp_path / "written" / "touch.h5"
+    path.parent.mkdir()
+    recorder = Recorder(path, sensor="bench 1", attributes={"force_n": np.float64(80), "of": "a"})
+    for i, counts in enumerate(IMAGES):
+        recorder.append(
+            frame_from(
+                counts, t_ns=i * 10**6, seq=i, wrist=[1, 2, 3, i], pose=np.eye(4) if i % 3 else None
+            )
+        )
+    recorder.flush()
+    left = tmp_path / "touch.part.h5"
+    left.write_bytes(path.with_name("touch.part.h5").read_bytes())
+    recorder.close()
+    assert [*path.parent.iterdir()] == [path]
+    return left
+
+
+def size_of(journal):
+    """Bytes of its head and of a record."""
+    length = struct.unpack_from("<I", journal.read_bytes(), 8)[0]
+    return 16 + length, 2 * 30 + 8 + 16 + 128 + 4
+
+
+def check(frames, count):
+    read = list(frames)
+    assert [frame.seq for frame in read] == list(range(count))
+    for i, frame in enumerate(read):
+        assert (frame.counts == IMAGES[i]).all()
+        assert (frame.t_ns, frame.wrist.tolist()) == (i * 10**6, [1, 2, 3, i])
+        assert (frame.pose is None) == (i % 3 == 0)
+
+
+def test_it_is_read_as_it_is_under_both_names(journal):
+    for name in (journal, journal.with_name("touch.h5")):
+        recording = Recording(name)
+        check(recording.frames(), 200)
+        check(Recording(name, live=True).frames(), 200)
+        assert recording.shape == (6, 5)
+        assert recording.origin.sensor == "bench 1"
+        assert dict(recording.origin.more) == {"force_n": 80.0, "of": "a"}
+        assert [(file.path, file.poses) for file in recording.files] == [(journal, True)]
+
+
+@pytest.mark.parametrize("cut", [0, 1, 100, 215])
+def test_a_torn_record_ends_it(journal, cut):
+    start, size = size_of(journal)
+    journal.write_bytes(journal.read_bytes()[: start + 150 * size + cut])
+    check(Recording(journal).frames(), 150)
+    content = bytearray(journal.read_bytes())
+    content[-1 - cut] ^= 1  # of the last whole record
+    journal.write_bytes(content)
+    check(Recording(journal).frames(), 149)
+
+
+def test_a_damaged_record_costs_its_block(journal):
+    start, size = size_of(journal)
+    content = bytearray(journal.read_bytes())
+    content[start + 70 * size + 5] ^= 8
+    journal.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"damaged: cannot read it; .*`repair`"):
+        list(Recording(journal).frames())
+    result = repair(journal)
+    assert (result.frames, result.lost) == (136, 64)
+    kept = journal.with_name("touch.damaged.h5")
+    assert kept.read_bytes() == content
+    assert Recording(result.path).origin.more["frames_lost"] == 64
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        HEAD | {"version": 2},
+        HEAD | {"shape": [1 << 20, 1 << 20]},
+        HEAD | {"shape": [-6, 5]},
+        HEAD | {"more": 3},
+        [],
+        "[" * 100_000,
+    ],
+    ids=lambda head: str(head)[:20],
+)
+def test_heads_that_mean_harm_are_damage(tmp_path, head):
+    text = (head if isinstance(head, str) else json.dumps(head)).encode()
+    path = tmp_path / "touch.h5"
+    path.write_bytes(b"TOUCHLOG" + struct.pack("<II", len(text), zlib.crc32(text)) + text)
+    for attempt in (Recording, repair):
+        with pytest.raises(RecordingError, match="damaged: cannot read it"):
+            attempt(path)
+    content = b"TOUCHLOG" + struct.pack("<II", 1 << 31, 0)
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match="damaged: cannot read it"):
+        Recording(path)
+    assert path.read_bytes() == content
+
+
+def test_a_disk_without_space_for_hdf5_leaves_the_journal(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise RecordingError("cannot write it: No space left on device", fix="free some space")
+
+    recorder = Recorder(tmp_path / "touch.h5")
+    recorder.append(frame_from(IMAGES[0], t_ns=0, seq=0))
+    monkeypatch.setattr("probe.recording.record.write_hdf5", refuse)
+    with pytest.raises(RecordingError, match="free some space, then run `repair`"):
+        recorder.close()
+    assert recorder.files == [tmp_path / "touch.part.h5"]
+    assert len(Recording(tmp_path / "touch.h5")) == 1
+    monkeypatch.undo()
+    assert repair(tmp_path / "touch.h5").path == tmp_path / "touch.h5"
+    assert len(Recording(tmp_path / "touch.h5")) == 1

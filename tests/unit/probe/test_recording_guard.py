@@ -51,14 +51,6 @@ def test_it_is_refused_before_a_value_is_read(folder, kind, monkeypatch):
     assert [file.name for file in folder.iterdir()] == ["a.h5"]
 
 
-def test_the_link_of_an_unknown_kind_is_one(folder):
-    kinds = []
-    with h5py.File(write_hostile("link of an unknown kind", folder / "a.h5")) as file:
-        group = file["/"].id
-        group.links.iterate(lambda _, link: kinds.append(link.type), info=True)
-    assert sorted(kinds) == [h5py.h5l.TYPE_HARD, 77]
-
-
 @pytest.mark.parametrize(
     "words",
     [

@@ -1,14 +1,26 @@
-"""Others' arrays become recordings: formats, axes, choice, scaling, refusals."""
+"""Others' arrays and ROS messages become recordings, and ours messages: formats, axes, refusals."""
 
 from __future__ import annotations
+
+import hashlib
+import io
 
 import h5py
 import numpy as np
 import pytest
+from mcap_ros2.writer import Writer
+from recorded import pose_at, same
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
 from scipy.io import savemat
 
 from probe.errors import RecordingError
+from probe.frame import frame_from
 from probe.recording.imported import import_array
+from probe.recording.mcap import export_mcap, import_mcap
+from probe.recording.read import Recording
+from probe.recording.record import Recorder
+from probe.recording.ros import DEFINITIONS, IMAGE, POSE, TOUCH_FRAME, covariance_message
 
 COUNTS = np.random.default_rng(5).integers(0, 1024, (70, 16, 16)).astype(np.uint16)
 
@@ -33,14 +45,12 @@ def refused(path, match, **options):
 
 
 @pytest.mark.parametrize("axes", ["time first", "time last"])
-@pytest.mark.parametrize("kind", ["npy", "npz", "mat", "mat7.3", "h5"])
+@pytest.mark.parametrize("kind", ["npy", "mat", "mat7.3", "h5"])
 def test_every_format_gives_the_same_frames(tmp_path, kind, axes):
     array = COUNTS if axes == "time first" else np.moveaxis(COUNTS, 0, 2)
     path = tmp_path / f"others.{kind[:3]}"
     if kind == "npy":
         np.save(path, array)
-    elif kind == "npz":
-        np.savez(path, images=array, rate=220)
     elif kind == "mat":
         savemat(path, {"images": array, "note": "washer"})
     elif kind == "mat7.3":
@@ -65,23 +75,6 @@ def test_sixteen_images_have_time_first(tmp_path):
     assert (
         import_array(tmp_path / "a.npy", tmp_path / "out.h5").block().counts == COUNTS[:16]
     ).all()
-
-
-def test_of_several_arrays_one_must_be_named(tmp_path):
-    path = tmp_path / "a.npz"
-    np.savez(path, left=COUNTS, right=COUNTS[:5], time=np.arange(70))
-    refused(path, r"several arrays .* left \(70, 16, 16\), right \(5, 16, 16\); .*--dataset")
-    refused(path, "no array of images 'up' in it, but left", dataset="up")
-    assert len(import_array(path, tmp_path / "out.h5", dataset="right")) == 5
-
-
-def test_an_array_named_frames_is_meant(tmp_path):
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        file["background"] = COUNTS
-        file["frames"] = COUNTS[:7] / 4
-    recording = import_array(tmp_path / "a.h5", tmp_path / "out.h5")
-    assert len(recording) == 7
-    assert recording.origin.more["imported_array"] == "frames"
 
 
 def test_values_that_are_no_numbers_are_refused(tmp_path):
@@ -131,7 +124,131 @@ def test_files_without_images_are_refused(tmp_path):
         refused(tmp_path / name, "damaged|no HDF5 file|empty")
 
 
-@pytest.mark.parametrize("rate", [0.0, -1.0, np.inf, np.nan])
-def test_rates_are_above_0(tmp_path, rate):
-    np.save(tmp_path / "a.npy", COUNTS)
-    refused(tmp_path / "a.npy", "frames per second above 0", rate_hz=rate)
+RNG = np.random.default_rng(23)
+N = 40
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """Full counts, gaps in seq, a clock that restarts, poses here and there, attributes."""
+    path = tmp_path / "touch.h5"
+    more = {"overlay": "tab", "rate": 220.0, "list": [1, 2]}
+    with Recorder(path, sensor="bench 1", calibration="ab" * 32, attributes=more) as recorder:
+        for i in range(N):
+            recorder.append(
+                frame_from(
+                    RNG.integers(0, 65536, (16, 16)),
+                    t_ns=(i if i < 30 else i - 30) * 4_545_454 + 3,
+                    seq=i if i < 7 else 2**33 + i,
+                    wrist=RNG.integers(0, 1024, 4),
+                    pose=pose_at(i / 3) if i % 3 else None,
+                )
+            )
+    return Recording(path)
+
+
+def test_there_and_back_is_the_same_recording_and_the_same_file(recording, tmp_path):
+    assert export_mcap(recording, tmp_path / "a.mcap") == N
+    back = import_mcap(tmp_path / "a.mcap", tmp_path / "back.h5")
+    a, b = recording.origin, back.origin
+    assert (a.sensor, a.calibration, a.units) == (b.sensor, b.calibration, b.units)
+    plain = [{n: np.asarray(v).tolist() for n, v in one.more.items()} for one in (a, b)]
+    assert plain[0] == plain[1]
+    assert all(map(same, back.frames(), recording.frames()))
+    export_mcap(back, tmp_path / "b.mcap")
+    digests = {hashlib.sha256((tmp_path / n).read_bytes()).digest() for n in ("a.mcap", "b.mcap")}
+    assert len(digests) == 1
+
+
+def test_rosbags_reads_it(recording, tmp_path):
+    """By the message types that rosbags knows itself, ours by the definition in the file."""
+    path = tmp_path / "a.mcap"
+    export_mcap(recording, path)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    frames = list(recording.frames())
+    with AnyReader([path], default_typestore=store) as reader:
+        topics = {c.topic: c.msgtype for c in reader.connections}
+        assert topics == {"/touch/image": IMAGE, "/touch/frame": TOUCH_FRAME, "/touch/pose": POSE}
+        read = [(c.topic, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
+    images = [message for topic, message in read if topic == "/touch/image"]
+    assert {(m.encoding, m.height, m.width, m.step) for m in images} == {("32FC1", 16, 16, 64)}
+    shown = sorted(message.data.tobytes() for message in images)
+    assert shown == sorted(frame.counts.astype("<f4").tobytes() for frame in frames)
+    rests = {message.seq for topic, message in read if topic == "/touch/frame"}
+    assert rests == {frame.seq for frame in frames}
+    at = sorted(message.pose.position.x for topic, message in read if topic == "/touch/pose")
+    known = sorted(frame.pose[0, 3] / 1000 for frame in frames if frame.pose is not None)
+    assert at == pytest.approx(known, abs=1e-15)
+
+
+def robots_file(path, *, encoding="16UC1", dtype="<u2", image=None, step=None):
+    """Write what a robot's own recorder writes: images and poses on topics of its own."""
+    image = np.arange(256).reshape(16, 16) if image is None else image
+    with open(path, "wb") as stream:
+        writer = Writer(stream)
+        kinds = {kind: writer.register_msgdef(kind, DEFINITIONS[kind]) for kind in (IMAGE, POSE)}
+        for i in (1, 0):
+            stamp = {"sec": 1_700_000_000, "nanosec": i * 5_000_000}
+            head = {"stamp": stamp, "frame_id": "finger"}
+            fields = {"header": head, "height": 16, "width": 16, "encoding": encoding}
+            fields |= {"is_bigendian": int(dtype[0] == ">"), "step": step or 16 * int(dtype[2])}
+            fields["data"] = (image + i).astype(dtype).tobytes()
+            when = stamp["sec"] * 10**9 + stamp["nanosec"]
+            writer.write_message("/finger/tactile", kinds[IMAGE], fields, log_time=when + 77)
+            at = {"x": 0.1 * i, "y": 0.2, "z": 0.3}
+            turn = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+            pose = {"header": head, "pose": {"position": at, "orientation": turn}}
+            writer.write_message("/finger/pose", kinds[POSE], pose, log_time=when + 99)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize(("encoding", "dtype"), [("16UC1", "<u2"), ("32FC1", ">f4")])
+def test_images_of_others_become_a_recording(tmp_path, encoding, dtype):
+    path = robots_file(tmp_path / "robot.mcap", encoding=encoding, dtype=dtype)
+    block = import_mcap(path, tmp_path / "r.h5").block()
+    assert np.array_equal(block.counts[1], np.arange(256).reshape(16, 16) + 1)
+    assert np.diff(block.t_ns).tolist() == [5_000_000]
+    assert np.allclose(block.pose[:, 0, 3], [0, 100])
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"encoding": "rgb8", "dtype": "<u2"}, "image 0 is encoded as rgb8"),
+        ({"encoding": "32FC1", "dtype": "<f4", "image": np.full((16, 16), 0.5)}, "whole numbers"),
+        ({"step": 31}, "bytes, not 16 rows of 31"),
+    ],
+)
+def test_images_that_are_none_are_refused_and_nothing_is_left(tmp_path, options, said):
+    path = robots_file(tmp_path / "robot.mcap", **options)
+    with pytest.raises(RecordingError, match=said) as caught:
+        import_mcap(path, tmp_path / "r.h5")
+    assert caught.value.fix
+    assert [p.name for p in tmp_path.iterdir()] == ["robot.mcap"]
+
+
+def test_a_file_without_images_is_refused(tmp_path):
+    stream = io.BytesIO()
+    writer = Writer(stream)
+    writer.write_message(
+        "/pose", writer.register_msgdef(POSE, DEFINITIONS[POSE]),
+        covariance_message(np.eye(4), np.eye(6), 0, "base")["pose"], log_time=0,
+    )  # fmt: skip
+    writer.finish()
+    (tmp_path / "pose.mcap").write_bytes(stream.getvalue())
+    with pytest.raises(RecordingError, match="no sensor_msgs/msg/Image in it, but geometry_msgs"):
+        import_mcap(tmp_path / "pose.mcap", tmp_path / "r.h5")
+
+
+def test_a_covariance_is_in_metres():
+    covariance = np.diag([4.0, 9.0, 16.0, 0.01, 0.02, 0.03])
+    covariance[0, 5] = covariance[5, 0] = 0.5
+    T = np.eye(4)
+    T[:3, 3] = [10, 20, 30]
+    fields = covariance_message(T, covariance, 1_500_000_000, "base")
+    read = np.array(fields["pose"]["covariance"]).reshape(6, 6)
+    assert np.allclose(np.diag(read), [4e-6, 9e-6, 16e-6, 0.01, 0.02, 0.03])
+    assert read[0, 5] == pytest.approx(0.5e-3)
+    assert fields["pose"]["pose"]["position"] == {"x": 0.01, "y": 0.02, "z": 0.03}
+    assert fields["header"]["stamp"] == {"sec": 1, "nanosec": 500_000_000}

@@ -55,33 +55,24 @@ def test_the_wanted_force_is_reached_and_never_exceeded_much(law):
     assert len(felt) <= 60
 
 
-def test_nothing_there_gives_up_and_goes_back():
-    bench = Bench(lambda d: 8 * d, at=1e9)
-    end = guarded_approach(bench, ApproachLimits(travel_mm=12, step_mm=0.5))
-    assert not end
-    assert (end.reason, end.travel_mm) == ("no contact", 0)
-    assert max(bench.went) == 12
-    assert bench.went[-1] == 0
-
-
-def test_a_surface_too_hard_for_the_step_lifts_the_sensor():
-    bench = Bench(lambda d: 1e4 * d)
-    end = guarded_approach(bench)
-    assert (end.reason, end.travel_mm) == ("force limit", 0)
-    assert bench.went[-1] == 0
-    assert max(bench.went) == 3.5  # not a step more
-
-
-def test_a_surface_too_soft_ends_at_the_travel_limit():
-    end = guarded_approach(Bench(lambda d: 0.6 + 0.1 * d), ApproachLimits(travel_mm=10))
-    assert (end.reason, end.travel_mm) == ("travel limit", 10)
-    assert end.force_n == pytest.approx(1.3)
-
-
-def test_a_force_that_jumps_over_the_wanted_one_is_told():
-    end = guarded_approach(Bench(lambda d: 90.0 if d > 0.123 else 10.0))
-    assert (end.reason, end.force_n) == ("too stiff", 10)
-    assert end.travel_mm == pytest.approx(3.123, abs=1e-4)
+@pytest.mark.parametrize(
+    ("law", "at", "limits", "reason", "travel", "force", "farthest"),
+    [
+        (lambda d: 8 * d, 1e9, {"travel_mm": 12, "step_mm": 0.5}, "no contact", 0, 0, 12),
+        (lambda d: 1e4 * d, 3, {}, "force limit", 0, None, 3.5),  # not a step more
+        (lambda d: 0.6 + 0.1 * d, 3, {"travel_mm": 10}, "travel limit", 10, 1.3, 10),
+        (lambda d: 90.0 if d > 0.123 else 10.0, 3, {}, "too stiff", 3.123, 10, None),
+    ],
+)
+def test_an_approach_that_fails_says_why(law, at, limits, reason, travel, force, farthest):
+    bench = Bench(law, at)
+    end = guarded_approach(bench, ApproachLimits(**limits))
+    assert not end or reason == "too stiff"
+    assert (end.reason, end.travel_mm) == (reason, pytest.approx(travel, abs=1e-4))
+    assert force is None or end.force_n == pytest.approx(force)
+    assert farthest is None or max(bench.went) == farthest
+    if travel == 0:
+        assert bench.went[-1] == 0  # it is lifted
 
 
 def test_forces_and_limits_that_make_no_sense():
@@ -220,14 +211,6 @@ def scan_poses():
     return [
         T_base_surface @ surface_to_sensor(x, y, plan.theta_rad) for x, y in plan.places_mm.tolist()
     ]
-
-
-def test_a_perfect_arm_is_where_it_believes():
-    poses = scan_poses()
-    perfect = JointErrors((0.0,) * 5, (0.0,) * 5)
-    found = follow_poses(Arm(), poses, perfect, np.random.default_rng(1))
-    assert found.believed == pytest.approx(np.array(poses), abs=1e-9)
-    assert found.true == pytest.approx(np.array(poses), abs=1e-9)
 
 
 def test_the_covariance_holds_what_happens():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +20,6 @@ from encoded_objects.base.sensor_type_file import (
     sensor_type_named,
     shipped_names,
 )
-from probe.command import run
 from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.recording.read import Recording
@@ -78,16 +76,6 @@ def test_what_is_wrong_stands_at_its_line_and_column(text, says):
     assert refused.value.exit_code == 2
 
 
-def test_names_and_files(tmp_path):
-    with pytest.raises(SensorTypeError, match="did you mean 'fsr-16'"):
-        sensor_type_named("fsr_16")
-    with pytest.raises(SensorTypeError, match="there is no such file"):
-        sensor_type_named(str(tmp_path / "mine.yaml"))
-    path = tmp_path / "mine.yaml"
-    path.write_text(LEAST)
-    assert sensor_type_named(str(path)).shape == (4, 6)
-
-
 def test_which_type_images_are_of():
     text = sensor_type_text(sensor_type_named("fsr-8x8"))
     assert choose_sensor_type(None, "", None, "x") == SensorType()
@@ -118,23 +106,6 @@ def test_an_overlay_is_taken_as_usual():
     assert flexitac.with_overlay("tab") is flexitac
     assert SensorType(overlay=Overlay(kind="pad")).with_overlay("tab") == SensorType()
     assert pad.with_overlay("tab").overlay.tab_diameter_mm == pytest.approx(1.2666 * 2 / 1.5875)
-
-
-def test_every_command_takes_a_type_and_a_recording_carries_it(tmp_path, capsys):
-    recording, table = tmp_path / "a.h5", tmp_path / "a.csv"
-    given = ["--sensor-type", "fsr-8x8"]
-    assert run(["record", "sim:", "-o", str(recording), "--frames", "30", *given]) == 0
-    held = Recording(recording)
-    assert (held.sensor_type().name, held.shape) == ("fsr-8x8", (8, 8))
-    words = ["--csv", str(table), "--png", str(tmp_path / "a.png")]
-    assert run(["export", str(recording), *words]) == 0
-    assert table.read_text().splitlines()[0].split(",")[-5] == "r7c7"
-    assert run(["import", str(table), "-o", str(tmp_path / "b.h5"), *given]) == 0
-    assert np.array_equal(Recording(tmp_path / "b.h5").block().counts, held.block().counts)
-    assert run(["live", "sim:", "--seconds", "0.3", "--json", *given]) == 0
-    capsys.readouterr()
-    assert run(["info", "sim:", "--seconds", "0.2", "--json", *given]) == 0
-    assert json.loads(capsys.readouterr().out)["ident"]["columns"] == 8
 
 
 def test_frames_of_another_shape_are_not_recorded(tmp_path):

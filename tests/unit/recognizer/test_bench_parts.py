@@ -35,7 +35,7 @@ from recognizer.bench.files import (
     part_to_send,
 )
 from recognizer.bench.frames import FrameHandler, page_guide
-from recognizer.bench.message import FILTERS, FrameMessage, filter_image, mosaic_message
+from recognizer.bench.message import FILTERS, filter_image, mosaic_message
 from recognizer.bench.reading import (
     AGAIN_S,
     RESTLESS_S,
@@ -324,19 +324,6 @@ def test_filters_build_on_each_other():
     assert made["sobel"][6, 6] == 0
     assert made["sobel"][6, 3] > 0
     assert filter_image(image, SensorType(), "bias-free", image).max() == 0
-
-
-def test_a_frame_is_packed_as_its_module_says():
-    image = np.arange(256.0).reshape(16, 16)
-    picture = FrameMessage(image, SensorType(), None, True, 2**32 + 5, 1.5, 1e12)
-    data = picture.as_bytes("raw")
-    assert len(data) == 32 + 1024
-    kind, newtons, wish, _, seq, t_s, received, largest, _ = struct.unpack("<cBBBIddff", data[:32])
-    assert (kind, newtons, FILTERS[wish], seq, t_s, received, largest) == (
-        b"F", 1, "raw", 5, 1.5, 1e12, 255,
-    )  # fmt: skip
-    assert np.array_equal(np.frombuffer(data, "<f4", offset=32).reshape(16, 16), image)
-    assert picture.as_bytes("raw") is data  # made once for all pages
 
 
 def test_a_mosaic_is_packed_thinned_and_tells_what_was_not_felt():

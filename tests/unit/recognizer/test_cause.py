@@ -16,7 +16,7 @@ from recognizer.touch import recognition as cause
 from recognizer.touch.diagnose import diagnose, image_features
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, TOO_FEW, Cause, refusal
+from recognizer.touch.recognition import Cause
 from recognizer.touch.search_gate import GAPS, gap_share
 from recognizer.touch.signal import signal_of
 from recognizer.touch.verify import TouchImages
@@ -121,21 +121,7 @@ def test_symbols_that_are_plainly_there_are_no_plain_face(keyed):
     assert refused.cause.evidence["surprise"] > 20
 
 
-def test_a_cause_is_said_beside_the_reason_it_led_to():
-    edge = Cause(cause.EDGE, {"loaded": 0.5, "symbols": 3.0})
-    assert str(replace(refusal(1, TOO_FEW), cause=edge)) == (
-        "not recognised: at an edge: 50 % of the sensor is loaded, 3 symbols are read; "
-        "move towards the loaded part"
-    )
-    one = Cause(cause.EDGE, {"loaded": 0.2, "symbols": 1.0})
-    assert str(one) == "at an edge: 20 % of the sensor is loaded, 1 symbol is read"
-    both = str(replace(refusal(1, AMBIGUOUS), cause=edge))
-    assert both.startswith("not recognised: ambiguous: at an edge: 50 %")
-    assert both.endswith("touch again a few mm beside")
-    assert refusal(1, NOT_ENCODED).reason_code == "not_an_encoded_surface"
-    halves = Cause(cause.EXCHANGED, {"columns": 0.0})
-    assert "halves of the sensor's rows are exchanged" in str(halves)
-    assert "is the sensor wired as drawn?" in str(replace(refusal(1, AMBIGUOUS), cause=halves))
+def test_every_cause_has_words_and_a_way_out():
     numbers = dict.fromkeys(
         ("plateau", "signal_to_noise", "newtons", "loaded", "symbols", "direction_deg",
          "sharpness", "silent", "explained", "explained_anywhere",

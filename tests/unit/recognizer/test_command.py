@@ -5,7 +5,6 @@ import math
 import subprocess
 import sys
 
-import h5py
 import numpy as np
 import pytest
 from PIL import Image
@@ -137,36 +136,6 @@ def test_answers_as_json(asked, lab, images):
     assert entries[0]["T_robot_object"] is None
     assert len(json.loads(asked(path, "--touches", 1, "--json")[1])) == 1
     assert len(json.loads(asked(path, "--every", "--touches", 3, "--json")[1])) == 3
-
-
-def test_any_file_with_frames_is_read(asked, lab, images):
-    with h5py.File(lab / "others.h5", "w") as file:
-        file["frames"] = np.array([np.zeros((16, 16)), *images], np.uint16)
-    entries = json.loads(asked(lab / "others.h5", "--json")[1])
-    assert [entry["seq"] for entry in entries] == [1, 2]
-    assert_at(entries[1], BESIDE)
-
-
-def test_the_overlay_is_told_by_the_recording(asked, lab):
-    counts, _ = read_counts(forces_of(lab, AT, "pad", "F2"), Electronics(), fsr_of(16, 16), None,
-                            np.random.default_rng(4))  # fmt: skip
-    path = recorded(lab / "pad.h5", [counts], sensor="simulated/pad")
-    entry = json.loads(asked(path, "--json")[1])[0]
-    assert_at(entry, AT, "F2", mm=0.3, degrees=1.5)
-    asked_for = recorded(lab / "unknown.h5", [counts])
-    again = json.loads(asked(asked_for, "--overlay", "pad", "--json")[1])[0]
-    assert again == entry
-
-
-def test_nothing_to_recognise(asked, lab):
-    empty = recorded(lab / "empty.h5", [])
-    assert asked(empty) == (1, "", "no touch in 0 frames\n")
-    assert asked(empty, "--json") == (1, "[]\n", "")
-    recorded(lab / "rest.h5", [np.full((16, 16), 4)] * 9)
-    assert asked(lab / "rest.h5")[2] == "no touch in 9 frames\n"
-    rest = json.loads(asked(lab / "rest.h5", "--every", "--json")[1])
-    assert {entry["reason"] for entry in rest} == {"no contact"}
-    assert len(rest) == 9
 
 
 @pytest.fixture(scope="module")

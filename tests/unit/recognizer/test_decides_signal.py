@@ -1,12 +1,21 @@
 """What of a frame is worth fitting: floors, contacts and dead rows worked by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch import signal
 from recognizer.touch.options import ReaderOptions
-from recognizer.touch.signal import combine_around, contact_counts, noise_of, quantile, signal_of
+from recognizer.touch.signal import (
+    combine_around,
+    contact_counts,
+    mean_of_strongest,
+    noise_of,
+    quantile,
+    signal_of,
+)
 
 
 def rows_of(*sums, turned=False):
@@ -265,3 +274,16 @@ def test_squares_end_at_the_rim(shape, reach, combine, of):
 def test_quantiles_are_numpys(count, share):
     values = np.random.default_rng(count).random((3, count))
     assert quantile(np.sort(values), share).tolist() == np.quantile(values, share, axis=1).tolist()
+
+
+def test_the_law_of_a_type_is_taken_off_counts_alone():
+    image = six(4.0 * contact_counts(SensorType()))
+    rooted = replace(SensorType(), exponent=0.5)
+    found = signal_of(image, floor=0.0, sensor=rooted)
+    np.testing.assert_allclose(found.forces, image**2)
+    assert (signal_of(image, floor=0.0, sensor=rooted, newtons=True).forces == image).all()
+    assert (signal_of(image, floor=0.0, sensor=SensorType()).forces == image).all()
+
+
+def test_how_hard_is_pressed_is_the_mean_of_the_twelve_strongest():
+    assert mean_of_strongest(np.arange(256.0).reshape(16, 16)) == 249.5

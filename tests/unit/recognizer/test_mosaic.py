@@ -52,7 +52,6 @@ from recognizer.scan.mosaic.pose_graph import (
 )
 from recognizer.scan.mosaic.register import APART, CONSTANT, NOISE, register_patches
 from recognizer.scan.mosaic.search import KnownRaster, cross_correlate, peaks, points_mm
-from recognizer.thesis.merge import product_shift
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
 
@@ -193,14 +192,6 @@ def test_peaks_lie_between_cells():
     ((row, column, _),) = peaks(hill, 3)
     assert (row, column) == pytest.approx((3.3, 6.2))
     assert peaks(-hill, 3) == []  # highest on the rim
-
-
-def test_the_thesis_s_product_finds_whole_tactels():
-    image = np.zeros((24, 24))
-    rows, columns = np.random.default_rng(0).integers(0, 24, (2, 40))
-    image[rows, columns] = 5.0
-    shift = product_shift(image[4:20, 2:18], image[7:23, 4:20], (1.5, -2.5), 1.0)
-    assert shift.tolist() == [2.0, -3.0]  # right, and down the rows
 
 
 # --- one touch as an image ------------------------------------------------------------------
@@ -429,21 +420,6 @@ def test_a_constraint_along_a_ridge_leaves_the_rest_to_belief():
 
 
 # --- the canvas -----------------------------------------------------------------------------
-
-
-def test_a_removed_touch_leaves_nothing():
-    canvas = empty_canvas(P)
-    first = CanvasEntry(np.array([5.0, 40.0, 0.2]), SURE, 1.0)
-    second = CanvasEntry(np.array([-9.0, 33.0, -0.7]), SURE, 1.3)
-    one = add_to_canvas(canvas, patch(sampled()), first)
-    both = add_to_canvas(one, patch(sampled((1, 0))), second)
-    back = add_to_canvas(both, patch(sampled((1, 0))), second, -1)
-    assert not canvas.tiles
-    assert back.tiles.keys() == one.tiles.keys()
-    for key, tile in one.tiles.items():
-        assert back.tiles[key] == pytest.approx(tile, rel=1e-9, abs=1e-6)
-    assert not add_to_canvas(back, patch(sampled()), first, -1).tiles
-    assert image_of(canvas).values.shape == (0, 0)
 
 
 def test_the_image_is_the_weighted_mean():

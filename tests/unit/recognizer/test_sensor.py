@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
-from generator.pipeline import encode
-from generator.spec import read_specs
 from probe.circuit.network import effective_resistances
 from probe.contact.contract import Touch
 from probe.contact.press import ENGINE, press
@@ -186,13 +184,8 @@ def test_a_person_is_told_what_was_learned():
 
 
 @pytest.fixture(scope="module")
-def lab(tmp_path_factory):
-    """A database with one object."""
-    folder = tmp_path_factory.mktemp("sensor")
-    (folder / "cube.yaml").write_text("{name: Cube, shape: {cube: 60 mm}}")
-    encode(read_specs([folder / "cube.yaml"]), folder=folder, formats=("stl",),
-           database=f"sqlite:///{folder / 'lab.db'}")  # fmt: skip
-    return folder
+def lab(make_lab):
+    return make_lab("{name: Cube, shape: {cube: 60 mm}}")
 
 
 @pytest.fixture(scope="module")
@@ -234,27 +227,6 @@ def test_touches_tell_gains_and_where_tips_stand(lab, felt, monkeypatch):
     assert not signal.trust[state.dead].any()
     with pytest.raises(SensorStateError, match="for one of"):
         Reader(reader.lab, SensorType(rows=8), state=state)
-
-
-def test_the_command_learns_and_keeps_and_reads_by_it(lab, felt, tmp_path, capsys):
-    images, _, _ = felt
-    with Recorder(tmp_path / "touches.h5", sensor="left") as recorder:
-        for seq, counts in enumerate(images[:16]):
-            recorder.append(frame_from(counts.astype(np.uint16), t_ns=seq, seq=seq))
-    words = [str(tmp_path / "touches.h5"), "--every", "--database", str(lab / "lab.db")]
-    kept = tmp_path / "left.json"
-    assert run([*words, "--learn", str(kept)]) == 0
-    told = capsys.readouterr().err
-    assert "learned of left, 16 touches: 5 of 256 tactels never answer" in told
-    assert read_state(kept).touches == 16
-    before = kept.read_bytes()
-    assert run([*words, "--touches", "1", "--sensor-state", str(kept)]) == 0
-    assert kept.read_bytes() == before
-    assert run([*words, "--sensor-state", str(kept), "--learn", str(kept)]) == 2
-    assert run([*words, "--learn", str(tmp_path / "no" / "left.json")]) == 2
-    write_state(replace(read_state(kept), sensor="right"), kept)
-    assert run([*words, "--sensor-state", str(kept)]) == 2
-    assert "is of sensor 'right', not of 'left'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

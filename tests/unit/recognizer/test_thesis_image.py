@@ -69,12 +69,6 @@ def test_bias_is_what_is_read_without_force():
     assert over.values.max() == pytest.approx(image.values.max() - 100)
 
 
-def test_median_is_that_of_the_neighbourhood():
-    values = noise(1)
-    expected = ndimage.median_filter(values, 3, mode="nearest")
-    assert np.array_equal(median(tactile_image(values, step_mm=1.0)).values, expected)
-
-
 def test_median_over_holes_is_that_of_what_is_known():
     values, known = noise(2), np.random.default_rng(3).random((16, 16)) > 0.3
     found = median(tactile_image(values, step_mm=1.0, defined=known)).values

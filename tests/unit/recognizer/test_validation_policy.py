@@ -6,8 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.pipeline import encode
-from generator.spec import read_specs
 from recognizer.scan.session import Scan
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
@@ -20,12 +18,8 @@ PLAN = TouchPlan("", 5, "typical", "corner", policy=NEXT)
 
 
 @pytest.fixture(scope="module")
-def url(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("lab")
-    (folder / "cube.yaml").write_text("{name: Cube, shape: {cube: 60 mm}}")
-    database = f"sqlite:///{folder / 'lab.db'}"
-    encode(read_specs([folder / "cube.yaml"]), folder=folder, database=database, formats=())
-    return database
+def url(make_lab):
+    return f"sqlite:///{make_lab('{name: Cube, shape: {cube: 60 mm}}') / 'lab.db'}"
 
 
 @pytest.fixture(scope="module")

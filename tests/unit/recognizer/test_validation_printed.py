@@ -15,11 +15,9 @@ import numpy as np
 import pytest
 
 from generator.errors import PrintError
-from generator.pipeline import encode
 from generator.printed import prints
 from generator.printed.prints import surface_keys, surface_path
 from generator.printed.surface import PrintedSurface, write_surface
-from generator.spec import read_specs
 from probe.errors import SurfaceError
 from probe.simulate import printed
 from probe.simulate.printed import (
@@ -49,23 +47,15 @@ def no_slicer():
         yield
 
 
-def make(folder, spec):
-    (folder / "spec.yaml").write_text(spec)
-    database = str(folder / "lab.db")
-    encode(read_specs([folder / "spec.yaml"]), folder=folder / "parts",
-           database=f"sqlite:///{database}", formats=("stl",))  # fmt: skip
-    return database
+@pytest.fixture(scope="module")
+def panels(make_lab):
+    return str(make_lab("{name: Cube, shape: {cube: 36 mm}}", formats=("stl",)) / "lab.db")
 
 
 @pytest.fixture(scope="module")
-def panels(tmp_path_factory):
-    return make(tmp_path_factory.mktemp("panels"), "name: Cube\nshape: {cube: 36 mm}\n")
-
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    spec = "name: Cube\nshape: {cube: 36 mm}\nprint: {parts: whole}\n"
-    return make(tmp_path_factory.mktemp("whole"), spec)
+def whole(make_lab):
+    spec = "{name: Cube, shape: {cube: 36 mm}, print: {parts: whole}}"
+    return str(make_lab(spec, formats=("stl",)) / "lab.db")
 
 
 def print_as_designed(part, database, folder, faces):

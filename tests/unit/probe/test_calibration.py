@@ -1,5 +1,7 @@
-"""Calibrating simulated sensors whose truth is known, and loads that do not suffice."""
+"""Calibrations: of simulated sensors whose truth is known, and their files; what is refused."""
 
+import json
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +12,12 @@ from probe.calibration import (
     Condition,
     calibrate_image,
     calibration_from,
+    drift_of,
     even_load,
+    expected_counts,
     known_load,
+    read_calibration,
+    write_calibration,
 )
 from probe.calibration.fit import FittedLaw, fit_laws, law_s, shrink_laws
 from probe.calibration.load import average_frames
@@ -175,3 +181,106 @@ def test_few_or_unlike_tactels_are_left_as_they_are():
     together = shrink_laws(apart, np.ones(40, bool))
     assert together.gain_s[39] == pytest.approx(1e9)
     np.testing.assert_allclose(together.gain_s[:39], law.gain_s[:39], rtol=0.05)
+
+
+@pytest.fixture(scope="module")
+def sensor():
+    return draw_fsr(np.random.default_rng(3), Spread(dead=0.05, stuck=0.01, preloaded=0.01))
+
+
+@pytest.fixture(scope="module")
+def made(sensor):
+    def load(force, seed):
+        return known_load(recorded(sensor, NONE + force, seed), NONE + force)
+
+    return calibration_from(
+        recorded(sensor, NONE, 0),
+        [load(f, i) for i, f in enumerate((0.1, 0.4, 1.0, 2.5))],
+        sensor="bench-1",
+        made="2024-05-01T10:00:00Z",
+        board=BOARD,
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        (lambda d: d.update(version=2), "version 2"),
+        (lambda d: d.update(format="spec"), "no calibration"),
+        (lambda d: d["gain_s"][3].__setitem__(3, 1.0), "was changed"),
+        (lambda d: d.update(sensor="other"), "was changed"),
+        (lambda d: d.update(sha256="0"), "was changed"),
+        (lambda d: d.pop("gain_s"), "damaged"),
+        (lambda d: d["gain_s"].pop(), "damaged"),
+        (lambda d: d["board"].update(bits=99), "damaged"),
+        (lambda d: d["condition"].__setitem__(0, "?" * 16), "damaged"),
+    ],
+)
+def test_what_was_changed_is_refused(made, tmp_path, change, match):
+    path = tmp_path / "a.json"
+    write_calibration(made, path)
+    document = json.loads(path.read_text())
+    change(document)
+    path.write_text(json.dumps(document))
+    with pytest.raises(CalibrationError, match=match):
+        read_calibration(path)
+
+
+def test_another_sensor_s_file_and_no_file_are_refused(made, tmp_path):
+    path = tmp_path / "a.json"
+    write_calibration(made, path)
+    with pytest.raises(CalibrationError, match="'bench-1', not of 'bench-2'"):
+        read_calibration(path, sensor="bench-2")
+    with pytest.raises(CalibrationError, match="cannot be read"):
+        read_calibration(tmp_path / "none.json")
+    path.write_bytes(b"\xff\x00 nonsense")
+    with pytest.raises(CalibrationError, match="JSON"):
+        read_calibration(path)
+    with pytest.raises(CalibrationError, match="cannot be written"):
+        write_calibration(made, tmp_path / "no" / "folder" / "a.json")
+
+
+def test_a_failed_writing_keeps_the_old_file(made, tmp_path, monkeypatch):
+    path = tmp_path / "a.json"
+    write_calibration(made, path)
+    before = path.read_bytes()
+
+    def full_disk(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full_disk)
+    with pytest.raises(CalibrationError, match="No space"):
+        write_calibration(made, path)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_bad_and_saturated_tactels_tell_no_force(made):
+    counts = np.full((16, 16), 200.0)
+    sound = np.argwhere(made.condition == 0)[0]
+    counts[tuple(sound)] = 1023
+    read = calibrate_image(counts, made)
+    assert read.bad[tuple(sound)]
+    assert (read.bad >= made.bad).all()
+    assert (read.values[read.bad] == 0).all()
+    assert np.isinf(read.sigma[read.bad]).all()
+    assert np.isfinite(read.values).all()
+
+
+def test_rest_reads_as_no_force(made, sensor):
+    for seed in range(5):
+        read = calibrate_image(recorded(sensor, NONE, seed)[0], made)
+        assert (read.values[~read.bad] > 0).mean() < 0.02
+
+
+def test_drift_of_the_bias_warns_and_nothing_else_does(made, sensor):
+    rest = recorded(sensor, NONE, 50)
+    assert drift_of(made, rest).warning == ""
+    moved = drift_of(made, rest + 3).warning
+    assert "bias" in moved
+    assert "calibrate again" in moved
+    with pytest.raises(CalibrationError):
+        drift_of(made, np.zeros((20, 8, 8)))
+    for bad in (np.zeros((8, 8)), NONE - 1, NONE + np.nan):
+        with pytest.raises(CalibrationError):
+            expected_counts(bad, made)

@@ -1,23 +1,37 @@
-"""Levels of sensors and prints: each does to the counts what it says, computed independently."""
+"""Worlds: each level does to the counts what it says; neighbours, worn symbols, written files."""
 
-from dataclasses import asdict, replace
+import math
+import struct
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import pytest
+from reference.indenters import block
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.circuit.electronics import QUIET, Electronics
 from probe.circuit.network import loaded_columns
-from probe.circuit.reading import shares
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
-from probe.errors import CircuitError
+from probe.errors import CircuitError, SurfaceError
 from probe.simulate.scene import bare_scene
 from probe.simulate.world.levels import LEVELS, SOUND, TYPICAL
 from probe.simulate.world.sensor import COUNTS_PER_N, MOUNTINGS, LevelSensor, mount, sample_sensor
-from probe.simulate.world.surfaces import DistortedSurface
+from probe.simulate.world.surfaces import (
+    GAP_MM,
+    REACH_MM,
+    STEP_MM,
+    AdjacentParts,
+    DistortedSurface,
+    FramePlace,
+    place_adjacent,
+    worn_scene,
+)
+from probe.simulate.written import part_mesh, written_triangles
+from probe.surface.face import FaceSurface
 from probe.surface.indenters import FlatPlate, RaisedStrip
+from probe.surface.mesh import mesh
+from probe.surface.polygon import polygon
 
 SENSOR = SensorType()
 HERE = Touch(x_mm=0.3, y_mm=0.2, theta_rad=0.4, force_n=60.0)
@@ -62,14 +76,6 @@ def test_column_under_load_is_that_of_kirchhoff(loose):
     np.testing.assert_allclose(
         loaded_columns(g, floating, 470.0), brute_force(g, floating, 470.0), rtol=1e-9
     )
-
-
-@pytest.mark.parametrize(("readout", "floats"), [("grounded", False), ("floating", True)])
-def test_column_under_load_is_that_of_the_readouts_of_the_board(readout, floats):
-    g = film_s(np.random.default_rng(1).exponential(size=(16, 16)))
-    board = Electronics(readout=readout, supply_v=5, reference_v=5, noise=QUIET)
-    found = loaded_columns(g, np.full(16, floats), board.load_ohm)
-    np.testing.assert_allclose(found, shares(g, board), rtol=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -228,3 +234,143 @@ def test_instance_of_a_sensor_is_the_same_at_every_touch():
     )
     np.testing.assert_array_equal(first, second)
     assert (counts_of(level, seed=1) != counts_of(level, seed=2)).any()
+
+
+OBLONG = polygon([np.array([(0, 0), (40, 0), (40, 30), (0, 30)])])
+TRIANGLE = polygon([np.array([(0, 0), (50, 0), (25, 45)])])
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("first", "second"), [(OBLONG, TRIANGLE), (TRIANGLE, OBLONG)])
+def test_faces_lie_beside_each_other_and_the_sensor_near_both(first, second, seed):
+    place, at = place_adjacent(first, second, np.random.default_rng(seed))
+    both = AdjacentParts(FaceSurface(None, first), FaceSurface(None, second), place)
+    x, y = np.meshgrid(np.arange(-99.8, 140, 1.0), np.arange(-99.8, 140, 1.0))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    on_first, on_second = first.contains(points), second.contains(place.into(points))
+    assert not (on_first & on_second).any()
+    area = {id(OBLONG): 1200.0, id(TRIANGLE): 1125.0}
+    assert on_second.sum() == pytest.approx(area[id(second)], rel=0.03)
+    heights = both.heights_mm(points)
+    assert (heights[on_first] == 0).all()
+    assert (heights[on_second] == place.z_mm).all()
+    assert (heights[~on_first & ~on_second] == -np.inf).all()
+    assert first.contains(at[None])[0]
+    assert first.distance_mm(at[None])[0] <= REACH_MM
+    beside = second.distance_mm(place.into(at[None]))[0]
+    assert beside <= REACH_MM + GAP_MM
+    assert abs(place.z_mm) <= STEP_MM
+
+
+def test_two_bodies_are_one():
+    cube = block((0, 0, 0), (10, 10, 10))
+    place = FramePlace(22.0, 0.0, -0.5, math.pi / 2)  # from x = 12 to 22
+    both = AdjacentParts(mesh(cube), mesh(cube), place)
+    solid = both.solid_mm
+    volume = np.einsum("ni,ni->n", solid[:, 0], np.cross(solid[:, 1], solid[:, 2])).sum() / 6
+    assert volume == pytest.approx(2000, rel=1e-5)
+    again = mesh(solid)
+    points = np.random.default_rng(1).uniform(-15, 30, (500, 2))
+    np.testing.assert_allclose(again.heights_mm(points), both.heights_mm(points), atol=1e-4)
+
+
+def test_a_face_without_an_outer_edge_is_refused():
+    ring = np.linspace(0, 2 * math.pi, 20, endpoint=False)
+    radius = np.where(np.arange(20) % 2, 10.0, 4.0)
+    star = polygon([np.column_stack([radius * np.cos(ring), radius * np.sin(ring)])])
+    with pytest.raises(SurfaceError, match="no edge beside which"):
+        place_adjacent(star, OBLONG, np.random.default_rng(1))
+
+
+TURN = 0.4  # of the face's x axis into the array's
+CENTRES = (
+    np.array([(i, j) for i in range(3) for j in range(3)])
+    * 7.0
+    @ np.array([[math.cos(TURN), -math.sin(TURN)], [math.sin(TURN), math.cos(TURN)]])
+)
+
+
+@dataclass(frozen=True)
+class Dots:
+    """Round dots of 2 mm at CENTRES, 1 mm high, on a face that stands .25 mm too high or low."""
+
+    base_mm: float
+    top_mm: float = 1.5
+
+    def heights_mm(self, points_mm: np.ndarray) -> np.ndarray:
+        away = np.linalg.norm(points_mm[:, None] - CENTRES, axis=2).min(axis=1)
+        return self.base_mm + np.where(away < 2.0, 1.0, 0.0)
+
+
+def worn_surface(surface, share, seed=1):
+    rng = np.random.default_rng(seed)
+    return worn_scene(bare_scene(surface), CENTRES, TURN, 7.0, share, rng).surface
+
+
+@pytest.mark.parametrize("base", [0.0, 0.25, -0.25])
+def test_a_worn_symbol_lies_level_with_the_face_around_it(base: float) -> None:
+    surface = Dots(base)
+    points = np.random.default_rng(1).uniform(-3.0, 14.0, (4000, 2))
+    worn = worn_surface(surface, 1.0)
+    assert worn.heights_mm(points) == pytest.approx(np.full(4000, base))
+    whole = worn_surface(surface, 0.0)
+    assert (whole.heights_mm(points) == surface.heights_mm(points)).all()
+
+
+def test_only_what_is_drawn_is_worn() -> None:
+    some = worn_surface(Dots(0.25), 0.5, seed=2)
+    assert 0 < len(some.centres_mm) < len(CENTRES)
+    left = some.heights_mm(CENTRES)
+    gone = (np.abs(CENTRES[:, None] - some.centres_mm).max(axis=2) < 1e-9).any(axis=1)
+    assert left == pytest.approx(np.where(gone, 0.25, 1.25))
+
+
+def binary(triangles, header=b"solid of a lying header"):
+    """Bytes of a binary STL."""
+    body = b"".join(
+        struct.pack("<12fH", 0, 0, 0, *np.asarray(t, float).ravel(), 0) for t in triangles
+    )
+    return header.ljust(80, b" ") + struct.pack("<I", len(triangles)) + body
+
+
+@pytest.mark.parametrize("kind", ["binary", "ascii"])
+def test_files_are_read_exactly(tmp_path, kind):
+    triangles = np.random.default_rng(0).normal(size=(40, 3, 3)).astype(np.float32)
+    file = tmp_path / "part.stl"
+    if kind == "binary":
+        file.write_bytes(binary(triangles))
+    else:
+        rows = ["solid x"]
+        for t in triangles:
+            rows += ["facet normal 0 0 0", " outer loop"]
+            rows += [f"  vertex {x!r} {y!r} {z!r}" for x, y, z in t.astype(float).tolist()]
+            rows += [" endloop", "endfacet"]
+        file.write_text("\n".join([*rows, "endsolid x"]))
+    assert np.array_equal(written_triangles(file), triangles.astype(float))
+    assert part_mesh(file).top_mm == triangles[..., 2].max()
+
+
+@pytest.mark.parametrize(
+    ("content", "match"),
+    [
+        (binary([np.eye(3)])[:-1], "announces 1 triangles, but ends at byte 133 after 0"),
+        (binary([]), "no triangle"),
+        (binary([np.eye(3) * np.nan]), "triangle 1 at byte 84 has a corner that is not a number"),
+        (b"solid x\nendsolid", "no triangle"),
+        (b"\x89PNG", "neither ASCII nor binary STL"),
+        (b"", "empty"),
+    ],
+)
+def test_what_is_no_stl_is_refused(tmp_path, content, match):
+    file = tmp_path / "bad.stl"
+    file.write_bytes(content)
+    with pytest.raises(SurfaceError, match=match) as caught:
+        written_triangles(file)
+    assert caught.value.place.startswith(str(file))
+    assert caught.value.fix
+
+
+def test_missing_files_and_folders_are_refused(tmp_path):
+    for path, match in ((tmp_path / "none.stl", "no such file"), (tmp_path, "is a directory")):
+        with pytest.raises(SurfaceError, match=match):
+            written_triangles(path)

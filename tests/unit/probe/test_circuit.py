@@ -1,0 +1,451 @@
+"""Tactels, network and board: by hand, against many digits, and counts back to conductances."""
+
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+from reference.drawn_fsr import DATASHEET, draw_fsr, read_sequence
+
+from probe.circuit import (
+    QUIET,
+    Electronics,
+    Noise,
+    conductances,
+    effective_resistances,
+    fsr_of,
+    invert_readings,
+    read_counts,
+    transconductances,
+)
+from probe.circuit.network import solve_floating
+from probe.circuit.reading import scan_shares, shares, unscan_shares
+from probe.errors import CircuitError
+
+
+def law(force, **changes):
+    fsr = replace(fsr_of(), **changes)
+    return fsr, conductances(fsr, np.full((16, 16), float(force)))
+
+
+def test_a_newton_over_the_break_force_gives_the_gain():
+    fsr, (g, _) = law(1.01, series_ohm=np.zeros((16, 16)))
+    np.testing.assert_allclose(g - fsr.leak_s, 1e-4, rtol=1e-12)
+
+
+def test_the_thesis_s_two_decades_from_1_to_100_newton_per_square_centimetre():
+    area = 0.15875**2
+    low = law(1 * area)[1][0][0, 0]
+    high = law(100 * area)[1][0][0, 0]
+    assert 80 < high / low < 200
+
+
+def test_the_series_resistance_bounds_any_force():
+    for force in (1e3, 1e9, 1e300):
+        fsr, (g, _) = law(force, hysteresis=0.0)
+        assert np.isfinite(g).all()
+        assert g[0, 0] <= 1 / 500 + fsr.leak_s
+
+
+def test_hysteresis_is_bounded_and_does_not_know_the_rate():
+    fsr = replace(fsr_of(), drift=0.0, series_ohm=np.zeros((16, 16)), break_n=np.zeros((16, 16)))
+    one = np.ones((16, 16))
+
+    def last(path, elapsed):
+        state = None
+        for force in path:
+            g, state = conductances(fsr, force * one, state, elapsed)
+        return g[0, 0] - fsr.leak_s
+
+    assert last([1.0], 0.1) == pytest.approx(1e-4)
+    assert last([2.0, 1.0], 0.1) == pytest.approx(1.1e-4)
+    assert last([2.0, 1.0], 9.0) == last([2.0, 1.5, 1.0], 0.1) == last([2.0, 1.0], 0.1)
+    assert last([2.0, 1.0, 1.05], 0.1) == pytest.approx(1.1e-4)  # inside the loop it stays
+    assert last([2.0, 1.0, 1.5], 0.1) == pytest.approx(1.5e-4)  # and leaves by the way up
+    assert last([2.0, 0.0], 0.1) == 0.0
+
+
+def test_creep_is_a_share_per_decade_of_time_and_starts_anew_with_a_new_load():
+    fsr = replace(fsr_of(), hysteresis=0.0, series_ohm=np.zeros((16, 16)))
+    one = np.ones((16, 16))
+    first, state = conductances(fsr, one)
+    later, state = conductances(fsr, one, state, 99.0)
+    assert (later - fsr.leak_s)[0, 0] / (first - fsr.leak_s)[0, 0] == pytest.approx(1.10)
+    _, off = conductances(fsr, 0 * one, state, 1.0)
+    again, _ = conductances(fsr, one, off, 1.0)
+    np.testing.assert_allclose(again, first, rtol=1e-12)
+
+
+def test_dead_stuck_and_preloaded_tactels():
+    dead, stuck, preload = np.zeros((16, 16), bool), np.zeros((16, 16)), np.zeros((16, 16))
+    dead[0, 0], stuck[0, 1], preload[0, 2] = True, 3e-5, 0.5
+    fsr = replace(fsr_of(), dead=dead, stuck_s=stuck, preload_n=preload)
+    rest, loaded = (conductances(fsr, np.full((16, 16), f))[0] for f in (0.0, 1.0))
+    assert rest[0, 0] == loaded[0, 0] == fsr.leak_s
+    assert rest[0, 1] == loaded[0, 1] == 3e-5
+    assert rest[0, 2] > 100 * rest[5, 5]
+    assert loaded[0, 2] > loaded[5, 5]
+
+
+def test_forces_and_laws_that_are_none():
+    fsr = fsr_of()
+    for bad in (np.zeros((15, 16)), np.full((16, 16), -1.0), np.full((16, 16), np.nan)):
+        with pytest.raises(CircuitError):
+            conductances(fsr, bad)
+    _, state = conductances(fsr, np.zeros((3, 16, 16)))
+    with pytest.raises(CircuitError, match="state"):
+        conductances(fsr, np.zeros((16, 16)), state)
+    with pytest.raises(CircuitError, match="gain_s"):
+        replace(fsr, gain_s=np.zeros((16, 16)))
+    with pytest.raises(CircuitError, match="shape"):
+        replace(fsr, exponent=np.ones((3, 3)))
+    with pytest.raises(CircuitError, match="leak"):
+        replace(fsr, leak_s=0.0)
+
+
+def exact_resistances(g, digits=50):
+    """Return the resistances by a 31x31 inverse in many digits."""
+    rows, columns = g.shape
+    with mpmath.workdps(digits):
+        size = rows + columns
+        laplacian = mpmath.zeros(size)
+        for r, c in np.ndindex(rows, columns):
+            x, b = mpmath.mpf(float(g[r, c])), rows + c
+            laplacian[r, r] += x
+            laplacian[b, b] += x
+            laplacian[r, b] -= x
+            laplacian[b, r] -= x
+        inverse = laplacian[: size - 1, : size - 1] ** -1
+
+        def z(a, b):
+            return inverse[a, b] if max(a, b) < size - 1 else mpmath.mpf(0)
+
+        return np.array(
+            [
+                [float(z(r, r) + z(b, b) - 2 * z(r, b)) for b in range(rows, size)]
+                for r in range(rows)
+            ]
+        )
+
+
+def scenes(decades):
+    rng = np.random.default_rng(decades)
+    x = np.arange(16) - 7.5
+    radius = np.hypot(x, x[:, None])
+    low = 10.0**-decades
+    hidden = np.full((16, 16), low)
+    hidden[[2, 2, 9], [2, 9, 2]] = 1
+    return {
+        "even in decades": 10 ** rng.uniform(-decades, 0, (16, 16)),
+        "washer": np.where((radius > 2.2) & (radius < 4.8), 1.0, low),
+        "hidden corner": hidden,
+    }
+
+
+def test_two_by_two_by_hand():
+    g = np.array([[1.0, 2.0], [4.0, 8.0]])
+    around = 1 / (1 / 2 + 1 / 8 + 1 / 4)  # the way round of (0, 0): 2, 8, 4 in series
+    assert effective_resistances(g)[0, 0] == pytest.approx(1 / (1 + around), rel=1e-15)
+
+
+@pytest.mark.parametrize("name", scenes(6))
+def test_six_decades_of_conductance_against_fifty_digits(name):
+    g = 1e-4 * scenes(6)[name]
+    error = effective_resistances(g) / exact_resistances(g) - 1
+    assert np.abs(error).max() <= 1e-13  # asked: 1.7e-10
+
+
+def test_a_batch_is_what_its_networks_are_alone():
+    batch = np.stack(list(scenes(4).values()))
+    alone = [effective_resistances(g) for g in batch]
+    np.testing.assert_allclose(effective_resistances(batch), alone, rtol=1e-13)
+    alone = [transconductances(g, 0.1, 0.3) for g in batch]
+    np.testing.assert_allclose(transconductances(batch, 0.1, 0.3), alone, rtol=1e-12)
+
+
+def test_a_divider_by_hand():
+    g = np.array([[1.0, 2.0], [3.0, 4.0]])
+    current = transconductances(g, 0.0, 0.5)
+    np.testing.assert_allclose(current * 0.5, g / (np.array([4.0, 6.0]) + 2.0), rtol=1e-15)
+    np.testing.assert_array_equal(transconductances(g), g)
+
+
+def test_driven_rows_agree_with_the_whole_network():
+    g, row, column = scenes(4)["even in decades"], 0.05, 0.2
+    laplacian = np.zeros((32, 32))
+    laplacian[:16, 16:], laplacian[16:, :16] = -g, -g.T
+    np.fill_diagonal(laplacian, np.r_[g.sum(1) + 1 / row, g.sum(0) + 1 / column])
+    expected = np.linalg.inv(laplacian)[16:, :16].T / row / column
+    np.testing.assert_allclose(transconductances(g, row, column), expected, rtol=1e-11)
+
+
+@pytest.mark.parametrize(("on", "error"), [(1e-4, 0.0016), (1e-2, 0.14), (0.1, 0.63)])
+def test_what_the_multiplexer_costs_a_virtual_ground_on_a_washer(on, error):
+    g = scenes(4)["washer"]
+    read = transconductances(g, on, on)
+    assert np.abs(read / g - 1)[g > 0.5].max() == pytest.approx(error, rel=0.15)
+
+
+def test_networks_that_fall_apart_or_make_no_sense_are_refused():
+    apart = np.zeros((16, 16))
+    apart[:8, :8] = apart[8:, 8:] = 1
+    with pytest.raises(CircuitError, match="falls into parts"):
+        effective_resistances(apart)
+    empty = np.ones((16, 16))
+    empty[3] = 0
+    with pytest.raises(CircuitError, match="leak"):
+        effective_resistances(empty)
+    for bad in (-np.ones((4, 4)), np.full((4, 4), np.nan), np.ones(16)):
+        with pytest.raises(CircuitError):
+            effective_resistances(bad)
+        with pytest.raises(CircuitError):
+            transconductances(bad)
+
+
+IDEAL = Electronics(noise=QUIET, settling_s=1.0, coupling=0.0, bias_lsb=0.0)
+
+
+def pressed(seed=0, share=0.25, most=1.5):
+    rng = np.random.default_rng(seed)
+    return np.where(rng.random((16, 16)) < share, rng.uniform(0.1, most, (16, 16)), 0.0)
+
+
+def read(electronics, forces, fsr=None, seed=0):
+    return read_counts(forces, electronics, fsr or fsr_of(), None, np.random.default_rng(seed))[0]
+
+
+def test_each_ideal_readout_by_its_formula():
+    forces = pressed()
+    g, _ = conductances(fsr_of(), forces)
+    through = 2200 / (2200 + effective_resistances(g))
+    ideal = {
+        "floating": 2 * through,
+        "grounded": 2 * g / (g.sum(axis=0) + 1 / 2200),
+        "virtual": 2 * 2200 * g,
+    }
+    for readout, share in ideal.items():
+        expected = np.clip(np.rint(share * 1023), 0, 1023)
+        np.testing.assert_array_equal(read(replace(IDEAL, readout=readout), forces), expected)
+
+
+def test_counts_rise_with_force_and_stop_at_full_scale():
+    virtual = replace(IDEAL, readout="virtual")
+    counts = [int(read(virtual, np.full((16, 16), f))[3, 3]) for f in (0, 0.1, 0.5, 1, 3, 50)]
+    assert counts == sorted(counts)
+    assert counts[0] == 0
+    assert counts[-1] == 1023
+
+
+def test_the_tactel_before_is_seen_as_much_as_the_settling_leaves():
+    board = replace(IDEAL, settling_s=10e-6, tau_s=5e-6)
+    share = np.zeros((16, 16))
+    share[4, 15] = 1.0
+    seen = scan_shares(share, board)
+    rest = np.exp(-2.0)
+    assert seen[4, 15] == pytest.approx(1 - rest)
+    assert seen[5, 0] == pytest.approx((1 - rest) * rest)
+    assert seen[4, 14] == pytest.approx(0, abs=1e-12)
+    np.testing.assert_allclose(unscan_shares(seen, board), share, atol=1e-12)
+
+
+def test_columns_couple_and_are_parted_again():
+    board = replace(IDEAL, coupling=-1e-3)
+    share = np.zeros((16, 16))
+    share[4, 7] = 1.0
+    seen = scan_shares(share, board)
+    assert seen[9, 7] == pytest.approx(-1e-3)
+    assert seen[9, 8] == 0
+    np.testing.assert_allclose(unscan_shares(seen, board), share, atol=1e-15)
+
+
+def test_the_default_board_is_at_least_as_bad_as_the_measured_one():
+    board, forces = Electronics(), pressed(3)
+    assert board.residue * 1023 >= 0.86
+    assert board.coupling <= -1e-3
+    counts, _ = read_sequence(
+        np.broadcast_to(forces, (800, 16, 16)),
+        board,
+        draw_fsr(np.random.default_rng(1), DATASHEET),
+        None,
+        np.random.default_rng(2),
+    )
+    away = counts - np.median(counts, axis=0)
+    usual = np.where(np.abs(away) > 50, np.nan, away)
+    deviation = np.nanstd(usual, axis=0)
+    idle, active = deviation[forces == 0], deviation[counts.mean(axis=0) > 30]
+    assert 0.24 <= np.median(idle) <= 0.8
+    assert active.min() >= 6
+    assert 14 <= np.median(active) <= 30
+    assert (np.abs(away[:, forces == 0]) > 50).mean() >= 451e-6
+
+
+def test_the_contact_s_noise_does_not_average_out_at_once():
+    board = replace(Electronics(), noise=Noise(0.0, 1.2, 0.05, 0.0, 0.0))
+    forces = np.full((1000, 16, 16), 0.5)
+    counts, _ = read_sequence(forces, board, fsr_of(), None, np.random.default_rng(0))
+    away = counts - counts.mean(axis=0)
+    kept = (away[1:] * away[:-1]).mean() / (away**2).mean()
+    assert kept == pytest.approx(np.exp(-board.frame_s / 0.05), abs=0.02)
+
+
+@pytest.mark.parametrize("readout", ["floating", "grounded", "virtual"])
+def test_touches_side_by_side_are_read_as_alone(readout):
+    board = Electronics(readout=readout, row_ohm=20.0, column_ohm=50.0, noise=QUIET)
+    forces = np.stack([pressed(i) for i in range(4)])
+    alone = [read(board, force) for force in forces]
+    np.testing.assert_array_equal(read(board, forces), alone)
+    assert read(board, forces).dtype == np.uint16
+
+
+def test_boards_that_are_none():
+    for change in (
+        {"readout": "open"},
+        {"bits": 0},
+        {"bits": 17},
+        {"load_ohm": 0.0},
+        {"row_ohm": -1.0},
+        {"coupling": 0.5},
+        {"tau_s": float("nan")},
+        {"noise": Noise(idle_lsb=-1)},
+    ):
+        with pytest.raises(CircuitError):
+            replace(Electronics(), **change)
+
+
+READOUTS = ["floating", "grounded", "virtual"]
+
+
+def washer(decades):
+    x = np.arange(16) - 7.5
+    radius = np.hypot(x, x[:, None])
+    return np.where((radius > 2.2) & (radius < 4.8), 1.0, 10.0**-decades)
+
+
+def few(number, seed, contrast=1e3):
+    rng = np.random.default_rng(seed)
+    g = np.full(256, 1 / contrast)
+    g[rng.choice(256, number, replace=False)] = rng.uniform(0.3, 1, number)
+    return g.reshape(16, 16)
+
+
+def board_of(readout, **changes):
+    """Return a board for conductances up to 1e-4 S."""
+    e = Electronics(
+        readout=readout, supply_v=1.0, reference_v=1.0, load_ohm=1e4, feedback_ohm=9e3,
+        noise=Noise(0.3, 0.0, 0.05, 0.0, 0.0),
+    )  # fmt: skip
+    return replace(e, **changes)
+
+
+def offered(g, e):
+    return scan_shares(shares(g, e), e) * e.full + e.bias_lsb * e.lsb
+
+
+def digitised(g, e, seed):
+    noise = e.noise.idle_lsb * e.lsb * np.random.default_rng(seed).standard_normal(g.shape)
+    return np.clip(np.rint(offered(g, e) + noise), 0, e.full)
+
+
+@pytest.mark.parametrize("decades", [0, 2, 4, 6])
+def test_floating_rows_over_six_decades(decades):
+    for g in (washer(decades), 10 ** np.random.default_rng(1).uniform(-decades, 0, (16, 16))):
+        for scale in (1.0, 1e-9):
+            found = solve_floating(effective_resistances(scale * g))
+            assert np.abs(found.conductance_s / (scale * g) - 1).max() <= 1e-8
+            assert found.steps <= 12
+            assert found.own.sum() == pytest.approx(31, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("pressed", "median"), [(5, (0.008, 0.004)), (30, (0.010, 0.004)), (80, (0.008, 0.006))]
+)
+def test_the_errors_of_a_10_bit_board_at_a_contrast_of_1000(pressed, median):
+    errors = {"floating": [], "grounded": []}
+    for seed in range(4):
+        g = 1e-4 * few(pressed, seed)
+        on = g > 1e-5
+        for readout, load, known in (("floating", 1e4, errors["floating"]),
+                                     ("grounded", 5e3, errors["grounded"])):  # fmt: skip
+            e = board_of(readout, load_ohm=load)
+            found = invert_readings(digitised(g, e, seed), e)
+            known.append(np.median(np.abs(found.conductance_s / g - 1)[on]))
+            assert not found.lost[on].any()
+            assert found.conductance_s[~on].max() <= 0.03 * g.max()
+    assert np.mean(errors["floating"]) <= median[0]
+    assert np.mean(errors["grounded"]) <= median[1]
+
+
+@pytest.mark.parametrize("readout", READOUTS)
+@pytest.mark.parametrize("row", [0.0, 30.0])
+def test_sigma_is_the_deviation_of_repeated_readings(readout, row):
+    g = 1e-4 * few(40, 3, contrast=30)
+    e = board_of(readout, row_ohm=row, column_ohm=100.0, bits=12)
+    frames = [invert_readings(digitised(g, e, seed), e) for seed in range(15)]
+    away = np.stack([f.conductance_s for f in frames]) - g
+    scale = away / np.stack([f.sigma_s for f in frames])
+    assert 0.8 <= np.sqrt((scale[:, g > 1e-5] ** 2).mean()) <= 1.2
+
+
+@pytest.mark.parametrize("readout", READOUTS)
+def test_what_lies_under_the_noise_is_lost_and_what_does_not_is_not(readout):
+    g = np.full((16, 16), 1e-9)
+    g[4:8, 4:8] = 1e-4
+    e = board_of(readout)
+    found = invert_readings(digitised(g, e, 1), e)
+    assert not found.lost[4:8, 4:8].any()
+    assert found.lost[g < 1e-8].mean() > 0.5
+    assert (found.conductance_s <= 5 * found.sigma_s + 1e-9)[g < 1e-8].all()
+    sharp = invert_readings(offered(1e-4 * few(60, 1), e), e, sigma_counts=1e-7)
+    assert not sharp.lost.any()
+
+
+def test_a_hidden_tactel_of_floating_rows_is_named():
+    """Behind three pressed corners the fourth shows its neighbours, not itself."""
+    g = np.full((16, 16), 1e-8)
+    g[[2, 2, 9], [2, 9, 2]] = 1e-4
+    e = board_of("floating", bits=16)
+    found = invert_readings(digitised(g, e, 1), e)
+    assert found.lost[9, 9]
+    assert not found.lost[2, 2]
+
+
+def test_saturated_readings_are_bounds_only():
+    g = 1e-4 * few(20, 2)
+    for readout in READOUTS:
+        e = board_of(readout, reference_v=0.3)
+        counts = digitised(g, e, 1)
+        full = counts == e.full
+        assert full.any()
+        found = invert_readings(counts, e)
+        assert found.lost[full].all()
+        assert np.isinf(found.sigma_s[full]).all()
+
+
+def test_a_column_that_carries_more_than_the_supply_can_give_is_refused():
+    e = board_of("grounded", noise=QUIET)
+    counts = np.full((16, 16), e.bias_lsb * e.lsb)
+    counts[:, 3] = 400
+    found = invert_readings(counts, e)
+    assert np.isnan(found.conductance_s[:, 3]).all()
+    assert found.lost[:, 3].all()
+    assert np.isfinite(np.delete(found.conductance_s, 3, axis=1)).all()
+
+
+@pytest.mark.parametrize("readout", READOUTS)
+def test_frames_side_by_side_are_inverted_as_alone(readout):
+    e = board_of(readout, row_ohm=5.0)
+    counts = np.stack([digitised(1e-4 * few(20, seed), e, seed) for seed in range(3)])
+    together = invert_readings(counts, e)
+    for i in range(3):
+        alone = invert_readings(counts[i], e)
+        np.testing.assert_allclose(together.conductance_s[i], alone.conductance_s, rtol=1e-9)
+        np.testing.assert_array_equal(together.lost[i], alone.lost)
+
+
+def test_counts_that_are_none():
+    e = Electronics()
+    for bad in (np.full((16, 16), 1024), np.full((16, 16), -1), np.full((16, 16), np.nan), [1, 2]):
+        with pytest.raises(CircuitError):
+            invert_readings(bad, e)
+    with pytest.raises(CircuitError, match="not above 0"):
+        solve_floating(np.zeros((16, 16)))

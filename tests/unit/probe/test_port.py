@@ -1,0 +1,387 @@
+"""Ports: URLs, lines, the probe in software, FlexiTac's stream, and a port of another package."""
+
+from __future__ import annotations
+
+import errno
+import itertools
+import os
+import pty
+import socket
+import threading
+import time
+import tomllib
+import tty
+from contextlib import contextmanager, suppress
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from probe.client.client import Client
+from probe.errors import PortError
+from probe.frame import Frame, frame_from
+from probe.port.address import Address
+from probe.port.flexitac import MARKER, PAUSE_LEAST_S, MarkedImages
+from probe.port.serial_line import _explain_refusal
+from probe.port.software import SoftwareProbe, endless_frames
+from probe.port.url import GROUP, address_of, open_port, typed_port
+from probe.protocol import FramePacket, IdentPacket, Splitter, StatisticsPacket, decode
+
+
+@pytest.mark.parametrize(
+    ("url", "target", "options"),
+    [
+        ("serial:///dev/ttyACM0?baud=500000", "/dev/ttyACM0", {"baud": "500000"}),
+        ("sim:", "", {}),
+        ("sim:out/cube.stl?seed=3", "out/cube.stl", {"seed": "3"}),
+        ("sim:lab.db#Cube/top?rate=5&seed=1", "lab.db#Cube/top", {"rate": "5", "seed": "1"}),
+        ("sim:sqlite:///lab.db#Cube/1", "sqlite:///lab.db#Cube/1", {}),
+        ("sim:postgresql://h/d?sslmode=require#Cube/1", "postgresql://h/d?sslmode=require#Cube/1",
+         {}),
+        ("file:touch.h5?speed=0&loop=1", "touch.h5", {"speed": "0", "loop": "1"}),
+    ],
+)  # fmt: skip
+def test_urls_are_read(url, target, options):
+    assert address_of(url) == Address(url, url.partition(":")[0], target, options)
+
+
+@pytest.mark.parametrize(
+    ("url", "says"),
+    [
+        ("touch.h5", "write file:touch.h5"),
+        ("serial:", "names no device"),
+        ("file:?speed=1", "names no recording"),
+        ("sim:?rate", "options 'rate' cannot be read"),
+        ("sim:?rate=fast", "rate='fast' is no number from 0.1"),
+        ("sim:?rate=0", "rate='0' is no number from 0.1"),
+        ("sim:?rate=inf", "is no number"),
+        ("file:touch.h5?speed=-1", "no number from 0"),
+        ("serial:///dev/ttyACM0?boud=1", "serial: has no option boud"),
+    ],
+)
+def test_urls_that_mean_nothing_are_refused(url, says):
+    with pytest.raises(PortError) as refused:
+        open_port(url)
+    assert says in str(refused.value)
+    assert refused.value.fix
+    assert refused.value.exit_code == 3
+
+
+def test_without_permission_the_group_is_named(tmp_path):
+    device = tmp_path / "ttyACM0"
+    device.touch()
+    refused = _explain_refusal(address_of(f"serial://{device}"), OSError(errno.EACCES, "no"), 9600)
+    assert f"no permission to open {device}" in refused.cause
+    assert "usermod -a -G" in refused.fix
+
+
+def test_bytes_go_both_ways_until_the_device_goes(line):
+    master, url = line
+    port = open_port(url)
+    assert port.url == url
+    assert port.read(0.01) == b""
+    os.write(master, b"\x00\x01\x11\x13\r\n\xff")  # what a line must not change
+    assert port.read(1.0) == b"\x00\x01\x11\x13\r\n\xff"
+    port.write(b"s\r")
+    assert os.read(master, 10) == b"s\r"
+    os.close(master)
+    with pytest.raises(PortError, match="went away"):
+        port.read(1.0)
+    port.close()
+    port.close()
+
+
+@pytest.fixture
+def line():
+    """Yield the master of a pty, and the URL of its other end."""
+    master, slave = pty.openpty()
+    tty.setraw(master)
+    name = os.ttyname(slave)
+    os.close(slave)
+    yield master, f"serial://{name}"
+    with suppress(OSError):  # the test may have closed it
+        os.close(master)
+
+
+IDENT = IdentPacket(0, 0, name="test")
+
+
+def frame(seq: int, t_ns: int) -> Frame:
+    return frame_from(np.full((16, 16), seq % 1024), t_ns=t_ns, seq=seq, wrist=[1, 2, 3, 4])
+
+
+def frames(n: int, step_ns: int = 10_000_000):
+    return iter([frame(i, i * step_ns) for i in range(n)])
+
+
+def packets(port, reads: int = 1, bits: int = 10) -> list:
+    splitter = Splitter()
+    blocks = [b for _ in range(reads) for b in splitter.feed(port.read(0.0))]
+    return [decode(block, bits) for block in blocks]
+
+
+def test_it_is_silent_until_it_is_started_and_after_it_is_stopped():
+    port = SoftwareProbe("sim:", frames(10), IDENT, speed=0)
+    assert packets(port) == []
+    port.write(b"s")
+    assert [p.seq for p in packets(port)] == list(range(10))
+    port = SoftwareProbe("sim:", frames(10), IDENT, speed=0)
+    port.write(b"sx")
+    assert packets(port) == []
+
+
+def test_one_frame_at_a_time():
+    port = SoftwareProbe("sim:", frames(10), IDENT, speed=1)
+    port.write(b"g")
+    assert [p.seq for p in packets(port, 3)] == [0]
+    port.write(b"gg")
+    assert [p.seq for p in packets(port, 3)] == [1, 2]
+
+
+def test_ident_and_statistics_answer():
+    port = SoftwareProbe("sim:", frames(10), IDENT, speed=0)
+    port.write(b"5bgQ#")
+    (first,) = packets(port)
+    assert isinstance(first, FramePacket)
+    assert first.byte_wide
+    port.write(b"it")
+    ident, statistics = packets(port)
+    assert (ident.sensor, ident.bits, ident.name, ident.seq) == (5, 8, "test", 1)
+    assert isinstance(statistics, StatisticsPacket)
+    assert (statistics.frames, statistics.receive_errors) == (1, 2)
+
+
+def test_the_end_is_told_after_the_last_frame():
+    port = SoftwareProbe("file:x", frames(3), IDENT, speed=0)
+    port.write(b"s")
+    assert len(packets(port)) == 3
+    with pytest.raises(EOFError):
+        port.read(0.0)
+
+
+def test_jumps_are_announced():
+    jumping = [
+        frame(0, 0),
+        frame(1, 10**7),
+        frame(5, 5 * 10**7),
+        frame(6, 10**10),
+        frame(2, 10**10),
+    ]
+    port = SoftwareProbe("file:x", iter(jumping), IDENT, speed=0)
+    port.write(b"s")
+    seen = [(type(p).__name__[0], p.seq) for p in packets(port)]
+    assert seen == [
+        ("F", 0), ("F", 1), ("S", 2), ("F", 5), ("S", 6), ("F", 6), ("S", 7), ("F", 2)
+    ]  # fmt: skip
+
+
+def test_a_late_reader_makes_the_device_wait():
+    port = SoftwareProbe("sim:", frames(1000), IDENT, speed=1.0)
+    port.write(b"s")
+    packets(port)
+    time.sleep(0.7)
+    assert len(packets(port)) == 1  # not the seventy that were due
+    port.write(b"t")
+    (statistics,) = packets(port)
+    assert statistics.transmit_waits == 1
+
+
+def test_a_recording_repeats_with_rising_numbers_and_times():
+    seen = list(islice(endless_frames(lambda: iter([frame(7, 5), frame(9, 25)])), 5))
+    assert [f.seq for f in seen] == [0, 2, 3, 5, 6]
+    assert [f.t_ns for f in seen] == [0, 20, 10_000_020, 10_000_040, 20_000_040]
+    assert list(endless_frames(lambda: iter([]))) == []
+
+
+LENGTH = 512
+RNG = np.random.default_rng(3)
+
+
+def images_of(number):
+    """Return images (number, 512), in many of which the marker stands at some place."""
+    images = RNG.integers(0, 256, (number, LENGTH), dtype=np.uint8)
+    for image in images[::2]:
+        at = int(RNG.integers(LENGTH - 2))
+        image[at : at + 2] = 0xAA, 0x55
+    return images
+
+
+def stream_of(images):
+    return b"".join(MARKER + image.tobytes() for image in images)
+
+
+def found_in(stream, pieces, **told):
+    marked, found = MarkedImages(LENGTH), []
+    cuts = np.sort(RNG.integers(0, len(stream), pieces))
+    for part in np.split(np.frombuffer(stream, np.uint8), cuts):
+        found += marked.feed(part.tobytes(), **told)
+    return np.array([np.frombuffer(image, np.uint8) for image in found]), marked
+
+
+@pytest.mark.parametrize("pieces", [1, 40, 3000])
+def test_images_come_out_of_any_pieces(pieces):
+    images = images_of(40)
+    found, marked = found_in(stream_of(images)[777:] + MARKER, pieces)
+    assert np.array_equal(found, images[2:])  # the first two began before the stream
+    assert marked.sure
+
+
+def test_a_marker_inside_images_that_stand_still_is_told_by_the_pauses():
+    image = np.zeros(LENGTH, np.uint8)
+    image[100:102], image[200] = (0xAA, 0x55), 7
+    marked, found = MarkedImages(LENGTH), []
+    block = MARKER + image.tobytes()
+    for part in [block[300:], *[block] * 20]:
+        found += marked.feed(part[:400], quiet_s=2 * PAUSE_LEAST_S)
+        found += marked.feed(part[400:])
+    assert len(found) >= 15
+    assert all(one == image.tobytes() for one in found)
+
+
+def test_without_pauses_nothing_is_guessed():
+    image = np.zeros(LENGTH, np.uint8)
+    image[100:102] = 0xAA, 0x55
+    found, marked = found_in(stream_of(np.tile(image, (50, 1))), 20)
+    assert len(found) == 0
+    assert not marked.sure
+    assert len(marked._rest) <= 5 * (LENGTH + 2) + 1
+
+
+def test_lost_and_added_bytes_cost_the_images_that_they_are_in():
+    images = images_of(60)
+    stream = bytearray(stream_of(images))
+    del stream[20 * 514 + 99 : 20 * 514 + 102]  # of image 20
+    stream[40 * 514 : 40 * 514] = b"\x00\xaa\x55\x01\x02"  # before image 40
+    found, marked = found_in(bytes(stream) + MARKER, 30)
+    true = {image.tobytes() for image in images}
+    assert all(image.tobytes() in true for image in found)
+    assert len(found) >= 60 - 2
+    assert marked.lost == 511 + 514 + 5
+
+
+@contextmanager
+def line_of(images, period_s=0.004, skip=50):
+    """Yield the device of a board that sends images again and again, from within the first on."""
+    master, slave = pty.openpty()
+    tty.setraw(master)
+    name = os.ttyname(slave)
+    stop = threading.Event()
+
+    def send():
+        first = True
+        while not stop.is_set():
+            for image in images:
+                os.write(master, (MARKER + image.tobytes())[skip if first else 0 :])
+                first = False
+                if stop.wait(period_s):
+                    return
+
+    thread = threading.Thread(target=send, daemon=True)
+    thread.start()
+    try:
+        yield name
+    finally:
+        stop.set()
+        thread.join(5)
+        os.close(slave)
+        os.close(master)
+
+
+def still_image():
+    image = np.zeros(LENGTH, np.uint8)
+    image[100:102], image[200] = (0xAA, 0x55), 7
+    return image
+
+
+@pytest.mark.parametrize("images", [images_of(9), still_image()[None]], ids=["changing", "still"])
+def test_a_board_is_read_over_a_line(images):
+    true = {image.tobytes() for image in images}
+    with line_of(images) as device, Client(f"flexitac://{device}") as client:
+        frames = [frame for frame, _ in zip(client.frames(timeout_s=5), range(40), strict=False)]
+        ident = client.ident
+    assert len(frames) == 40
+    assert all(frame.counts.astype(np.uint8).tobytes() in true for frame in frames)
+    assert frames[0].counts.shape == (16, 32)
+    assert [frame.seq - frames[0].seq for frame in frames] == list(range(40))
+    assert all(a.t_ns < b.t_ns for a, b in itertools.pairwise(frames))
+    assert (ident.name, ident.rows, ident.columns) == ("flexitac", 16, 32)
+
+
+def test_it_reads_what_its_own_client_reads():
+    """The reference: `flexitac` 0.3.1, images in which no marker stands."""
+    flexitac = pytest.importorskip("flexitac")
+    images = RNG.integers(0, 160, (12, LENGTH), dtype=np.uint8)
+    with line_of(images) as device:
+        with flexitac.FlexiTacSensor(port=device, rows=16, cols=32, baseline=0.0) as theirs:
+            read = [theirs.read().raw for _ in range(24)]
+        with Client(f"flexitac://{device}") as client:
+            ours = [f.counts for f, _ in zip(client.frames(timeout_s=5), range(24), strict=False)]
+    number = {image.tobytes(): i for i, image in enumerate(images)}
+    for got in (read, [counts.astype(np.uint8) for counts in ours]):
+        order = [number[one.tobytes()] for one in got]
+        assert all((b - a) % len(images) == 1 for a, b in itertools.pairwise(order))
+
+
+def test_the_type_of_the_line_is_that_of_the_scheme_or_the_one_asked_for():
+    assert typed_port("flexitac:///dev/ttyUSB0")[1].shape == (16, 32)
+    assert typed_port("flexitac:///dev/ttyUSB0?sensor_type=flexitac-12x32")[1].shape == (12, 32)
+    url, kind = typed_port("sim:?rate=50", "fsr-8x8")
+    assert (url, kind.name) == ("sim:?rate=50&sensor_type=fsr-8x8", "fsr-8x8")
+    assert typed_port("serial:///dev/ttyACM0") == ("serial:///dev/ttyACM0", None)
+
+
+EXAMPLE = Path(__file__).parents[3] / "docs/examples/udp_probe"
+
+
+@pytest.fixture
+def udp(tmp_path, monkeypatch):
+    """Install the package as pip would, and yield a free port of this machine."""
+    project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]
+    info = tmp_path / "udp_probe-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: udp-probe\nVersion: 1.0\n")
+    entries = project["entry-points"][GROUP].items()
+    text = "".join(f"{scheme} = {opener}\n" for scheme, opener in entries)
+    (info / "entry_points.txt").write_text(f"[{GROUP}]\n{text}lost = no_such_module:Port\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.syspath_prepend(EXAMPLE)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+def test_images_of_another_package_are_frames(udp):
+    images = np.random.default_rng(1).integers(0, 4096, (6, 8, 8)).astype("<u2")
+    url = f"udp://127.0.0.1:{udp}?sensor_type=fsr-8x8"
+    assert typed_port(url)[1].name == "fsr-8x8"
+    stop = threading.Event()
+
+    def send():
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            while not stop.is_set():
+                for image in images:
+                    out.sendto(image.tobytes(), ("127.0.0.1", udp))
+                    time.sleep(0.005)
+
+    sender = threading.Thread(target=send, daemon=True)
+    sender.start()
+    with Client(url) as client:
+        frames = [frame for frame, _ in zip(client.frames(timeout_s=5), range(12), strict=False)]
+        assert (client.ident.name, client.ident.rows) == ("udp", 8)
+    stop.set()
+    sender.join()
+    assert len(frames) == 12
+    known = {image.tobytes() for image in images}
+    assert all(frame.counts.astype("<u2").tobytes() in known for frame in frames)
+
+
+def test_it_refuses_as_ports_do(udp):
+    with pytest.raises(PortError, match=r"cannot listen.*write udp://"):
+        open_port("udp://127.0.0.1:port")
+    with pytest.raises(PortError, match=r"no_such_module.*install it again"):
+        open_port("lost:")
+    with pytest.raises(PortError, match="sim:, file:, lost: or udp:"):
+        open_port("http://probe")
+    with pytest.raises(PortError, match="udp: has no option rows"):
+        open_port(f"udp://127.0.0.1:{udp}?rows=8")
