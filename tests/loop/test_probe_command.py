@@ -15,6 +15,7 @@ import sys
 import termios
 import time
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 import pytest
@@ -45,15 +46,8 @@ def started(*words, **named):
 
 
 @pytest.fixture
-def asked(capsys):
-    """Run a command in this process: code, stdout, stderr."""
-
-    def ask(*words):
-        capsys.readouterr()
-        code = run([str(word) for word in words])
-        return code, *capsys.readouterr()
-
-    return ask
+def asked(ask):
+    return partial(ask, run)
 
 
 def wait_for(what, timeout_s=SHORT_S):

@@ -4,6 +4,7 @@ import io
 import json
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -48,15 +49,8 @@ def bench(tmp_path_factory):
 
 
 @pytest.fixture
-def asked(capsys):
-    """Run a command: code, stdout, stderr."""
-
-    def ask(*words):
-        capsys.readouterr()
-        code = run([str(word) for word in words])
-        return code, *capsys.readouterr()
-
-    return ask
+def asked(ask):
+    return partial(ask, run)
 
 
 HEAVY = [
