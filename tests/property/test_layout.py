@@ -161,7 +161,7 @@ def test_unfolding_keeps_areas_and_never_overlaps(solid, cuts):
 
 
 @given(solids, st.sampled_from(["faces", "net"]), st.integers(0, 10**6))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_layouts_use_no_cell_twice_and_keep_clear_of_edges(solid, kind, seed):
     random = np.random.default_rng(seed)
     clearances = [
@@ -186,6 +186,7 @@ def test_layouts_use_no_cell_twice_and_keep_clear_of_edges(solid, kind, seed):
         assert (face.places == 0) == (len(here) == 0) == (face.face in layout.blank_faces)
         if not here:
             continue
+        assert np.array_equal(face.labels, ARRAY.symbols(face.rows, face.columns))
         rotation = -face.placement.rotation_rad
         check_clearance(
             face_polygon(solid, face.face), clearances[face.face], face.centres_mm, rotation, half

@@ -9,7 +9,6 @@ import pytest
 from reference.polynomials import windows_are_unique
 
 from generator.array import (
-    PROFILES,
     FoldedArray,
     Sequence,
     array_from,
@@ -28,6 +27,10 @@ from generator.errors import ArrayError
 
 def block(a, b):
     return np.arange(a)[:, None], np.arange(b)
+
+
+def product(family, rows, columns):
+    return {"family": family, "factors": {"rows": rows, "columns": columns}}
 
 
 def test_most_square_folds():
@@ -66,73 +69,46 @@ def test_shapes_and_kinds_of_indices():
         with pytest.raises(ArrayError, match="pair of integers"):
             array.symbols(wrong, 0)
     assert array.symbols([1, 2], 3).dtype == np.int64
-
-
-def test_rank_depends_on_differences_only():
-    array = profile("thesis").array()
     assert array.rank([], []) == 0
-    assert array.rank(0, 0) == 1
     assert array.rank([0, 0, 63], [0, 65, 0]) == 1  # one cell, three times
-    r, c = block(4, 4)
-    assert array.rank(r, c) == array.rank(r + 60, c - 3) == 10
-    assert not array.identifies(r, c)
-    assert array.identifies(*block(6, 2))
-    assert not array.identifies(*block(2, 6))  # of 0x1099: 6x2 means six rows
 
 
-def test_fold_that_is_none():
-    with pytest.raises(ArrayError, match=r"63x64 is no size.*take 63x65 or 23x89"):
-        array_from({"family": "prba", "rows": 63, "columns": 64})
+def test_a_fold_has_sides_without_a_common_factor_that_may_be_given_by_one():
     sequence = Sequence(field_of_order(2), primitive_polynomial(2, 12))
     with pytest.raises(ArrayError, match="take 63x65, 45x91"):
         FoldedArray(sequence, 105, 39)  # 3 divides both
-    with pytest.raises(ArrayError, match=r"do not fold.*degree 12 \(63x65\) or degree 14.*prbs"):
-        array_from({"family": "prba", "degree": 13})
-    assert array_from({"family": "prba", "degree": 12, "rows": 65, "columns": 63}).rows == 65
-    assert array_from({"family": "prba", "degree": 12, "rows": 45}).columns == 91
-    assert array_from({"family": "prba", "degree": 12, "columns": 91}).rows == 45
-
-
-@pytest.mark.parametrize(
-    ("order", "degree", "cause", "fix"),
-    [
-        (2, 61, r"prime factor 2305843009213693951.*2\^40", r"degree 60 \(\d+x\d+\) or degree 62"),
-        (2, 59, "prime factor 3203431780337", r"degree 58 .* or degree 60"),
-        (2, 49, "prime factor 4432676798593", "degree 48 .* or degree 50"),
-        (7, 19, "prime factor", "degree 18 .* or degree 20"),
-    ],
-)
-def test_sizes_that_cannot_be_decoded_are_refused(order, degree, cause, fix):
-    for family in ("prmva", "prmvs"):
-        with pytest.raises(ArrayError) as caught:
-            array_from({"family": family, "order": order, "degree": degree})
-        caught.match(cause)
-        caught.match("take degree")
-        if family == "prmva":
-            caught.match(fix)
-    factors = {"rows": {"order": order, "degree": degree}, "columns": {"degree": 3}}
-    with pytest.raises(ArrayError, match="prime factor"):
-        array_from({"family": "prmvpa", "factors": factors})
-
-
-def test_window_that_is_not_unique():
-    with pytest.raises(ArrayError) as caught:
-        array_from({"family": "prba", "polynomial": "0x1099", "window": [4, 4]})
-    assert str(caught.value) == (
-        "a 4x4 window of 0x1099 on 63x65 has rank 10 of 12, so it occurs more than once; "
-        "take 6x2 or 5x4"
-    )
-    array_from({"family": "prba", "polynomial": "0x1099", "window": [5, 4]})
-    for window in ([0, 3], [64, 2], [3, 66]):
-        with pytest.raises(ArrayError, match="does not lie in an array of 63x65"):
-            array_from({"family": "prba", "degree": 12, "window": window})
-    with pytest.raises(ArrayError, match="take 4x2 or larger"):
-        array_from(dict(profile("product").encoding) | {"window": [3, 2]})
+    binary = {"family": "prba", "degree": 12}
+    for given, size in (
+        ({"rows": 65, "columns": 63}, (65, 63)),
+        ({"rows": 45}, (45, 91)),
+        ({"columns": 91}, (45, 91)),
+    ):
+        array = array_from(binary | given)
+        assert (array.rows, array.columns) == size
 
 
 @pytest.mark.parametrize(
     ("definition", "message"),
     [
+        *[
+            ({"family": family, "order": order, "degree": degree}, f"{cause}.*take degree {fix}")
+            for order, degree, cause, fix in (
+                (2, 61, r"prime factor 2305843009213693951.*2\^40", r"60 \(\d+x\d+\) or degree 62"),
+                (2, 59, "prime factor 3203431780337", "58 .* or degree 60"),
+                (2, 49, "prime factor 4432676798593", "48 .* or degree 50"),
+                (7, 19, "prime factor", "18 .* or degree 20"),
+            )
+            for family, fix in (("prmva", fix), ("prmvs", ""))
+        ],
+        (product("prmvpa", {"order": 2, "degree": 61}, {"degree": 3}), "prime factor"),
+        ({"family": "prba", "degree": 13},
+         r"do not fold.*degree 12 \(63x65\) or degree 14.*prbs"),
+        ({"family": "prba", "polynomial": "0x1099", "window": [4, 4]},
+         ".*has rank 10 of 12, so it occurs more than once; take 6x2 or 5x4"),
+        *[({"family": "prba", "degree": 12, "window": window}, "does not lie in an array of 63x65")
+          for window in ([0, 3], [64, 2], [3, 66])],
+        (dict(profile("product").encoding) | {"window": [3, 2]}, "take 4x2 or larger"),
+        ({"family": "prmva", "order": 121, "degree": 2}, "none is for this field"),
         ({}, "family None is none.*prbs, prba"),
         ({"family": "anoto"}, "family 'anoto'"),
         ({"family": "prba", "order": 4, "degree": 6}, "binary.*take family prmva"),
@@ -158,12 +134,10 @@ def test_window_that_is_not_unique():
         ({"family": "prmva", "order": 4, "degree": 6, "field": "x"}, "no minimal polynomial"),
         ({"family": "prmva", "order": 32, "degree": 9}, "is on file"),
         ({"family": "prpa"}, "factors: does not give them"),
-        ({"family": "prpa", "factors": {"rows": {}, "columns": 3}}, "rows: has no degree"),
-        ({"family": "prpa", "factors": {"rows": {"degree": 4}, "columns": 3}}, "is no sequence"),
-        ({"family": "prpa", "factors": {"rows": {"degree": 4, "window": 2}, "columns": {}}},
-         "factors: rows knows no window"),
-        ({"family": "prpa", "factors": {"rows": {"degree": 4, "order": 4}, "columns": {}}},
-         "binary"),
+        (product("prpa", {}, 3), "rows: has no degree"),
+        (product("prpa", {"degree": 4}, 3), "is no sequence"),
+        (product("prpa", {"degree": 4, "window": 2}, {}), "factors: rows knows no window"),
+        (product("prpa", {"degree": 4, "order": 4}, {}), "binary"),
         ({"family": "prpa", "degree": 4}, "prpa knows no degree"),
     ],
 )  # fmt: skip
@@ -174,8 +148,8 @@ def test_definitions_that_make_no_array(definition, message):
 
 
 def test_product_law_and_sizes():
-    factors = {"rows": {"degree": 4}, "columns": {"degree": 6}}
-    array = array_from({"family": "prpa", "factors": factors, "law": [[0, 2], [1, 3]]})
+    given = product("prpa", {"degree": 4}, {"degree": 6})
+    array = array_from(given | {"law": [[0, 2], [1, 3]]})
     assert (array.rows, array.columns, array.order, array.window) == (15, 63, 4, (4, 6))
     rows, columns = array.row_sequence, array.column_sequence
     assert np.array_equal(
@@ -185,9 +159,9 @@ def test_product_law_and_sizes():
     assert windows_are_unique(array, (4, 6))
     for law in ([[0, 1], [1, 2]], [[0, 1, 2, 3]], [0, 1, 2, 3]):
         with pytest.raises(ArrayError, match="injective"):
-            array_from({"family": "prpa", "factors": factors, "law": law})
+            array_from(given | {"law": law})
     with pytest.raises(ArrayError, match="rows: 16 is not the period of its sequence, 15"):
-        array_from({"family": "prpa", "factors": factors, "rows": 16})
+        array_from(given | {"rows": 16})
     assert array.rank([], []) == 0
     assert array.minimum_distance([0], [0]) == 0
 
@@ -203,14 +177,6 @@ def test_definition_keeps_start_and_field():
     assert array.sequence.symbols([0, 1]).tolist() == [7, 3]
     assert np.array_equal(again.symbols(*block(15, 17)), array.symbols(*block(15, 17)))
     assert windows_are_unique(array, array.window)
-
-
-def test_profiles_by_name():
-    assert profile() is PROFILES["one-touch"]
-    with pytest.raises(ArrayError, match="unknown profile 'huge'; choose one of one-touch, thesis"):
-        profile("huge")
-    with pytest.raises(TypeError):
-        profile().encoding["order"] = 2
 
 
 def test_large_and_up():

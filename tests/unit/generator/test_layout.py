@@ -1,14 +1,21 @@
-"""Whole layouts of known objects on the profiles' arrays."""
+"""Whole layouts of known objects, nets known by heart, and footprints worked by hand."""
 
 import numpy as np
 import pytest
 
 from generator.array.profiles import profile
 from generator.errors import LayoutError
+from generator.layout.footprint import (
+    blocked_intervals,
+    free_grid,
+    mirror_region,
+    move_region,
+    region_of,
+)
 from generator.layout.layout import lay_out
-from generator.layout.occupancy import Occupancy
 from generator.layout.placement import CODE_LETTERS, FaceLayout, Layout, Placement, object_code
-from generator.layout.places import array_cells, count_places, count_windows, rank_test
+from generator.layout.places import array_cells, count_places, count_windows
+from generator.layout.unfold import overlap, split, triangles_of, unfold
 from generator.polyhedron import shapes
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
@@ -23,31 +30,8 @@ def laid_out(solid, occupied=NONE, kind="auto", array=ARRAY, pitch=7.0, half=2.7
     return lay_out(solid, array, pitch, half, clearances(solid), occupied, kind, **options)
 
 
-def cells_of(layout):
-    return tuple(np.concatenate([getattr(f, k) for f in layout.faces]) for k in ("rows", "columns"))
-
-
-def check(layout, array=ARRAY):
-    """Cells are used once, carry the array's symbols, and lie where the placement says."""
-    rows, columns = cells_of(layout)
-    assert len(set(zip(rows.tolist(), columns.tolist(), strict=True))) == len(rows)
-    p = layout.pitch_mm
-    for face in layout.faces:
-        here = face.placement
-        assert np.array_equal(face.labels, array.symbols(face.rows, face.columns))
-        c, s = np.cos(here.rotation_rad), np.sin(here.rotation_rad)
-        x, y = face.centres_mm.T
-        u, v = c * x - s * y + here.x_mm, s * x + c * y + here.y_mm
-        column, row = u / p - 0.5 + here.column, -v / p - 0.5 + here.row
-        assert np.allclose(column, np.rint(column), atol=1e-9)
-        assert np.allclose(row, np.rint(row), atol=1e-9)
-        assert np.array_equal(np.rint(row).astype(np.int64) % array.rows, face.rows)
-        assert np.array_equal(np.rint(column).astype(np.int64) % array.columns, face.columns)
-
-
 def test_the_60_mm_cube_carries_384_symbols():
     layout = laid_out(shapes.cube(60.0))
-    check(layout)
     assert layout.kind == "faces"
     assert [len(face.rows) for face in layout.faces] == [64] * 6
     assert [face.places for face in layout.faces] == [42] * 6
@@ -57,49 +41,15 @@ def test_the_60_mm_cube_carries_384_symbols():
         assert np.allclose(np.unique(np.round(face.centres_mm, 4)), x, atol=1e-4)
 
 
-@pytest.mark.parametrize("kind", ["faces", "net"])
-@pytest.mark.parametrize(
-    "solid",
-    [
-        shapes.cube(60.0),
-        shapes.box((80.0, 60.0, 40.0)),
-        shapes.triangular_prism(60.0, 80.0),
-        shapes.tetrahedron(80.0),
-        shapes.dodecahedron(30.0),
-    ],
-    ids=lambda solid: solid.kind,
-)
-def test_the_usual_solids(solid, kind):
-    layout = laid_out(solid, kind=kind)
-    check(layout)
-    assert all(face.places > 0 for face in layout.faces)
-    assert kind == layout.kind
-
-
-def test_the_same_object_gives_the_same_layout_and_a_second_one_other_cells():
-    solid = shapes.triangular_prism(60.0, 80.0)
-    first, again = laid_out(solid), laid_out(solid)
-    for one, two in zip(first.faces, again.faces, strict=True):
-        assert one.placement == two.placement
-        assert one.centres_mm.tobytes() == two.centres_mm.tobytes()
-        assert one.labels.tobytes() == two.labels.tobytes()
-    second = laid_out(solid, cells_of(first))
-    check(second)
-    both = Occupancy.from_cells(*cells_of(first), ARRAY).with_cells(*cells_of(second))
-    assert both.used == sum(len(f.rows) for layout in (first, second) for f in layout.faces)
-
-
 def test_the_net_falls_into_islands_where_the_array_is_too_small():
     array = profile("product").array()  # 15 x 15
     solid = shapes.tetrahedron(75.0)
     layout = laid_out(solid, kind="net", array=array, pitch=8.0, half=3.0)
-    check(layout, array)
     assert len({(f.placement.row, f.placement.column) for f in layout.faces}) > 1
 
 
 def test_a_face_identified_by_its_rank_alone_is_one_place():
     layout = laid_out(shapes.box((80.0, 60.0, 12.0)), kind="faces")
-    check(layout)
     assert sorted(face.places for face in layout.faces) == [1, 1, 1, 1, 63, 63]
 
 
@@ -107,6 +57,9 @@ def test_faces_without_a_place_are_listed_with_what_would_help():
     solid = shapes.box((80.0, 60.0, 5.0))
     with pytest.raises(LayoutError) as caught:
         laid_out(solid)
+    layout = laid_out(solid, allow_blank_faces=True)
+    assert layout.blank_faces == (1, 2, 3, 4)
+    assert [warning.endswith("left blank") for warning in layout.warnings] == [True]
     names = [solid.faces[k].name for k in (1, 2, 3, 4)]
     assert all(name in caught.value.cause for name in names)
     assert "80.0 x 5.0 mm, 0 cells" in caught.value.cause
@@ -120,18 +73,9 @@ def test_faces_without_a_place_are_listed_with_what_would_help():
     assert all(face.places > 0 for face in larger.faces)
 
 
-def test_faces_without_a_place_may_be_left_blank():
-    layout = laid_out(shapes.box((80.0, 60.0, 5.0)), allow_blank_faces=True)
-    check(layout)
-    assert layout.blank_faces == (1, 2, 3, 4)
-    assert len(layout.warnings) == 1
-    assert layout.warnings[0].endswith("left blank")
-
-
 def test_faces_are_left_blank_on_purpose_without_a_warning():
     for kind in ("faces", "net"):
         layout = laid_out(shapes.cube(60.0), kind=kind, blank_faces={0, 3})
-        check(layout)
         assert (layout.blank_faces, layout.warnings) == ((0, 3), ())
         assert len(layout.faces) == 6
 
@@ -212,16 +156,6 @@ def test_every_cell_has_its_own_code():
     assert "F" not in "".join(codes)
 
 
-def test_rank_test_agrees_with_the_array():
-    array = profile("thesis").array()
-    identifies = rank_test(array)
-    rows, columns = np.mgrid[:6, :2].reshape(2, -1)
-    for _ in range(2):  # the second answer is remembered
-        assert identifies(rows, columns)
-        assert not identifies(rows[:11], columns[:11])
-        assert identifies(columns, rows) == array.identifies(columns, rows)
-
-
 def test_windows_of_masks():
     mask = np.ones((4, 5), dtype=bool)
     assert count_windows(mask, (3, 2)) == 2 * 4
@@ -238,3 +172,133 @@ def test_quarter_turns_of_cells_turn_counter_clockwise():
     assert (rows.tolist(), columns.tolist()) == ([0, 0, -1], [0, 1, 1])
     rows, columns = array_cells(cells, 1)
     assert (rows.tolist(), columns.tolist()) == ([0, -1, -1], [0, 0, -1])
+
+
+SOLIDS = {
+    "cube": lambda: shapes.cube(60.0),
+    "box": lambda: shapes.box((80.0, 60.0, 12.0)),
+    "triangular_prism": lambda: shapes.triangular_prism(60.0, 80.0),
+    "tetrahedron": lambda: shapes.tetrahedron(80.0),
+    "octahedron": lambda: shapes.octahedron(70.0),
+    "dodecahedron": lambda: shapes.dodecahedron(30.0),
+    "prism": lambda: shapes.prism(17, 90.0, side=20.0),
+    "pyramid": lambda: shapes.pyramid(24, 150.0, side=15.0),
+}
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_solids_unfold_in_one_piece(name):
+    solid = SOLIDS[name]()
+    net = unfold(solid)
+    assert len(net.pieces) == 1
+    assert sorted(net.pieces[0]) == list(range(len(solid.faces)))
+    assert net.parents.count(-1) == 1
+
+
+def test_splitting_halves_a_piece_along_a_fold():
+    net = split(unfold(shapes.cube(60.0)), 0)
+    assert sorted(map(len, net.pieces)) in ([2, 4], [3, 3])
+    for faces in net.pieces:
+        assert [net.parents[face] for face in faces].count(-1) == 1
+        assert all(net.parents[face] in (-1, *faces) for face in faces)
+    while any(len(faces) > 1 for faces in net.pieces):
+        net = split(net, next(k for k, faces in enumerate(net.pieces) if len(faces) > 1))
+    assert net.parents == (-1,) * 6
+
+
+def square(x, y, side=1.0):
+    return triangles_of([np.array([[x, y], [x + side, y], [x + side, y + side], [x, y + side]])])
+
+
+@pytest.mark.parametrize(
+    ("other", "overlaps"),
+    [
+        ((1, 0), False),  # they touch
+        ((1, 1), False),
+        ((5, 5), False),
+        ((0, 0), True),  # and cross no edge
+        ((0.5, 0), True),
+        ((0.4, 0.4, 0.1), True),
+        ((1 - 1e-6, 0), True),
+    ],
+)
+def test_squares_overlap_where_they_share_an_area(other, overlaps):
+    assert overlap(square(0, 0), square(*other), 1e-9) == overlaps
+
+
+def test_a_square_in_a_hole_or_a_bay_does_not_overlap():
+    ring = [
+        np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]]),
+        np.array([[1.0, 1.0], [1.0, 2.0], [2.0, 2.0], [2.0, 1.0]]),
+    ]
+    assert not overlap(triangles_of(ring), square(1, 1), 1e-9)
+    assert overlap(triangles_of(ring), square(1.1, 1), 1e-9)
+    bay = np.array([[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]], dtype=float)
+    assert not overlap(triangles_of([bay]), square(1, 1), 1e-9)
+    assert overlap(triangles_of([bay]), square(1, 0.9), 1e-9)
+
+
+SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
+
+
+def region(clearance=1.0, hole=None):
+    loops = [SQUARE] if hole is None else [SQUARE, hole]
+    return region_of(loops, [np.full(len(loop), clearance) for loop in loops])
+
+
+def test_a_square_leaves_the_middle_and_its_limits_count_as_free():
+    x = np.array([2.9, 3.0, 5.0, 7.0, 7.1])
+    free = free_grid(region(), 2.0, x, x)
+    assert free.tolist() == [[2.9 < a < 7.1 and 2.9 < b < 7.1 for b in x] for a in x]
+
+
+def test_each_edge_has_its_own_clearance():
+    face = region_of([SQUARE], [np.array([0.0, 1.0, 2.0, 3.0])])  # bottom, right, top, left
+    x, y = np.array([4.9, 5.0, 7.0, 7.1]), np.array([1.9, 2.0, 6.0, 6.1])
+    expected = np.outer([False, True, True, False], [False, True, True, False])
+    assert np.array_equal(free_grid(face, 2.0, y, x), expected)
+
+
+def test_a_hole_keeps_its_distance_on_every_side():
+    hole = np.array([[4.0, 4.0], [4.0, 6.0], [6.0, 6.0], [6.0, 4.0]])  # clockwise
+    x = np.array([1.0, 2.4, 2.6, 5.0, 7.4, 7.6, 9.0])
+    free = free_grid(region(0.5, hole), 0.5, np.array([5.0]), x)[0]
+    assert free.tolist() == [True, True, True, False, True, True, True]
+    free = free_grid(region(1.0, hole), 0.7, np.array([5.0]), x)[0]
+    assert free.tolist() == [False, False, False, False, False, False, False]
+
+
+def test_a_corner_is_kept_clear_by_a_circle():
+    # The corner of the L at (5, 5): a footprint towards the open side is seen along the diagonal.
+    corner = np.array(
+        [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [5.0, 20.0], [5.0, 15.0], [0.0, 15.0]]
+    )
+    face = region_of([corner], [np.full(6, 2.0)])
+    low, high = blocked_intervals(face, 1.0, np.array([13.0]))
+    # The square's corner is 1 mm below the vertex (5, 15), so 3^0.5 mm beside it is near enough.
+    edge = 3  # from (5, 20) to (5, 15)
+    assert (low[edge, 0], high[edge, 0]) == pytest.approx((4 - 3**0.5, 6 + 3**0.5), abs=1e-6)
+
+
+@pytest.mark.parametrize("angle", np.linspace(0.1, 6.2, 14))
+def test_blocked_intervals_of_a_slanted_edge_agree_with_distances(angle):
+    shapely = pytest.importorskip("shapely")
+    end = 6.0 * np.array([np.cos(angle), np.sin(angle)])
+    face = region_of([np.array([[0.0, 0.0], end])], [np.array([1.5, 1.5])])
+    y = np.linspace(-11.0, 11.0, 45)
+    low, high = blocked_intervals(face, 2.0, y)
+    x = np.linspace(-11.0, 11.0, 89)
+    segment = shapely.LineString([(0, 0), end])
+    for line, a, b in zip(y, low[0], high[0], strict=True):
+        near = [
+            segment.distance(shapely.box(c - 2, line - 2, c + 2, line + 2)) < 1.5 - 1e-6 for c in x
+        ]
+        assert ((x > a) & (x < b)).tolist() == near
+
+
+def test_moved_and_mirrored_keep_the_face_on_the_left():
+    face = move_region(region(), np.pi / 2, 10.0, 0.0)
+    assert np.allclose(face.start[0], (10, 0))
+    x = np.array([5.0])
+    assert free_grid(face, 2.0, x, x).all()
+    assert free_grid(mirror_region(face), 2.0, x, x).all()

@@ -125,13 +125,6 @@ def test_auto_takes_finer_symbols_on_a_printer_that_makes_them(tmp_path):
         assert bool(found.notes) == (pitch < 5)
 
 
-def test_round_objects_are_embossed_as_flat_ones(tmp_path):
-    can = "name: A\nshape: {cylinder: {diameter: 60 mm, height: 50 mm}}\n"
-    assert choice(tmp_path, can).plans[0].spec.style.pitch_mm == 5.0
-    asked = choice(tmp_path, can + "symbols: {pitch: 6 mm}\n")
-    assert asked.plans[0].spec.style.pitch_mm == 6.0
-
-
 def test_auto_follows_a_profile_that_the_set_names(tmp_path):
     text = "objects:\n- {name: A, shape: {cube: 60}}\n- {name: B, shape: {cube: 60}, profile: %s}\n"
     for profile, rows in (("large", 51), ("one-touch", 63)):
@@ -153,17 +146,6 @@ def test_each_face_is_told_with_the_least_size_that_shows_a_place(tmp_path):
     square = [face for face in short.face_reports if max(face.size_mm) < 59]
     assert square
     assert not any(face.places for face in square)
-
-
-def test_a_round_face_is_told_as_one(tmp_path):
-    text = "name: A\nshape: {cylinder: {diameter: 40 mm, height: 30 mm}}\n"
-    (made,) = dry(tmp_path, text).objects
-    assert made.faces == 3
-    side, top = made.face_reports
-    assert (side.name, side.kind, top.kind) == ("F2", "cylinder", "plane")
-    assert side.size_mm == pytest.approx((125.66, 30.0), abs=0.01)
-    assert side.smallest_mm[1] < 30
-    assert "F1 stays blank" in made.warnings[0]
 
 
 def test_panels_of_a_round_object_are_refused_where_they_are_asked_for(tmp_path):

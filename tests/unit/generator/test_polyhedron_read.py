@@ -61,9 +61,8 @@ def test_unit_of_a_step_file_is_honoured(tmp_path):
     )
 
 
-@pytest.mark.parametrize("name", ["l_bracket.stl", "block_with_bore.step"])
-def test_scale(name):
-    plain, inches = (read_shape(SHAPES_FOLDER / name, scale) for scale in (1.0, 25.4))
+def test_a_scaled_round_face_is_divided_as_finely():
+    plain, inches = (read_shape(SHAPES_FOLDER / "block_with_bore.step", s) for s in (1.0, 25.4))
     assert volume(inches) == pytest.approx(25.4**3 * volume(plain), rel=1e-3)
     assert len(inches.surfaces) == len(plain.surfaces)
     assert all(surface.chord_error_mm <= 0.02 for surface in inches.surfaces)
@@ -206,13 +205,8 @@ def rounded_bar(steps):
     """Return the triangles of a bar of 60 x 40 x 50 mm, one long edge rounded by 10 mm."""
     turn = np.linspace(0, np.pi / 2, steps + 1)
     arc = np.stack([50 + 10 * np.cos(turn), 30 + 10 * np.sin(turn)], axis=1)
-    ring = np.concatenate([[[0, 0], [60, 0]], arc, [[0, 40]]])
-    found = []
-    for p, q in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-        found += [((*p, 0), (*q, 0), (*q, 50)), ((*p, 0), (*q, 50), (*p, 50))]
-    for p, q in itertools.pairwise(ring[1:]):
-        found += [((*ring[0], 50), (*p, 50), (*q, 50)), ((*ring[0], 0), (*q, 0), (*p, 0))]
-    return found
+    ring = [(0, 0), (60, 0), *arc.tolist(), (0, 40)]
+    return prism(ring, 50, [(0, k, k + 1) for k in range(1, len(ring) - 1)])
 
 
 def test_planar_faces_of_a_rounded_mesh_keep_their_symbols(tmp_path):
@@ -229,10 +223,7 @@ def test_planar_faces_of_a_rounded_mesh_keep_their_symbols(tmp_path):
 
 def test_corners_on_other_edges_are_joined(tmp_path):
     """One side of a box has an edge that its neighbours have in two and three pieces."""
-    corners = [(0, 0), (30, 0), (30, 20), (0, 20)]
-    found = []
-    for (a, b), (c, d) in zip(corners, corners[1:] + corners[:1], strict=True):
-        found += [((a, b, 0), (c, d, 0), (c, d, 10)), ((a, b, 0), (c, d, 10), (a, b, 10))]
+    found = prism([(0, 0), (30, 0), (30, 20), (0, 20)], 10, [])
     found += [((0, 0, 10), (10, 0, 10), (0, 20, 10)), ((10, 0, 10), (18, 0, 10), (0, 20, 10)),
               ((18, 0, 10), (30, 0, 10), (0, 20, 10)), ((30, 0, 10), (30, 20, 10), (0, 20, 10)),
               ((15, 0, 0), (0, 0, 0), (0, 20, 0)), ((30, 0, 0), (15, 0, 0), (0, 20, 0)),
@@ -264,12 +255,7 @@ def test_step_that_crashes_the_kernel_is_refused(tmp_path):
     [
         ("a.stl", b"", "a.stl", "empty"),
         ("a.stl", b"\x01" * 60, "a.stl", "neither ASCII nor binary STL: 60 bytes"),
-        (
-            "a.stl",
-            bytes(80) + b"\x04\0\0\0" + bytes(120),
-            "a.stl",
-            "announces 4 triangles, but ends",
-        ),
+        ("a.stl", bytes(80) + b"\x04\0\0\0" + bytes(120), "a.stl", "announces 4 triangles"),
         ("a.stl", bytes(84), "a.stl", "no faces"),
         ("a.stl", binary_stl([[[np.nan] * 3] * 3]), "a.stl", "triangle 1 at byte 84"),
         ("a.stl", binary_stl([[[1e9, 0, 0]] * 3]), "a.stl", "a coordinate is 1e+09 mm"),
@@ -289,13 +275,7 @@ def test_step_that_crashes_the_kernel_is_refused(tmp_path):
         ("a.obj", TETRAHEDRON + "?\n", "a.obj:9", "no word of OBJ"),
         ("a.obj", "v 0 0 0\n", "a.obj", "no faces"),
         ("a.step", "solid\n", "a.step", "it starts with 'solid'"),
-        (
-            "a.step",
-            "ISO-10303-21;\nHEADER;",
-            "a.step",
-            "ends at byte 21 without 'END-ISO-10303-21;'",
-        ),
-        ("a.ply", "ply", "a.ply", "cannot read a shape from a '.ply' file"),
+        ("a.step", "ISO-10303-21;\nHEADER;", "a.step", "ends at byte 21 without 'END-ISO-1"),
         ("a", "x", "a", "no suffix"),
     ],
 )
@@ -307,7 +287,6 @@ def test_bad_files_give_place_cause_and_way_out(tmp_path, name, content, place, 
 
 
 def test_missing_and_large_files(tmp_path, monkeypatch):
-    assert refused(tmp_path / "none.stl").cause == "no such file or directory"
     (tmp_path / "folder.stl").mkdir()
     assert "directory" in refused(tmp_path / "folder.stl").cause
     monkeypatch.setattr("generator.polyhedron.read.LARGEST_BYTES", 100)

@@ -1,4 +1,4 @@
-"""Outlines: exact widths, planar sides, refusals with a way out that works."""
+"""Symbols: their ends and vertices (thesis figures 6.4, 6.12), outlines, and what is refused."""
 
 import math
 import re
@@ -10,20 +10,100 @@ import pytest
 
 from generator.alphabet import (
     ALPHABETS,
+    Counts,
     Glyph,
     SymbolStyle,
+    alphabet_from,
     alphabet_named,
     check_printable,
+    counts,
     footprint_half_mm,
     outline,
     outlines,
 )
+from generator.alphabet.figures import FIGURES, figures_of, in_figures
 from generator.alphabet.known import line
 from generator.alphabet.outline import engrave
 from generator.alphabet.printable import gap_between_mm, gap_inside_mm
+from generator.alphabet.strokes import same_shape
 from generator.errors import AlphabetError
 from generator.plane.polygon import edges_cross, points_inside, signed_area
 from generator.printers import PRINTERS
+from generator.solid.marks import MARK_DEPTH, MARK_SIZES
+
+BAR = [[[-1, 0], [1, 0]]]
+L, E, F, C = (2, 1), (3, 3), (3, 2), (2, 2)
+
+
+def glyphs(*strokes):
+    """Return what a definition says of glyphs a, b and so on."""
+    named = zip("ab", strokes, strict=False)
+    return {"glyphs": [{"name": name, "strokes": lines} for name, lines in named]}
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [("thesis-2", [L, F]), ("dense-4", [L, E, F, C]), ("letters-4", [L, E, F, C])],
+)
+def test_ends_and_vertices_are_the_thesis_ones(name, wanted):
+    found = [counts(glyph) for glyph in alphabet_named(name).glyphs]
+    assert [(c.ends, c.vertices) for c in found] == wanted
+    assert all(c.pieces == 1 and c.loops == 0 for c in found)
+
+
+@pytest.mark.parametrize(
+    ("strokes", "wanted"),
+    [
+        (line((-1, 0), (0, 0), (1, 0)), Counts(2, 0, 0, 1)),  # straight on: no vertex
+        (line((-1, 0), (1, 0)) + line((0, 0), (0, 1)), Counts(3, 1, 0, 1)),  # T on an interior
+        (line((-1, -1), (1, 1)) + line((-1, 1), (1, -1)), Counts(4, 1, 0, 1)),  # X
+        (line((-1, 0), (0, 1)) + line((-1, 1), (0, 0)), Counts(4, 1, 0, 1)),  # X off the nodes
+        (line((-1, 0), (1, 0)) + line((0, 0), (1, 0)), Counts(2, 0, 0, 1)),  # drawn twice
+        (line((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)), Counts(0, 4, 1, 1)),
+        (line((-1, -1), (0, -1)) + line((-1, 1), (0, 1)), Counts(4, 0, 0, 2)),
+    ],
+)
+def test_counts_split_strokes_where_they_meet(strokes, wanted):
+    assert counts(Glyph("x", strokes)) == wanted
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (glyphs(BAR) | {"glyphs": 2 * glyphs(BAR)["glyphs"]}, "a name of its own"),
+        (glyphs(BAR, [[[-1, 0], [0, 0]], [[0, 0], [0, 1]]]), "looks the same after 180 degrees"),
+        (glyphs([[[-1, 0], [0, 0]], [[0, 0], [0, 1]]], [[[0, 1], [0, 0]], [[0, 0], [1, 0]]]),
+         "turned by"),
+        (glyphs([[[-2, 0], [1, 0]]]), "outside"),
+        (glyphs([[[0.5, 0], [1, 0]]]), "not understood"),
+        ({"reach": "wide"}, "not understood"),
+        ({"reach": 0.7}, "reach 0.7"),
+    ],
+)  # fmt: skip
+def test_bad_definitions_say_why(change, words):
+    with pytest.raises(AlphabetError, match=words):
+        alphabet_from(alphabet_named("thesis-2").definition() | change)
+
+
+def test_figures_are_single_pieces_and_all_different():
+    assert all(counts(figure).pieces == 1 for figure in FIGURES)
+    digits = [figure for figure in FIGURES if figure.name in "0123456789F-"]
+    assert not any(same_shape(a, b) for i, a in enumerate(digits) for b in digits[:i])
+    assert len({frozenset(map(frozenset, figure.strokes)) for figure in FIGURES}) == len(FIGURES)
+
+
+def test_names_are_written_in_capitals_or_not_at_all():
+    every = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.+()"
+    assert in_figures(every.lower()) == every == "".join(FIGURES[k].name for k in figures_of(every))
+    assert [in_figures(text) for text in ("Bügel 1", "a:b", "\u7acb")] == ["BUGEL 1", None, None]
+
+
+@pytest.mark.parametrize("stroke", [0.4, 0.8, 1.6])
+def test_every_figure_is_engraved_in_the_smallest_size(stroke):
+    depth = MARK_DEPTH * stroke
+    for figure in FIGURES:
+        assert engrave(figure, min(MARK_SIZES) * stroke, stroke, depth).z_mm == (0.0, -depth)
+
 
 FDM = PRINTERS["fdm-0.4"]
 DENSE = alphabet_named("dense-4")
@@ -105,18 +185,15 @@ def test_profiles_can_be_printed(alphabet, style, printer):
 @pytest.mark.parametrize(
     ("style", "words"),
     [
-        (SymbolStyle(stroke_mm=0.5), "prints no stroke under 0.8 mm"),
         (SymbolStyle(height_mm=0.2), "cannot be felt"),
         (SymbolStyle(pitch_mm=3.9, stroke_mm=0.8, height_mm=0.5), "two strokes of symbol '1'"),
         (SymbolStyle(pitch_mm=7.0, stroke_mm=3.0), "touch at a pitch of 7 mm"),
         (SymbolStyle(draft_rad=math.radians(14)), "collapse"),
-        (SymbolStyle(pitch_mm=8.0, stroke_mm=1.4), "collapse"),
         (SymbolStyle(pitch_mm=8.0, stroke_mm=2.0, chamfer_mm=0.9), "chamfer"),
         (SymbolStyle(chamfer_mm=1.0), "a chamfer of 1 mm leaves"),
         (SymbolStyle(chamfer_mm=1e-9), "chamfer 1e-09 mm"),
         (SymbolStyle(draft_rad=-0.1), "draft -5.7"),
         (SymbolStyle(stroke_mm=math.nan), "stroke nan"),
-        (SymbolStyle(height_mm=0.0), "cannot be felt"),
     ],
 )
 def test_what_cannot_be_printed_is_refused(style, words):

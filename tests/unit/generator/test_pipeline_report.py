@@ -1,0 +1,226 @@
+"""What is said of an object: rates of its faces, what would help, its size, how to build it."""
+
+from __future__ import annotations
+
+import json
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from generator.command import run
+from generator.command.made_report import next_step, print_made, rate_lines
+from generator.errors import PrintError
+from generator.layout.placement import Layout
+from generator.layout.recognition_rate import LOW, RecognitionRate
+from generator.pipeline import Encoded, MadeObject, encode
+from generator.pipeline.faces import FaceReport, face_reports
+from generator.pipeline.files import outer_size_mm, parts_of
+from generator.pipeline.place import NO_CELLS, lay_out_object
+from generator.pipeline.plan import plan_object
+from generator.polyhedron import SHAPES
+from generator.polyhedron.assembly import assembly_order, distinct_faces
+from generator.polyhedron.frame import face_area, face_frame
+from generator.printed.slicer import PlateCost, read_cost
+from generator.spec.read import read_specs, tree_from
+
+BRACKET = """\
+{polyhedron: {
+    vertices: [[0, 0, 0], [70, 0, 0], [70, 0, 12], [12, 0, 12], [12, 0, 60], [0, 0, 60],
+               [0, 12, 0], [70, 12, 0], [70, 12, 12], [12, 12, 12], [12, 12, 60], [0, 12, 60]],
+    faces: [[0, 1, 2, 3, 4, 5], [6, 11, 10, 9, 8, 7], [0, 6, 7, 1], [1, 7, 8, 2],
+            [2, 8, 9, 3], [3, 9, 10, 4], [4, 10, 11, 5], [5, 11, 6, 0]]}}"""
+
+
+def laid_out(folder, shape, settings="profile: one-touch"):
+    """Return the plan of an object, and its layout on an empty array."""
+    (folder / "a.yaml").write_text(f"name: A\nshape: {shape}\n{settings}\n")
+    plan = plan_object(*read_specs([folder / "a.yaml"]))
+    return plan, lay_out_object(plan, NO_CELLS)
+
+
+def test_a_bracket_of_narrow_legs_is_not_readable_and_says_so(tmp_path):
+    faces = face_reports(*laid_out(tmp_path, BRACKET))
+    by_name = {face.name: face for face in faces}
+    assert by_name["F3"].place == "the 12 x 70 mm face at z = 0"
+    assert by_name["F6"].place == "the 12 x 48 mm face at x = 12"
+    for name in ("F1", "F3", "F5", "F6", "F8"):
+        assert by_name[name].promise.one_row
+        assert by_name[name].promise.at_once < 0.25
+    assert by_name["F4"].symbols == 0
+    assert by_name["F4"].promise.at_once == 0.0
+    text = "\n".join(rate_lines(faces))
+    assert (
+        "F4, the 12 x 12 mm face at x = 70 (and F7, as narrow): not readable: it is blank" in text
+    )
+    assert "not readable by single touches: one row of symbols" in text
+    assert "% of touches are answered at once" in text.splitlines()[0]
+
+
+def test_what_would_help_does_help(tmp_path):
+    narrow = face_reports(*laid_out(tmp_path, "{box: [80 mm, 40 mm, 14 mm]}"))
+    (face, *_) = [f for f in narrow if sorted(f.size_mm) == pytest.approx([14, 80])]
+    assert face.promise.at_once < LOW
+    width = float(face.promise.remedy.split(" mm wide instead of 14")[0])
+    wide = face_reports(*laid_out(tmp_path, f"{{box: [80 mm, 40 mm, {width} mm]}}"))
+    (again, *_) = [f for f in wide if sorted(f.size_mm) == pytest.approx([width, 80])]
+    assert again.promise.at_once > LOW - 0.03
+    assert again.promise.remedy == ""
+
+
+def test_a_large_cube_promises_more_than_a_small_one_and_names_no_face(tmp_path):
+    shares = []
+    for side in (20, 60, 200):
+        faces = face_reports(*laid_out(tmp_path, f"{{cube: {side} mm}}", "profile: auto"))
+        shares.append(faces[0].promise.at_once)
+        if side > 20:
+            (line,) = rate_lines(faces)
+            assert line.startswith(f"  {shares[-1]:.0%} of touches".replace("%", " %"))
+            assert line.endswith(" of touches are answered at once, over 99 % within three")
+            assert faces[0].promise.within_three > 0.99
+    assert shares[0] < 0.7 < shares[1] < 0.95 < shares[2] < 1
+
+
+def test_a_can_is_as_wide_as_it_is_round(tmp_path):
+    """Not as its facets."""
+    can = "{cylinder: {diameter: 60 mm, height: 80 mm}}"
+    plan, layout = laid_out(tmp_path, can, "symbols: {pitch: 14 mm}")
+    assert np.ptp(plan.polyhedron.vertices, axis=0)[0] < 59.99
+    size = outer_size_mm(plan.polyhedron, parts_of(plan, layout)[0])
+    assert size == pytest.approx([60, 60, 80], abs=1e-9)
+
+
+SHAPES_MADE = {
+    "Bar": {"shape": {"box": [60, 30, 12]}, "symbols": {"pitch": "7 mm"}},
+    "Can": {"shape": {"cylinder": {"diameter": 40, "height": 30}}},
+    "Old": {"shape": {"cube": 90}, "profile": "thesis"},
+}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Return the folder, and what was reported of each object."""
+    folder = tmp_path_factory.mktemp("rates")
+    return folder, {
+        name: encode(read_specs([tree_from(settings | {"name": name})]), folder=folder, formats=(),
+                     database=f"{folder}/{name}.db")
+        for name, settings in SHAPES_MADE.items()
+    }  # fmt: skip
+
+
+def shown(folder, name, capsys, *options):
+    """Return both shares of each face that has some, as `show` prints them."""
+    assert run(["show", name, "--database", f"{folder}/{name}.db", "--json", *options]) == 0
+    faces = json.loads(capsys.readouterr().out)["faces"]
+    return {one["name"]: one["promise"] for one in faces if one["promise"] is not None}
+
+
+@pytest.mark.parametrize("name", SHAPES_MADE)
+def test_the_database_gives_the_rates_that_were_reported(made, name, capsys):
+    folder, reports = made
+    reported = {
+        face.name: {"at_once": face.promise.at_once, "within_three": face.promise.within_three}
+        for face in reports[name].objects[0].face_reports
+        if face.promise is not None and face.promise.at_once
+    }
+    assert shown(folder, name, capsys) == reported
+    assert bool(reported) == (name != "Old")
+
+
+def test_another_sensor_has_the_rates_it_would_have_had_when_made(made, tmp_path, capsys):
+    folder, _ = made
+    spec = read_specs([tree_from(SHAPES_MADE["Bar"] | {"name": "Bar"})], sensor_type="mat-32x32")
+    report = encode(spec, folder=tmp_path, formats=(), database=f"{tmp_path}/lab.db")
+    reported = [face.promise.at_once for face in report.objects[0].face_reports if face.symbols]
+    found = shown(folder, "Bar", capsys, "--sensor-type", "mat-32x32")
+    assert sorted(one["at_once"] for one in found.values()) == sorted(reported)
+    usual = {one["at_once"] for one in shown(folder, "Bar", capsys).values()}
+    assert usual.isdisjoint(one["at_once"] for one in found.values())
+    # it sees too few symbols at once
+    assert shown(folder, "Bar", capsys, "--sensor-type", "gel-24x32") == {}
+
+
+def test_what_is_alike_shares_a_line_and_what_differs_does_not(capsys):
+    def face(number, width):
+        size, promise = (width, 50.0), RecognitionRate(0.7, 0.99)
+        return FaceReport(
+            f"F{number}", "", "plane", size, width * 50.0, 63, 40, promise, (16.0, 20.0)
+        )
+
+    faces = tuple(face(k, 40.0 if k in (1, 4) else 60.0) for k in range(1, 13))
+    layout = Layout("faces", 7.0, ())
+    made = [
+        MadeObject(name, 12, symbols, 200, 12, (), (), False, layout, face_reports=faces)
+        for name, symbols in (("Block-1", 384), ("Block-2", 380))
+    ]
+    encoded = Encoded(tuple(made), "sqlite:///lab.db", 51, 1285, 5000, 1.0)
+    print_made(encoded, dry_run=False, as_json=False)
+    text = capsys.readouterr().out
+    assert "Block-1: made; 12 faces, 384 symbols" in text
+    assert "Block-2: made; 12 faces, 380 symbols" in text
+    assert (
+        "  F1, F4:           40 x 50 mm, 63 symbols, 70% answered at once, 99% within three, "
+        "it could be as small as 16 x 20 mm" in text
+    )
+    assert "  F2 and 9 like it: 60 x 50 mm" in text
+
+
+@pytest.mark.parametrize("kind", ["cube", "dodecahedron", "tetrahedron"])
+def test_every_panel_meets_one_that_is_there(kind):
+    solid = SHAPES[kind](60.0)
+    steps = assembly_order(solid)
+    assert sorted(step.face for step in steps) == list(range(len(solid.faces)))
+    there = {steps[0].face}
+    for step in steps[1:]:
+        for number in step.edges:
+            edge = solid.edges[number]
+            assert {edge.left, edge.right} - {step.face} <= there
+        assert step.edges
+        there.add(step.face)
+    assert sum(len(step.edges) for step in steps) == len(solid.edges)
+
+
+def test_the_largest_face_lies_down_and_three_directions_are_touched():
+    solid = SHAPES["box"]((80.0, 60.0, 20.0))
+    assert face_area(solid, assembly_order(solid)[0].face) == pytest.approx(4800.0)
+    chosen = distinct_faces(solid, list(range(6)))
+    normals = np.array([face_frame(solid, face)[:3, 2] for face in chosen])
+    assert np.abs(normals @ normals.T).sum() == pytest.approx(3.0)  # a corner of the box
+    assert distinct_faces(solid, [2]) == (2,)
+
+
+def test_what_a_slicer_reckons():
+    text = "; total filament used [g] = 22.41\n"
+    text += "; estimated printing time (normal mode) = 1d 2h 36m 45s\n"
+    assert read_cost(text) == PlateCost(1597, 22.41)
+    assert str(PlateCost(157, 22.41)) == "2 h 37 min, 22 g"
+    with pytest.raises(PrintError, match="no time"):
+        read_cost("; nothing\n")
+
+
+def test_the_build_sheet_and_the_last_line_say_how_parts_lie(tmp_path):
+    block = {"name": "Block", "shape": {"box": [40, 30, 30]}}
+    whole = {"name": "Whole", "shape": {"cube": 40}, "print": {"parts": "whole"}}
+    specs = read_specs([tree_from({"name": "Course", "objects": [block, whole]})])
+    url = f"sqlite:///{tmp_path}/l.db"
+    made = encode(specs, folder=tmp_path / "out", database=url, formats=("3mf",), jobs=1)
+    page = next(f for f in made.files if f.name == "Block-build.html").read_text()
+    marks = re.findall(r'<b class="mark">(.*?)</b>', page)
+    code = re.search(r"short code</th><td>(\w+)", page)[1]
+    assert all(mark.split()[0].startswith(("BLOCK", code)) for mark in marks)
+    assert [mark[-1] for mark in marks] == list("123456")
+    assert re.findall(r"(?:src|href)=\"(?!#)([^\"]*)", page) == []  # no network
+    for drawing in re.findall(r"<svg.*?</svg>", page):
+        ET.fromstring(drawing)
+    lying = made.objects[1].lying
+    assert re.fullmatch(
+        r"F1 down, supports needed under F1 \(\d+ symbols hang over\), \d+ symbols stand out "
+        r"sideways; with  parts: panels  nothing hangs over",
+        lying,
+    )
+    assert made.objects[0].lying is None
+    line = next_step(made)
+    assert "print Course-plate-1" in line
+    assert "Course-build.html" in line
+    assert "Whole: F1 down, supports needed under F1 (" in line
