@@ -112,16 +112,6 @@ def test_the_surface_bears_the_registered_symbols_where_the_database_says(made):
     assert told.symbols == sum(len(one.labels) for one in known.layout.faces)
 
 
-def test_a_round_face_is_one_node_and_one_face(made):
-    folder, told, known = made
-    assert told.faces == 3
-    names = re.findall(rb'"name":"(F[^"]*)"', (folder / "Round.glb").read_bytes()[:20000])
-    assert sorted(set(names)) == [b"F1", b"F2", b"F3"]
-    carriers = {face.face for face in known.layout.faces if len(face.labels)}
-    assert known.spec["surfaces"][0]["facets"][0] in carriers
-    assert {known.polyhedron.faces[number].name for number in carriers} <= {"F2", "F3"}
-
-
 def test_the_slicer_repairs_nothing_and_prints_the_symbols(made, tmp_path):
     folder, _, known = made
     slicer = shutil.which("prusa-slicer")

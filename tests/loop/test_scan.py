@@ -100,8 +100,6 @@ def check(entries, truth, name, face):
     ("profile", "face", "seed", "most", "poses"),
     [
         ("thesis", "F4", 3, 10, True),
-        ("thesis", "F5", 1012, 13, False),
-        ("product", "F2", 2, 10, True),
         ("product", "F1", 1005, 10, False),
     ],
 )
@@ -163,38 +161,3 @@ def test_the_first_touch_of_a_product_scan_is_not_answered_a_pitch_beside(labs, 
     code, entries, _ = asked(touched, "--database", url)
     assert (code, entries[0]["object"], entries[0]["reason"]) == (1, None, "ambiguous")
     assert entries[0]["margin"] < 5
-
-
-def test_what_is_no_scan_is_refused_and_what_needs_one_is_told(labs, asked, tmp_path):
-    folder = labs["thesis"]
-    url = f"sqlite:///{folder / 'lab.db'}"
-    touched = tmp_path / "one.h5"
-    record_scan(touched, url, "Cube thesis", "F2", seed=3, most=1)
-    code, entries, said = asked(touched, "--database", url)
-    assert code == 1
-    assert entries[0]["object"] is None
-    assert "a scan of about 8 overlapping touches: recognize-object --scan" in said
-    code, refused, _ = asked(touched, "--database", url, "--scan")
-    assert code == 2
-    assert refused["error"]["kind"] == "ScanError"
-    assert "about 8 touches" in refused["error"]["cause"]
-    code, refused, _ = asked(touched, "--database", url, "--scan", "--joints", "0,-30,60,0,0")
-    assert code == 2
-    assert "a line for each touch" in refused["error"]["cause"]
-    several = tmp_path / "several.h5"
-    record_scan(several, url, "Cube thesis", "F2", seed=3, most=2, poses=False)
-    code, entries, _ = asked(several, "--database", url, "--method", "thesis")
-    assert (code, len(entries)) == (1, 2)
-    (tmp_path / "joints.txt").write_text("0, -30, sixty, 0, 0\n")
-    code, refused, _ = asked(several, "--database", url, "--scan",
-                             "--joints", tmp_path / "joints.txt")  # fmt: skip
-    assert refused["error"]["place"].endswith("joints.txt:1")
-
-
-def test_making_says_how_many_touches_an_answer_takes(capsys, tmp_path):
-    words = ("-o", tmp_path / "out", "--database", tmp_path / "lab.db", "--dry-run")
-    capsys.readouterr()
-    assert encode_object([str(word) for word in (SPECS / "thesis-cube.yaml", *words)]) == 0
-    assert "read by a scan: about 8 touches" in capsys.readouterr().out
-    assert encode_object([str(w) for w in (SPECS / "thesis-cube.yaml", *words, "--json")]) == 0
-    assert json.loads(capsys.readouterr().out)["objects"][0]["touches"] == 8

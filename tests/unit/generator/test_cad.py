@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
@@ -82,11 +79,6 @@ def test_what_is_no_single_solid_is_refused_and_leaves_nothing(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_nothing_heavy_is_loaded_before_it_is_used():
-    code = "import sys, generator; sys.exit('OCP' in sys.modules or 'numpy' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
 def test_symbols_keep_out_of_a_slot_that_is_too_narrow_for_them(tmp_path):
     lid = BRepPrimAPI_MakeBox(gp_Pnt(20, 0, 41.5), 60, 60, 20).Solid()
     post = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), 20, 60, 61.5).Solid()
@@ -128,18 +120,3 @@ def test_a_spec_is_a_file_its_text_or_its_settings(tmp_path):
         encode(text, layout="net", **given)
     with pytest.raises(SpecError, match=r"encode\(\):1:1: error: unknown setting 'nam'"):
         encode({"nam": "Cube", "shape": {"cube": "30 mm"}}, **given)
-
-
-def test_a_mesh_is_encoded_as_its_file_is_and_loads_no_kernel(tmp_path):
-    script = """
-import sys, trimesh
-from generator import encode
-mesh = trimesh.creation.box((30, 35, 40))
-mesh.export("box.stl")
-solid = encode(mesh, name="Mesh", database="lab.db", folder="mesh", formats=["stl"])
-model = encode("box.stl", name="File", database="lab.db", folder="file", formats=["stl"])
-assert solid.faces == model.faces == 6 and solid.symbols == model.symbols > 50, model
-assert solid.folder.name == "mesh", solid.folder
-assert not [name for name in sys.modules if name.startswith(("OCP", "build123d", "cadquery"))]
-"""
-    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True)

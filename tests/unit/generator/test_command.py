@@ -1,66 +1,58 @@
-"""The command `encode-object` as people run it: help, routes, exit codes, JSON, interruption."""
+"""The command `encode-object` as people run it: interruption, what is registered, the lab's key."""
 
+import json
 import os
 import select
+import shutil
 import signal
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+from generator.array import profile
+from generator.array.lab_key import lab_key_of
 from generator.command import run
+from generator.database.exchange import import_objects
+from generator.database.lab import lab_arrays, lab_key
+from generator.database.open import open_database
+from generator.database.read import read_object
+from generator.database.transaction import read_transaction
 
-FIXTURES = Path(__file__).parents[3] / "fixtures"
-HEAVY = ("numpy", "sqlalchemy", "yaml", "manifold3d", "PIL", "scipy", "shapely", "trimesh", "OCP",
-         "pymeshlab", "matplotlib", "build123d", "cadquery", "generator.spec", "generator.array",
-         "generator.pipeline")  # fmt: skip
+KEY, OTHER = "0123-4567-89AB-CDER", "F1XT-VRES-0000-000Q"
+V2 = Path(__file__).parents[3] / "fixtures" / "database" / "v2.db"
 ENTRY = "import sys; from generator.command import main; main()"
 
 
 @pytest.fixture(autouse=True)
 def _in_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setenv("COLUMNS", "160")
 
 
-def write(text, name="c.yaml"):
-    Path(name).write_text(text)
-    return name
-
-
-@pytest.mark.parametrize("arguments", [["--help"], ["init", "--help"], ["list", "--help"]])
-def test_help_loads_nothing_heavy(arguments):
-    program = (
-        "import sys\nfrom generator.command import main\n"
-        f"try: main({arguments!r})\n"
-        "except SystemExit as left: code = left.code\n"
-        f"print([name for name in {HEAVY!r} if name in sys.modules], code)\n"
+def make(name="Cube", database="lab.db", *options, more="", top="", code=0):
+    Path("spec.yaml").write_text(
+        f"name: {name}\nshape: {{cube: 30 mm}}\noutput: {{formats: stl{more}}}\n{top}"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.stderr == ""
-    assert done.stdout.splitlines()[-1] == "[] 0"
+    assert run(["spec.yaml", "--database", database, "-o", f"{database}-{name}", *options]) == code
 
 
-def test_a_scene_loads_what_it_needs():
-    unused = ("scipy", "matplotlib", "pandas", "OCP", "trimesh", "multiprocessing.pool",
-              "generator.polyhedron.read", "generator.export.check",
-              "generator.export.robot.model", "generator.printed",
-              "generator.pipeline.sets")  # fmt: skip
-    program = (
-        "import sys\nfrom generator.command import run\n"
-        f"code = run([{str(FIXTURES / 'cube.yaml')!r}, '-o', 'made', '--database', 'd.db'])\n"
-        f"print([name for name in {unused!r} if name in sys.modules], code)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.stdout.splitlines()[-1] == "[] 0", done.stderr
+def said(capsys, *arguments, code=0):
+    capsys.readouterr()
+    assert run([*arguments, "--json"]) == code
+    return json.loads(capsys.readouterr().out)
 
 
-def test_problem_of_the_shape_points_at_its_line(capsys):
-    text = (FIXTURES / "specs/full.yaml").read_text().replace("[0, 4, 5, 3]", "[0, 3, 5, 4]")
-    assert run(["--dry-run", write(text)]) == 2
-    first = capsys.readouterr().err.splitlines()[0]
-    assert first.startswith("c.yaml:5:1: error: ")
+def held(database, name="Cube"):
+    with read_transaction(open_database(database, writable=False)) as connection:
+        return read_object(connection, name)
+
+
+def files(database, name="Cube"):
+    folder = Path(f"{database}-{name}")
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 def test_interruption_has_exit_code_130():
@@ -90,3 +82,175 @@ def test_output_into_a_closed_pipe_is_no_traceback():
     process.stderr.close()
     assert process.wait(timeout=30) == 1
     assert messages == b""
+
+
+@pytest.fixture
+def cube():
+    """A cube that is registered in lab.db, with its files."""
+    make()
+
+
+def test_show_tells_missing_and_changed_files(cube, capsys):
+    first, second, third, *_ = sorted(Path("lab.db-Cube").glob("*.stl"))
+    first.unlink()
+    second.write_bytes(second.read_bytes() + b"x")
+    third.unlink()
+    third.mkdir()
+    value = said(capsys, "show", "Cube")
+    states = {Path(file["file"]).name: file["state"] for file in value["files"]}
+    assert states[first.name] == "missing"
+    assert states[second.name] == "changed"
+    assert states[third.name] == "unreadable"
+    assert list(states.values()).count("ok") == 3
+    assert run(["show", "Cube"]) == 0
+    assert "make them again" in capsys.readouterr().out
+    third.rmdir()
+    make()
+    assert {file["state"] for file in said(capsys, "show", "Cube")["files"]} == {"ok"}
+
+
+@pytest.mark.parametrize(("answer", "left"), [("n", 1), ("y", 0)])
+def test_a_person_is_asked_before_cells_are_freed(cube, answer, left, capsys):
+    ours, theirs = os.openpty()
+    os.write(ours, answer.encode() + b"\n")
+    done = subprocess.run(
+        [sys.executable, "-c", ENTRY, "retire", "Cube", "--free"],
+        stdin=theirs, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    os.close(ours)
+    os.close(theirs)
+    assert "will be taken for other objects" in done.stderr
+    assert done.returncode == left
+    assert len(said(capsys, "list")["objects"]) == left
+
+
+def test_all_named_objects_are_retired_or_none(cube, capsys):
+    assert run(["retire", "Cube", "Ball"]) == 4
+    assert "no object is called 'Ball'" in capsys.readouterr().err
+    assert said(capsys, "list")["objects"][0]["retired_utc"] is None
+
+
+def test_passwords_are_not_shown(cube, capsys, database_on):
+    with database_on("postgresql") as url:
+        url = url.replace("postgres@", "postgres:secret@", 1)  # the server asks for none
+        assert run(["export", "x.db"]) == 0
+        for command in (["import", "x.db"], ["list"], ["show", "Cube"], ["retire", "Cube"]):
+            assert run([*command, "--database", url]) == 0
+            assert run([*command, "--database", url, "--json"]) == 0
+        assert run(["import", url, "--database", url]) == 4
+        text, messages = capsys.readouterr()
+        assert "postgres:***@" in text
+        assert "secret" not in text + messages
+
+
+def test_a_new_lab_draws_a_key_and_keeps_it(capsys, monkeypatch):
+    drawn = iter([b"first" * 4, b"other" * 4])
+    monkeypatch.setattr("generator.array.lab_key.token_bytes", lambda _: next(drawn))
+    make("Cube", "a.db")
+    make("Second", "a.db")
+    make("Cube", "b.db")
+    a, b = said(capsys, "lab", "--database", "a.db"), said(capsys, "lab", "--database", "b.db")
+    assert a["lab_key"] == lab_key_of(b"first" * 4)
+    assert b["lab_key"] == lab_key_of(b"other" * 4)
+    assert held("a.db").array == held("a.db", "Second").array
+    assert held("a.db").array.lab_key == a["lab_key"]
+    own = profile("large").array_of_lab(a["lab_key"])
+    assert held("a.db").array.definition == own.definition()
+    assert held("a.db").layout.faces[0].placement.row == own.first[0]
+    assert files("a.db")["Cube-F1.stl"] != files("b.db")["Cube-F1.stl"]
+
+
+def test_the_same_key_gives_the_same_bytes(capsys):
+    make("Cube", "a.db", "--lab-key", KEY)
+    make("Cube", "b.db", more=f", lab_key: {KEY.lower()}")
+    make("Cube", "c.db", "--lab-key", KEY, more=f", lab_key: {OTHER}")  # the option counts
+    assert files("a.db") == files("b.db") == files("c.db")
+    make("Cube", "a.db", "--lab-key", KEY)  # again: the same key is no conflict
+    assert "registered before" in capsys.readouterr().out
+
+
+def test_another_key_than_the_databases_is_one_message(capsys):
+    make("Cube", "a.db", "--lab-key", KEY)
+    before = Path("a.db").read_bytes()
+    for options, more in ((("--lab-key", OTHER), ""), ((), f", lab_key: {OTHER}")):
+        capsys.readouterr()
+        make("Second", "a.db", *options, more=more, code=2)
+        text = capsys.readouterr().err
+        assert f"{OTHER} was given, but the database has the lab key {KEY}" in " ".join(
+            text.split()
+        )
+        assert text.count("error:") == 1
+    assert "spec.yaml:3:" in text
+    assert Path("a.db").read_bytes() == before
+    assert not Path("a.db-Second").exists()
+
+
+def test_objects_of_one_run_agree_on_a_key(capsys):
+    for name, key in (("A", KEY), ("B", OTHER)):
+        Path(f"{name}.yaml").write_text(
+            f"name: {name}\nshape: {{cube: 30}}\noutput: {{lab_key: {key}}}\n"
+        )
+    assert run(["A.yaml", "B.yaml"]) == 2
+    assert f"another lab key ({OTHER}) than 'A' ({KEY})" in " ".join(
+        capsys.readouterr().err.split()
+    )
+
+
+def test_a_lab_from_before_there_were_keys_goes_on_as_it_was(capsys):
+    shutil.copy(V2, "old.db")
+    before = held("old.db")
+    assert said(capsys, "lab", "--database", "old.db")["lab_key"] is None
+    make("Second", "old.db")
+    brick = held("old.db", "Brick").array  # profile large was 255x257 then
+    assert held("old.db", "Second").array == brick
+    assert (brick.rows, brick.lab_key) == (255, "")
+    make("Same", "old.db", top="profile: one-touch\n")
+    assert held("old.db", "Same").array == before.array
+    assert before.array.definition == profile("one-touch").array().definition()
+    make("Third", "old.db", "--lab-key", KEY, code=2)
+    assert "before there were lab keys" in capsys.readouterr().err
+    assert run(["lab", "--database", "old.db"]) == 0
+    assert "no lab key" in capsys.readouterr().out
+
+
+def test_published_arrays_are_the_same_in_every_lab():
+    text = "name: T\nshape: {cube: 120 mm}\nprofile: thesis\noutput: {formats: stl}\n"
+    Path("t.yaml").write_text(text)
+    for database, key in (("a.db", KEY), ("b.db", OTHER)):
+        assert run(["t.yaml", "--database", database, "--lab-key", key, "-o", f"{database}-T"]) == 0
+        assert held(database, "T").array.lab_key == ""
+    assert files("a.db", "T") == files("b.db", "T")
+
+
+def test_another_program_may_make_the_database_meanwhile(monkeypatch):
+    """What was planned on a key of our own is planned anew on the one that is there."""
+
+    def slower(url, **options):
+        open_database(url, lab_key=OTHER)
+        return open_database(url, **options)
+
+    module = import_module("generator.pipeline.encode")
+    monkeypatch.setattr(module, "open_database", slower)
+    make("Cube", "a.db")
+    with read_transaction(open_database("a.db")) as connection:
+        assert lab_key(connection) == OTHER
+        assert lab_arrays(connection).made["large"].lab_key == OTHER
+    assert held("a.db").array.lab_key == OTHER
+
+
+def test_labs_that_were_made_apart_merge():
+    keys = [lab_key_of(bytes([k] * 16)) for k in range(4)]
+    for k, key in enumerate(keys):
+        make(f"Cube {k}", f"{k}.db", "--lab-key", key)
+    for k in range(1, 4):
+        done = import_objects("0.db", f"{k}.db")
+        assert (done.copied, done.refused) == ((f"Cube {k}",), ())
+    arrays = [held("0.db", f"Cube {k}").array for k in range(4)]
+    assert [array.lab_key for array in arrays] == keys
+    assert len({array.array_id for array in arrays}) == 4
+    make("New", "0.db")
+    assert held("0.db", "New").array == arrays[0]  # on the lab's own
+    # an imported object, asked for again, keeps its cells and its bytes
+    make("Cube 2", "0.db")
+    assert held("0.db", "Cube 2").array == arrays[2]
+    assert files("0.db", "Cube 2") == files("2.db", "Cube 2")

@@ -1,8 +1,6 @@
 """The tables: what the database refuses without our help, taken cells as bits, prints."""
 
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from dataclasses import replace
 
@@ -99,17 +97,6 @@ def test_an_object_goes_as_a_whole_and_its_parts_do_not_go_alone(engine):
         connection.execute(text("DELETE FROM objects"))
         for table in (tables.vertices, tables.faces, tables.placements, tables.cells):
             assert connection.execute(select(table)).all() == []
-
-
-def test_reading_imports_nothing_heavy():
-    """The object-relational half of SQLAlchemy, the kernel and their like stay out."""
-    heavy = "sqlalchemy.orm scipy shapely OCP matplotlib trimesh pymeshlab psycopg"
-    script = (
-        "import sys, generator.database.open, generator.database.read, generator.database.register;"
-        f"print([m for m in {heavy.split()} if m in sys.modules])"
-    )
-    out = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert out.stdout.strip() == "[]"
 
 
 def test_the_same_schema_has_the_same_order_on_every_run(tmp_path):

@@ -1,10 +1,12 @@
-"""A lab small enough to be gone through place by place, and what a fit says of its cells."""
+"""Labs that are encoded, and one small enough to be gone through place by place."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from generator.pipeline import encode
+from generator.spec import read_specs
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.symbols.fit import Fit
 
@@ -84,6 +86,17 @@ def fit_of(cells, scores, seen=20.0, **changed):
     return Fit(**(values | changed))
 
 
+def known_face(name, face, **changed):
+    """A registered face of 42 x 42 mm; cell (6, 2) of the array is at its origin."""
+    plain = {
+        "object": name, "face": face, "round": None, "T_object_face": np.eye(4), "printed": None,
+        "polygon_mm": (np.array([(0, 0), (42, 0), (42, 42), (0, 42)], float),),
+        "rows": np.array([6]), "columns": np.array([2]), "rotation_rad": 0.0,
+        "centres_mm": np.array([[3.5, 3.5]]),
+    }  # fmt: skip
+    return SimpleNamespace(**plain | changed)
+
+
 def sure_of(labels, order=4, least=-12.0):
     """Scores of cells that show these labels beyond doubt (`order`: no symbol)."""
     return np.where(np.array(labels)[:, None] == np.arange(order + 1), 0.0, least)
@@ -93,5 +106,21 @@ def sure_of(labels, order=4, least=-12.0):
 def small():
     """What the lab and its fits are built with."""
     return SimpleNamespace(
-        Lab=SmallLab, two_faces=two_faces, fit_of=fit_of, sure_of=sure_of, pitch=PITCH
+        Lab=SmallLab, two_faces=two_faces, fit_of=fit_of, sure_of=sure_of, known_face=known_face
     )
+
+
+@pytest.fixture(scope="session")
+def make_lab(tmp_path_factory):
+    """Encode what YAML specs say; return the folder of `lab.db` and the files."""
+
+    def make(*specs, formats=(), **options):
+        folder = tmp_path_factory.mktemp("lab")
+        for spec in specs:
+            (folder / "spec.yaml").write_text(spec)
+            url = f"sqlite:///{folder / 'lab.db'}"
+            specs_read = read_specs([folder / "spec.yaml"])
+            encode(specs_read, folder=folder / "parts", database=url, formats=formats, **options)
+        return folder
+
+    return make

@@ -1,6 +1,7 @@
-"""How a part came out of the printer: from strains that are known, and what poses make of it."""
+"""How a part came out of the printer: known strains, what poses make of it, stretched touches."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -8,6 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from generator.database.as_built import AsBuilt
+from probe.contact.contract import Touch
+from probe.contact.press import press
+from probe.simulate.registered import registered_surface
 from recognizer.as_built.estimate import (
     ALWAYS,
     BETWEEN,
@@ -15,6 +19,7 @@ from recognizer.as_built.estimate import (
     estimate_print,
     estimate_printer,
 )
+from recognizer.as_built.touches import measure_prints
 from recognizer.as_built.verdict import AS_DESIGNED, CORRECTED, PRINT_AGAIN, judge_print
 from recognizer.errors import AsBuiltError
 from recognizer.touch.as_built import (
@@ -29,6 +34,9 @@ from recognizer.touch.as_built import (
     scales_and_skew,
     usual_print,
 )
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import Reader
+from recognizer.touch.source import TouchImage
 
 NEAR = st.floats(0.94, 1.06)
 TOP = np.eye(3)
@@ -278,3 +286,58 @@ def test_what_nobody_can_be_sure_of_is_not_said():
     assert judge_print(print_with(0.996, 1.0, 0.003, 1.6, unsure), 1.4).words == "as designed"
     strokes = judge_print(print_with(stroke_mm=1.2), 1.4)
     assert strokes.words == "as designed; strokes 0.2 mm too narrow: flow, first layer?"
+
+
+MIDDLE = np.array([20.0, 20.0])
+
+
+@dataclass(frozen=True)
+class Stretched:
+    """A surface that is stretched about the middle of a 40 mm face."""
+
+    surface: object
+    matrix: np.ndarray
+
+    @property
+    def top_mm(self):
+        return self.surface.top_mm
+
+    def heights_mm(self, points):
+        back = (points - MIDDLE) @ np.linalg.inv(self.matrix).T
+        return self.surface.heights_mm(back + MIDDLE)
+
+
+@pytest.fixture(scope="module")
+def reader(make_lab):
+    specs = (f"{{name: {name}, shape: {{cube: 40 mm}}}}" for name in ("Cube", "Other"))
+    return Reader(open_lab(make_lab(*specs, formats=("stl",)) / "lab.db"))
+
+
+def image_felt(reader, matrix, touch, name="Cube", seq=0):
+    scene = registered_surface(reader.lab.url, name, "F1")
+    forces = press(Stretched(scene.surface, matrix), reader.sensor, touch).forces_n
+    return TouchImage(seq, 0, 1, 100 * forces, np.zeros(4), None)
+
+
+@pytest.mark.parametrize(
+    "matrix", [np.diag([0.98, 1.0]), np.diag([1.0, 1.02]), np.array([[1.0, 0.015], [0.0, 1.0]])]
+)
+def test_a_touch_tells_scales_and_skew_of_the_print(reader, matrix):
+    touches = [
+        image_felt(reader, matrix, Touch(18.0, 21.5, turn, 80.0)) for turn in (0.3, 1.9, -2.2, -0.8)
+    ]
+    found = np.mean([one.strain for one in measure_prints(reader, touches)], axis=0)
+    E = (matrix.T @ matrix - np.eye(2)) / 2
+    np.testing.assert_allclose(found, (E[0, 0], E[1, 1], E[0, 1]), atol=0.002)
+
+
+def test_touches_that_tell_no_print_are_named(reader):
+    blank = TouchImage(0, 0, 1, np.zeros((16, 16)), np.zeros(4), None)
+    with pytest.raises(AsBuiltError, match=r"none of 2 touches tells of a print: 2 no contact"):
+        measure_prints(reader, [blank, blank])
+    with pytest.raises(AsBuiltError, match="no touch"):
+        measure_prints(reader, [])
+    at = Touch(18.0, 21.5, math.radians(20), 80.0)
+    both = [image_felt(reader, np.eye(2), at, name) for name in ("Cube", "Other", "Cube")]
+    with pytest.raises(AsBuiltError, match=r"touches of 2 objects: Cube \(2\), Other \(1\)"):
+        measure_prints(reader, both, place="touch.h5")

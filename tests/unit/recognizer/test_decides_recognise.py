@@ -86,15 +86,10 @@ class Found:
 
 @pytest.fixture
 def lab(small):
-    """Two faces of 42 x 42 mm; cell (6, 2) of the array is at the origin of the first."""
+    """Two faces of 42 x 42 mm."""
     made = small.two_faces().embossed
     for number, name in enumerate(("F1", "F2")):
-        made.known[number] = SimpleNamespace(
-            object="Thing", face=name, round=None, T_object_face=T_OBJECT_FACE,
-            polygon_mm=(np.array([(0, 0), (42, 0), (42, 42), (0, 42)], float),),
-            rows=np.array([6]), columns=np.array([2]), rotation_rad=0.0,
-            centres_mm=np.array([[3.5, 3.5]]), printed=None,
-        )  # fmt: skip
+        made.known[number] = small.known_face("Thing", name, T_object_face=T_OBJECT_FACE)
     return made
 
 

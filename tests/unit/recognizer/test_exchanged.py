@@ -6,13 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from encoded_objects.base.sensor_type import SensorType
 from probe.surface.polygon import polygon
-from recognizer.touch import recognise
-from recognizer.touch.options import ReaderOptions
-from recognizer.touch.recognise import has_residual, read_touch
-from recognizer.touch.recognition import refusal
-from recognizer.touch.signal import Signal, swap_halves
+from recognizer.touch.recognise import has_residual
+from recognizer.touch.signal import swap_halves
 from recognizer.touch.verdict import Evidence
 
 PLAIN = Evidence(log_likelihood_ratio=40.0, explained=0.95, inliers=16, contradictions=0)
@@ -69,21 +65,3 @@ def test_halves_are_swapped_along_an_axis_and_back(axis):
     swapped = swap_halves(forces, axis)
     assert (swap_halves(swapped, axis) == forces).all()
     assert swapped[0, 0] == (forces[8, 0] if axis == 0 else forces[0, 8])
-
-
-def test_readings_and_trust_are_swapped_together(monkeypatch):
-    forces = np.arange(256.0).reshape(16, 16)
-    trust = (forces % 7 > 0).astype(float)
-    answer, tried = replace(refusal(0, ""), object="Thing"), []
-    monkeypatch.setattr(recognise, "_search_twice", lambda *_: (answer, [None]))
-    monkeypatch.setattr(recognise, "has_residual", lambda _: True)
-    monkeypatch.setattr(
-        recognise, "verify_hypotheses", lambda touch, _: tried.append(touch.signal) or []
-    )
-    reader = SimpleNamespace(sensor=SensorType(), options=ReaderOptions())
-    signal = Signal(forces, trust, contact=True, newtons=False)
-    assert read_touch(reader, signal).answer is answer  # no other halves are read better
-    assert [one.forces[0, 0] for one in tried] == [forces[8, 0], forces[0, 8]]
-    for axis, one in enumerate(tried):
-        assert (one.trust == (one.forces % 7 > 0)).all()
-        assert (swap_halves(one.forces, axis) == forces).all()

@@ -422,21 +422,6 @@ def test_a_constraint_along_a_ridge_leaves_the_rest_to_belief():
 # --- the canvas -----------------------------------------------------------------------------
 
 
-def test_a_removed_touch_leaves_nothing():
-    canvas = empty_canvas(P)
-    first = CanvasEntry(np.array([5.0, 40.0, 0.2]), SURE, 1.0)
-    second = CanvasEntry(np.array([-9.0, 33.0, -0.7]), SURE, 1.3)
-    one = add_to_canvas(canvas, patch(sampled()), first)
-    both = add_to_canvas(one, patch(sampled((1, 0))), second)
-    back = add_to_canvas(both, patch(sampled((1, 0))), second, -1)
-    assert not canvas.tiles
-    assert back.tiles.keys() == one.tiles.keys()
-    for key, tile in one.tiles.items():
-        assert back.tiles[key] == pytest.approx(tile, rel=1e-9, abs=1e-6)
-    assert not add_to_canvas(back, patch(sampled()), first, -1).tiles
-    assert image_of(canvas).values.shape == (0, 0)
-
-
 def test_the_image_is_the_weighted_mean():
     canvas = empty_canvas(P)
     for k, level in enumerate((1.0, 1.0, 1.3)):

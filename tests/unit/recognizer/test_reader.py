@@ -1,4 +1,4 @@
-"""The reader as a program uses it: counts and recordings in, answers that print out."""
+"""The reader as a program uses it, and its stages: touches in, object, face and pose out."""
 
 import math
 from dataclasses import replace
@@ -7,18 +7,16 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from generator.pipeline import encode
-from generator.spec import read_specs
 from probe.contact.contract import Touch
-from probe.contact.press import press
+from probe.contact.tabs import tabs
 from probe.frame import frame_from
-from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
 from recognizer.errors import TouchError
 from recognizer.touch.lab import open_lab
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import read_touch, recognise
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     BY_CHANCE,
@@ -29,29 +27,124 @@ from recognizer.touch.recognition import (
     RunnerUp,
     refusal,
 )
-
-AT = Touch(20.0, 19.0, math.radians(25), 80.0)
-
-
-@pytest.fixture(scope="module")
-def lab(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("lab")
-    (folder / "cube.yaml").write_text("name: Cube\nshape: {cube: 40 mm}\n")
-    encode(read_specs([folder / "cube.yaml"]), folder=folder / "out",
-           database=f"sqlite:///{folder / 'lab.db'}", formats=("stl",))  # fmt: skip
-    return folder
+from recognizer.touch.signal import signal_of
+from recognizer.touch.symbols.template import psi, template_of
+from recognizer.touch.verdict import is_encoded
+from recognizer.touch.verify import TouchImages, verify_hypotheses
 
 
 @pytest.fixture(scope="module")
-def reader(lab):
-    return Reader(open_lab(lab / "lab.db"))
+def url(make_lab):
+    folder = make_lab(
+        "{name: Cube, shape: {cube: 60 mm}}", "{name: Tetra, shape: {tetrahedron: 80 mm}}"
+    )
+    return f"sqlite:///{folder / 'lab.db'}"
 
 
 @pytest.fixture(scope="module")
-def counts(lab):
-    surface = registered_surface(str(lab / "lab.db"), "Cube", "F1").surface
-    forces = press(surface, SensorType(), AT).forces_n
-    return np.rint(100 * forces)
+def reader(url):
+    return Reader(open_lab(url), SensorType())
+
+
+def felt(url, name, face, touch):
+    return tabs(registered_surface(url, name, face).surface, SensorType(), touch).forces_n
+
+
+@pytest.mark.parametrize(("name", "face"), [("Cube", "F1"), ("Cube", "F6"), ("Tetra", "F2")])
+def test_a_clean_touch_is_placed(url, reader, name, face):
+    touch = Touch(32.0, 24.0, 0.7, 80.0)
+    forces = felt(url, name, face, touch)
+    for newtons in (True, False):
+        image = forces if newtons else 100 * forces
+        found = recognise(reader, signal_of(image, floor=0.0, newtons=newtons), 5)
+        assert (found.object, found.face, found.seq) == (name, face, 5)
+        T = found.T_face_probe
+        assert T[:2, 3] == pytest.approx([32.0, 24.0], abs=0.05)
+        assert math.atan2(T[1, 0], T[0, 0]) == pytest.approx(0.7, abs=0.003)
+        assert found.margin > 20
+        scene = registered_surface(url, name, face)
+        assert found.T_object_probe == pytest.approx(scene.T_object_surface @ T)
+
+
+def test_the_reading_behind_an_answer(url, reader):
+    signal = signal_of(felt(url, "Cube", "F3", Touch(28.0, 33.0, 2.0, 70.0)), newtons=True)
+    reading = read_touch(reader, signal)
+    answer, hypothesis = reading.answer, reading.best
+    assert hypothesis.embossed.face(hypothesis.hypothesis.face).face == answer.face == "F3"
+    speaks = hypothesis.evidence
+    assert is_encoded(speaks)
+    assert speaks.explained > 0.85
+    assert speaks.inliers >= 9
+    assert speaks.contradictions == speaks.strong_contradictions == 0
+    scores = [r.score for r in verify_hypotheses(TouchImages(reader, signal), reader.options.first)]
+    assert scores == sorted(scores, reverse=True)
+
+
+def test_the_index_of_windows_lists_every_window(reader):
+    encoding = reader.lab.arrays[0]
+    order = encoding.array.order
+    for windows in encoding.windows:
+        down, right = windows.shape
+        assert (np.diff(windows.codes) >= 0).all()
+        for code, cell in list(zip(windows.codes, windows.cells, strict=True))[::97]:
+            row, column = divmod(int(encoding.keys[cell]), encoding.array.columns)
+            rows, columns = np.mgrid[row : row + down, column : column + right]
+            held, labels = encoding.at(rows % encoding.array.rows, columns % encoding.array.columns)
+            assert (held == encoding.owners[cell]).all()
+            digits = labels.ravel().astype(int).tolist()
+            assert int("".join(map(str, digits)), order) == code
+            assert cell in windows.at(int(code))
+
+
+def test_a_large_array_is_looked_up_like_a_small_one(reader):
+    encoding = reader.lab.arrays[0]
+    sparse = replace(encoding, dense=None, known={})
+    rng = np.random.default_rng(2)
+    rows = rng.integers(encoding.array.rows, size=500)
+    columns = rng.integers(encoding.array.columns, size=500)
+    for one, other in zip(encoding.at(rows, columns), sparse.at(rows, columns), strict=True):
+        assert (one == other).all()
+
+
+def test_a_print_keeps_the_middle_of_its_symbols(reader):
+    """On a triangle that is 4 mm and more from the middle of its box, whatever its part's frame."""
+    for number in range(len(reader.lab.arrays[0].faces)):
+        face = reader.lab.arrays[0].face(number)
+        about, middle = face.printed.T_part_face, face.centres_mm.mean(axis=0)
+        np.testing.assert_allclose(about @ [*middle, 0.0, 1.0], [0, 0, 0, 1], atol=1e-9)
+        if face.T_part_face is not None:
+            np.testing.assert_array_equal(about[:3, :3], face.T_part_face[:3, :3])
+        outline = face.polygon_mm[0]
+        box = (outline.min(axis=0) + outline.max(axis=0)) / 2
+        assert (np.linalg.norm(box - middle) > 4.0) == (face.object == "Tetra")
+        pose = np.eye(4)
+        pose[:2, 3] = middle
+        tenth = replace(face.printed.as_built, scale_x=0.9, scale_y=0.9)
+        at, _ = replace(face.printed, as_built=tenth).pose(pose, np.eye(3))
+        assert at[:2, 3] == pytest.approx(middle)
+        pose[0, 3] += 10.0
+        at, _ = replace(face.printed, as_built=tenth).pose(pose, np.eye(3))
+        assert at[:2, 3] == pytest.approx(middle + np.array([9.0, 0.0]))
+
+
+@pytest.mark.parametrize("overlay", ["tab", "pad"])
+def test_a_template_is_the_derivative_of_itself(reader, overlay):
+    encoding = reader.lab.arrays[0]
+    template = template_of(encoding.alphabet, encoding.style, SensorType().with_overlay(overlay))
+    at = np.array([[-1.2, 0.4], [0.3, -1.7], [1.6, 1.1]])
+    by = 0.1
+    aside = np.array([by, 0.0])
+    there = template.at(at)
+    ahead, behind = template.at(at + aside), template.at(at - aside)
+    assert (ahead - behind)[..., 0] / (2 * by) == pytest.approx(there[..., 1], abs=0.06)
+    assert template.at(np.array([[90.0, 0.0]])) == pytest.approx(0.0)
+    assert 0.1 < template.ink < 0.7
+    assert float(psi(np.array(1.0))) == pytest.approx(1.0)
+
+
+@pytest.fixture(scope="module")
+def counts(url):
+    return np.rint(100 * felt(url, "Cube", "F1", Touch(20.0, 19.0, math.radians(25), 80.0)))
 
 
 def film(path, images, **named):
@@ -61,31 +154,8 @@ def film(path, images, **named):
     return path
 
 
-def test_counts_give_an_answer_that_prints(reader, counts):
-    answer = reader.read(counts.tolist(), seq=7)
-    assert answer
-    assert (answer.object, answer.face, answer.seq) == ("Cube", "F1", 7)
-    assert math.hypot(answer.x_mm - AT.x_mm, answer.y_mm - AT.y_mm) < 0.15
-    assert answer.theta_deg == pytest.approx(25, abs=0.5)
-    assert 0 < answer.spread_mm < 0.2
-    where = f"Cube/F1 at ({answer.x_mm:.2f}, {answer.y_mm:.2f}) mm +- {answer.spread_mm:.2f}"
-    assert str(answer).startswith(f"{where} turned {answer.theta_deg:.1f} degrees; array (")
-    assert str(answer).endswith("no other place comes near")
-    assert str(replace(answer, margin=62.7)).endswith("; margin 63 nats")
-
-
-def test_a_recording_is_read_touch_by_touch_or_frame_by_frame(reader, lab, counts):
-    rest = np.zeros((16, 16))
-    path = film(lab / "film.h5", [rest] * 3 + [counts] * 30 + [rest] * 3)
-    (answer,) = reader.read_all(path)
-    assert (answer.seq, answer.face) == (3, "F1")
-    every = list(reader.read_all(Recording(path), every=True))
-    assert [one.seq for one in every] == list(range(36))
-    assert [bool(one) for one in every] == [False] * 3 + [True] * 30 + [False] * 3
-
-
-def test_a_recording_says_through_which_overlay_it_was_felt(reader, lab, counts, monkeypatch):
-    path = film(lab / "pad.h5", [counts], sensor="probe/pad")
+def test_a_recording_says_through_which_overlay_it_was_felt(reader, counts, tmp_path, monkeypatch):
+    path = film(tmp_path / "pad.h5", [counts], sensor="probe/pad")
     sensors = []
     monkeypatch.setattr(Reader, "read", lambda self, counts, **_: sensors.append(self.sensor))
     list(reader.read_all(path, every=True))
@@ -95,8 +165,8 @@ def test_a_recording_says_through_which_overlay_it_was_felt(reader, lab, counts,
     assert sensors[1] == own  # a pad of one's own stays as it is
 
 
-def test_a_calibration_that_is_not_beside_the_recording_is_said(reader, lab, counts):
-    path = film(lab / "lost.h5", [counts], calibration="f" * 64)
+def test_a_calibration_that_is_not_beside_the_recording_is_said(reader, counts, tmp_path):
+    path = film(tmp_path / "lost.h5", [counts], calibration="f" * 64)
     with pytest.warns(UserWarning, match="names calibration ffffffffffff"):
         answers = list(reader.read_all(path, every=True))
     assert answers[0].face == "F1"
@@ -138,24 +208,9 @@ def test_every_reason_has_a_way_out():
     assert math.isnan(doubt.theta_deg)
 
 
-def test_an_answer_says_what_would_match_by_chance(reader, counts):
-    answer = reader.read(counts)
-    assert 0 < answer.doubt < 1e-4
-    assert answer.as_json()["doubt"] == answer.doubt
-    refused = replace(reader, options=ReaderOptions(doubt=1e-30)).read(counts)
-    assert (refused.reason, refused.face) == (BY_CHANCE, None)
-    assert 1e-30 < refused.doubt <= answer.doubt  # its border counts where symbols are too few
-
-
 def test_a_reader_decides_by_its_settings(reader, counts):
     strict = ReaderOptions(margin=1e6, margin_by_few=1e6)
     assert replace(reader, options=strict).read(counts).reason in ("", AMBIGUOUS)
     deaf = ReaderOptions(contact_counts=1e6)
     assert replace(reader, options=deaf).read(counts).reason == NO_CONTACT
     assert replace(reader, options=deaf).prepared[0][1] is reader.prepared[0][1]  # not made anew
-
-
-def test_a_lab_says_what_it_holds(lab):
-    held = open_lab(lab / "lab.db")
-    assert str(held).endswith("lab.db: 1 object, 6 faces, 294 symbols")
-    assert repr(Reader(held)) == f"Reader({held}; fsr-16, tab)"

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
-from generator.database.registered import Bend, Developable
+from generator.database.registered import Bend
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.surface.face import endless_face
-from recognizer.touch.lab import LEAST_RADIUS_MM, MOST_RADIUS_MM, RADIUS_FACTOR, radii_of
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.curvature import guess_curvatures
 from recognizer.touch.symbols.image import Image, bend_image, image_of_signal, normalize_image
@@ -85,16 +83,3 @@ def test_forces_tell_along_which_line_a_cylinder_lies(radius, degrees):
     assert min(map(abs, turns)) < math.radians(12)
     assert found[0].left <= found[-1].left
     assert np.isfinite(found[0].gain).all()
-
-
-def test_radii_are_near_to_those_of_the_faces():
-    tube = Developable("cylinder", (1, 2), 47.0, 0.0, True, False, 0.02)
-    (radius,) = radii_of([tube])
-    assert 1 / RADIUS_FACTOR < radius / 47.0 < RADIUS_FACTOR
-    assert radii_of([replace(tube, concave=True)]) == ()
-    wide, narrow = (radii_of([replace(tube, radius_mm=r)]) for r in (1e6, 0.5))
-    assert wide[0] == pytest.approx(MOST_RADIUS_MM, rel=RADIUS_FACTOR - 1)
-    assert narrow == (LEAST_RADIUS_MM,)
-    cone = Developable("cone", (1, 2), 47.0, 0.4, True, False, 0.02)
-    assert len(radii_of([cone])) > 3
-    assert radii_of([cone])[0] == LEAST_RADIUS_MM

@@ -7,16 +7,11 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
-from generator.pipeline import encode
-from generator.spec import read_specs
 from probe.circuit.network import effective_resistances
 from probe.contact.contract import Touch
 from probe.contact.press import ENGINE, press
 from probe.contact.tips import Tips
-from probe.frame import frame_from
-from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
-from recognizer.command import run
 from recognizer.errors import SensorStateError, WiringError
 from recognizer.sensor import learn
 from recognizer.sensor.file import read_state, state_entry, state_words, write_state
@@ -186,13 +181,8 @@ def test_a_person_is_told_what_was_learned():
 
 
 @pytest.fixture(scope="module")
-def lab(tmp_path_factory):
-    """A database with one object."""
-    folder = tmp_path_factory.mktemp("sensor")
-    (folder / "cube.yaml").write_text("{name: Cube, shape: {cube: 60 mm}}")
-    encode(read_specs([folder / "cube.yaml"]), folder=folder, formats=("stl",),
-           database=f"sqlite:///{folder / 'lab.db'}")  # fmt: skip
-    return folder
+def lab(make_lab):
+    return make_lab("{name: Cube, shape: {cube: 60 mm}}")
 
 
 @pytest.fixture(scope="module")
@@ -234,27 +224,6 @@ def test_touches_tell_gains_and_where_tips_stand(lab, felt, monkeypatch):
     assert not signal.trust[state.dead].any()
     with pytest.raises(SensorStateError, match="for one of"):
         Reader(reader.lab, SensorType(rows=8), state=state)
-
-
-def test_the_command_learns_and_keeps_and_reads_by_it(lab, felt, tmp_path, capsys):
-    images, _, _ = felt
-    with Recorder(tmp_path / "touches.h5", sensor="left") as recorder:
-        for seq, counts in enumerate(images[:16]):
-            recorder.append(frame_from(counts.astype(np.uint16), t_ns=seq, seq=seq))
-    words = [str(tmp_path / "touches.h5"), "--every", "--database", str(lab / "lab.db")]
-    kept = tmp_path / "left.json"
-    assert run([*words, "--learn", str(kept)]) == 0
-    told = capsys.readouterr().err
-    assert "learned of left, 16 touches: 5 of 256 tactels never answer" in told
-    assert read_state(kept).touches == 16
-    before = kept.read_bytes()
-    assert run([*words, "--touches", "1", "--sensor-state", str(kept)]) == 0
-    assert kept.read_bytes() == before
-    assert run([*words, "--sensor-state", str(kept), "--learn", str(kept)]) == 2
-    assert run([*words, "--learn", str(tmp_path / "no" / "left.json")]) == 2
-    write_state(replace(read_state(kept), sensor="right"), kept)
-    assert run([*words, "--sensor-state", str(kept)]) == 2
-    assert "is of sensor 'right', not of 'left'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -323,30 +292,3 @@ def test_a_placed_touch_tells_the_mounting(lab, way, changes):
     assert ("read with --flip" in str(found)) is bool(changes)
     other = find_mounting(reader, way(np.rint(8 + 150 * forces)), ("Cube", "F2"))
     assert isinstance(other, Recognition)
-
-
-def test_the_commands_say_flip_and_check(lab, felt, tmp_path, capsys):
-    images, _, _ = felt
-    with Recorder(tmp_path / "mirrored.h5", sensor="left") as recorder:
-        for seq, counts in enumerate(images[:2]):
-            recorder.append(frame_from(np.fliplr(counts).astype(np.uint16), t_ns=seq, seq=seq))
-    words = [str(tmp_path / "mirrored.h5"), "--every", "--database", str(lab / "lab.db")]
-    assert run(words) == 1
-    assert "columns or rows seem reversed" in capsys.readouterr().err
-    assert run([*words, "--flip", "columns"]) == 0
-    assert capsys.readouterr().out.count("Cube/F1 at") == 2
-    assert run([*words, "--flip", "sideways"]) == 2
-
-    surface = registered_surface(f"{lab}/lab.db", "Cube", "F1").surface
-    forces = press(surface, SENSOR, Touch(30.0, 30.0, 0.1, 70.0)).forces_n
-    with Recorder(tmp_path / "placed.h5", sensor="left") as recorder:
-        counts = np.rot90(np.rint(8 + 150 * forces)).astype(np.uint16)
-        recorder.append(frame_from(np.ascontiguousarray(counts), t_ns=0, seq=0))
-    words = ["check", str(tmp_path / "placed.h5"), "--every", "--database", str(lab / "lab.db")]
-    capsys.readouterr()
-    assert run([*words, "--at", "Cube/F1"]) == 1
-    assert "mounted a quarter turn off, the other way" in capsys.readouterr().out
-    assert run([*words, "--at", "Cube/F1", "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
-    assert (told["flip"], told["agree"]) == (["quarter"] * 3, 1)
-    assert run([*words, "--at", "Cube"]) == 2

@@ -1,0 +1,63 @@
+"""What is loaded, and what is not: a command says its help at once, a scene takes what it needs."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CUBE = Path(__file__).parents[3] / "fixtures" / "cube.yaml"
+HELP = """
+numpy sqlalchemy yaml manifold3d PIL scipy shapely trimesh OCP pymeshlab matplotlib build123d
+cadquery generator.spec generator.array generator.pipeline"""
+SCENE = f"""
+from generator.command import run
+assert run([{str(CUBE)!r}, '-o', 'made', '--database', 'd.db']) == 0"""
+MESH = """
+import trimesh
+from generator import encode
+mesh = trimesh.creation.box((30, 35, 40))
+mesh.export("box.stl")
+given = {"database": "lab.db", "formats": ["stl"]}
+solid = encode(mesh, name="Mesh", folder="mesh", **given)
+model = encode("box.stl", name="File", folder="file", **given)
+assert solid.faces == model.faces == 6 and solid.symbols == model.symbols > 50
+assert solid.folder.name == "mesh" """
+# Fields are described by the text under them: in the schema, not at start-up.
+SETTINGS = """
+import linecache, generator.spec.settings
+assert not [name for name in linecache.cache if "generator" in name]"""
+# What is run, and modules that are not loaded by it.
+PROGRAMS = {
+    "public names": (
+        "import encoded_objects",
+        "numpy scipy sqlalchemy typer rich pydantic yaml h5py generator decoder probe recognizer",
+    ),
+    "generator": ("import generator", "OCP numpy"),
+    "help": ("from generator.command import run; assert run(['--help']) == 0", HELP),
+    "help of init": ("from generator.command import run; assert run(['init', '-h']) == 0", HELP),
+    "help of list": ("from generator.command import run; assert run(['list', '-h']) == 0", HELP),
+    "database": (
+        "import generator.database.open, generator.database.read, generator.database.register",
+        "sqlalchemy.orm scipy shapely OCP matplotlib trimesh pymeshlab psycopg",
+    ),
+    "scene": (
+        SCENE,
+        """scipy matplotlib pandas OCP trimesh multiprocessing.pool generator.polyhedron.read
+        generator.export.check generator.export.robot.model generator.printed
+        generator.pipeline.sets""",
+    ),
+    "mesh": (MESH, "OCP build123d cadquery"),
+    "settings": (SETTINGS, ""),
+}
+
+
+@pytest.mark.parametrize("what", PROGRAMS)
+def test_nothing_is_loaded_that_is_not_used(what, tmp_path):
+    program, unused = PROGRAMS[what]
+    program += f"\nimport sys; print([name for name in {unused.split()!r} if name in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.stderr == ""
+    assert done.stdout.splitlines()[-1] == "[]"
