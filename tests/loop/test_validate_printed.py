@@ -80,7 +80,6 @@ def test_a_run_goes_on_where_a_print_is_missing(spec: Path, printed: Path) -> No
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (("--kinds", "blank"), "parts of the set, not blank"),
         (("--print-profile", "fdm"), "unknown print profile 'fdm'"),
         (("--faults", "worse"), "unknown fault 'worse'"),
     ],

@@ -114,12 +114,13 @@ def small():
 def make_lab(tmp_path_factory):
     """Encode what YAML specs say; return the folder of `lab.db` and the files."""
 
-    def make(*specs, formats=()):
+    def make(*specs, formats=(), **options):
         folder = tmp_path_factory.mktemp("lab")
         for spec in specs:
             (folder / "spec.yaml").write_text(spec)
-            encode(read_specs([folder / "spec.yaml"]), folder=folder / "parts",
-                   database=f"sqlite:///{folder / 'lab.db'}", formats=formats)  # fmt: skip
+            url = f"sqlite:///{folder / 'lab.db'}"
+            specs_read = read_specs([folder / "spec.yaml"])
+            encode(specs_read, folder=folder / "parts", database=url, formats=formats, **options)
         return folder
 
     return make

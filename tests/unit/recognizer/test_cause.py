@@ -7,8 +7,6 @@ import pytest
 
 from encoded_objects import simulate
 from encoded_objects.base.sensor_type import SensorType
-from generator.pipeline import encode
-from generator.spec import read_specs
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.simulate.registered import registered_surface
@@ -32,12 +30,9 @@ def bars(rng, high=200.0):
 
 
 @pytest.fixture(scope="module")
-def reader(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("causes")
-    (folder / "cube.yaml").write_text("{name: Cube, shape: {cube: 48 mm}, profile: large}")
-    database = f"sqlite:///{folder}/lab.db"
-    encode(read_specs([folder / "cube.yaml"]), folder=folder, formats=(), database=database)
-    return Reader(open_lab(database))
+def reader(make_lab):
+    folder = make_lab("{name: Cube, shape: {cube: 48 mm}, profile: large}")
+    return Reader(open_lab(folder / "lab.db"))
 
 
 def code_of(reader, image):
@@ -94,12 +89,9 @@ def test_weak_is_told_in_newtons_where_they_are_known(reader):
 
 
 @pytest.fixture(scope="module")
-def keyed(tmp_path_factory):
+def keyed(make_lab):
     """A lab whose symbols are known, so that places can be named where the readings are even."""
-    folder = tmp_path_factory.mktemp("keyed")
-    (folder / "cube.yaml").write_text("{name: Cube, shape: {cube: 40 mm}}")
-    encode(read_specs([folder / "cube.yaml"]), folder=folder, formats=(),
-           database=f"sqlite:///{folder}/lab.db", lab_key="0123-4567-89AB-CDER")  # fmt: skip
+    folder = make_lab("{name: Cube, shape: {cube: 40 mm}}", lab_key="0123-4567-89AB-CDER")
     return f"{folder}/lab.db"
 
 

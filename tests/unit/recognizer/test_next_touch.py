@@ -88,13 +88,6 @@ def test_without_contact_the_same_place_is_pressed_harder(small):
     assert "nothing is felt" in found.why
 
 
-def test_a_weak_touch_asks_for_more_force_and_a_strong_one_does_not(small):
-    weak = propose_next(reader(small), felt(X < 99, 30.0), refusal(0, TOO_FEW), ())
-    strong = propose_next(reader(small), felt(X < 99, 300.0), refusal(0, TOO_FEW), ())
-    assert "more force" in weak.why
-    assert "more force" not in strong.why
-
-
 def test_a_sure_answer_needs_no_other_touch_and_an_unsure_one_does(small):
     answer = replace(refusal(0, ""), object="Thing", face="F1", margin=15.0, doubt=1e-6)
     for changed, asks in [({}, False), ({"margin": 13.0}, True), ({"doubt": 5e-5}, True)]:
@@ -179,21 +172,3 @@ def test_noise_and_full_scale_say_what_is_felt():
 @pytest.mark.parametrize(("pitch_mm", "gap"), [(0.5, 5), (1.5875, 5), (2.0, 5), (3.0, 3), (6.0, 3)])
 def test_gaps_are_closed_no_wider_where_tactels_are_coarse(pitch_mm, gap):
     assert next_limits(replace(SensorType(), pitch_mm=pitch_mm)).gap == gap
-
-
-def test_a_gel_at_an_edge_is_led_inwards_within_its_size(small):
-    gel = sensor_type_named("gel-24x32")
-    x, _ = gel.centres_mm().transpose(2, 0, 1)
-    strokes = ((np.indices(gel.shape) % 5) < 2).any(axis=0)
-    noise = np.random.default_rng(4).normal(0.0, gel.noise, gel.shape)
-    counts = np.clip(np.where((x > 2.0) & strokes, 500.0, 0.0) + noise, 0, 4095)
-    signal = signal_of(np.rint(counts), sensor=gel)
-    reader = SimpleNamespace(
-        sensor=gel,
-        options=ReaderOptions(),
-        lab=SimpleNamespace(arrays=(small.two_faces().embossed,)),
-    )
-    found = propose_next(reader, signal, refusal(0, TOO_FEW), ())
-    assert 3.0 < found.dx_mm < gel.half_mm[0]
-    assert "towards the loaded part" in found.why
-    assert found.force_n == next_limits(gel).force_n < 10.0

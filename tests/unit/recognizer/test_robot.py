@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from probe.arm import Arm, SensorPose, forward
+from probe.arm import Arm, SensorPose
 from probe.errors import PoseError
-from probe.wrist import Wrist, counts_of, distances_at, gripper_to_plate, plate_to_sensor
+from probe.wrist import Wrist, counts_of, distances_at
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.robot import (
     MOVED_CHANCE,
@@ -107,18 +107,6 @@ def test_a_joint_error_moves_the_object_as_its_covariance_says():
     grown = placed.covariance[:3, :3] - alone.covariance[:3, :3]
     assert np.linalg.norm(step) > 1.0
     assert grown == pytest.approx(np.outer(step, step), abs=0.02 * step @ step)
-
-
-def test_arm_and_wrist_carry_the_sensor():
-    arm, wrist = Arm(), Wrist()
-    counts = counts_of(wrist, distances_at(wrist, 5.0, 0.02, 0.03))
-    at = carried_pose(arm, wrist, JOINTS, np.full(5, 1e-3), counts)
-    from probe.wrist import distances_mm, wrist_pose
-
-    hanging = wrist_pose(wrist, distances_mm(wrist, counts))
-    expected = forward(arm, JOINTS) @ gripper_to_plate(wrist, hanging) @ plate_to_sensor(wrist)
-    assert at.T_base_sensor == pytest.approx(expected, abs=1e-9)
-    assert (np.linalg.eigvalsh(at.covariance) > -1e-12).all()
 
 
 def test_what_is_not_known():

@@ -11,10 +11,7 @@ from probe.circuit.network import effective_resistances
 from probe.contact.contract import Touch
 from probe.contact.press import ENGINE, press
 from probe.contact.tips import Tips
-from probe.frame import frame_from
-from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
-from recognizer.command import run
 from recognizer.errors import SensorStateError, WiringError
 from recognizer.sensor import learn
 from recognizer.sensor.file import read_state, state_entry, state_words, write_state
@@ -295,30 +292,3 @@ def test_a_placed_touch_tells_the_mounting(lab, way, changes):
     assert ("read with --flip" in str(found)) is bool(changes)
     other = find_mounting(reader, way(np.rint(8 + 150 * forces)), ("Cube", "F2"))
     assert isinstance(other, Recognition)
-
-
-def test_the_commands_say_flip_and_check(lab, felt, tmp_path, capsys):
-    images, _, _ = felt
-    with Recorder(tmp_path / "mirrored.h5", sensor="left") as recorder:
-        for seq, counts in enumerate(images[:2]):
-            recorder.append(frame_from(np.fliplr(counts).astype(np.uint16), t_ns=seq, seq=seq))
-    words = [str(tmp_path / "mirrored.h5"), "--every", "--database", str(lab / "lab.db")]
-    assert run(words) == 1
-    assert "columns or rows seem reversed" in capsys.readouterr().err
-    assert run([*words, "--flip", "columns"]) == 0
-    assert capsys.readouterr().out.count("Cube/F1 at") == 2
-    assert run([*words, "--flip", "sideways"]) == 2
-
-    surface = registered_surface(f"{lab}/lab.db", "Cube", "F1").surface
-    forces = press(surface, SENSOR, Touch(30.0, 30.0, 0.1, 70.0)).forces_n
-    with Recorder(tmp_path / "placed.h5", sensor="left") as recorder:
-        counts = np.rot90(np.rint(8 + 150 * forces)).astype(np.uint16)
-        recorder.append(frame_from(np.ascontiguousarray(counts), t_ns=0, seq=0))
-    words = ["check", str(tmp_path / "placed.h5"), "--every", "--database", str(lab / "lab.db")]
-    capsys.readouterr()
-    assert run([*words, "--at", "Cube/F1"]) == 1
-    assert "mounted a quarter turn off, the other way" in capsys.readouterr().out
-    assert run([*words, "--at", "Cube/F1", "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
-    assert (told["flip"], told["agree"]) == (["quarter"] * 3, 1)
-    assert run([*words, "--at", "Cube"]) == 2

@@ -1,4 +1,4 @@
-"""Prints of registered parts as surfaces: which faces, where they are kept, how they are found.
+"""Touches that are drawn: those that follow one without an answer, and those of printed parts.
 
 The slicer is left out: what stands for a print is the written part's own height map, moved.
 The real one runs in tests/loop/test_validate_printed.py.
@@ -27,13 +27,67 @@ from probe.simulate.printed import (
     read_listing,
 )
 from probe.simulate.target import part_surface
+from recognizer.scan.session import Scan
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.validation.draw import draw_touch
+from recognizer.touch.recognition import AMBIGUOUS, NextTouch, refusal
+from recognizer.validation.draw import draw_again, draw_touch
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.printing import find_parts
 from recognizer.validation.touch_plan import TouchPlan
-from recognizer.validation.trial import RIGHT, trial
+from recognizer.validation.trial import NEXT, touch_until_answered, trial
+
+PLAN = TouchPlan("", 5, "typical", "corner", policy=NEXT)
+
+
+@pytest.fixture(scope="module")
+def url(make_lab):
+    return f"sqlite:///{make_lab('{name: Cube, shape: {cube: 60 mm}}') / 'lab.db'}"
+
+
+@pytest.fixture(scope="module")
+def reader(url):
+    return Reader(open_lab(url))
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_the_first_touch_is_the_one_that_is_made_alone(url, reader, number):
+    one, alone = (
+        trial(replace(PLAN, database=url, policy=policy), number, reader)
+        for policy in (NEXT, "one")
+    )
+    assert (one.x_mm, one.y_mm, one.force_n) == (alone.x_mm, alone.y_mm, alone.force_n)
+    assert (one.touches == 1) == (alone.verdict == "right")
+
+
+def test_steps_are_made_from_the_sensor_s_frame_by_the_same_sensor(url, reader, monkeypatch):
+    plan = replace(PLAN, database=url, kind="face", level="dead-40")
+    step = NextTouch(4.0, 2.0, 30.0, 60.0, "told")
+    refused = replace(refusal(3, AMBIGUOUS), next=step)
+    monkeypatch.setattr(Scan, "add", lambda *_arguments, **_named: refused)
+    made = list(touch_until_answered(plan, 3, reader, 2))
+    first, second = (one.found.touch for one in made)
+    c, s = math.cos(first.theta_rad), math.sin(first.theta_rad)
+    at = first.x_mm + 4 * c - 2 * s, first.y_mm + 4 * s + 2 * c
+    assert math.dist(at, (second.x_mm, second.y_mm)) < 1.5  # the arm errs by .3 mm each way
+    assert second.theta_rad - first.theta_rad == pytest.approx(math.radians(30), abs=0.02)
+    assert second.force_n == pytest.approx(60, rel=0.4)
+    dead = [one.found.counts < 40 for one in made]
+    assert np.logical_and(*dead).sum() >= 90  # a third of them would be by chance
+    assert len(made) == 2
+
+
+def test_a_worn_face_has_lost_the_same_symbols_elsewhere(url, reader):
+    plan = replace(PLAN, database=url, kind="worn", level="low")
+    first = draw_touch(plan, 1, reader)
+    again = draw_again(plan, first, first.touch, reader, np.random.default_rng(0))
+    points = np.random.default_rng(1).uniform(0, 60, (400, 2))
+    assert np.array_equal(
+        again.contact.scene.surface.heights_mm(points),
+        first.contact.scene.surface.heights_mm(points),
+    )
+    assert (np.abs(again.counts.astype(int) - first.counts) < 40).all()  # the noise is another
+
 
 OPTIONS = PrintOptions(faults="usual", seed=5)
 
@@ -82,18 +136,6 @@ def listing(panels, tmp_path_factory):
     print_as_designed(part, panels, folder / "kept", 1)
     (folder / "printed.json").write_text(listing_of([part], OPTIONS, folder / "kept", folder))
     return str(folder / "printed.json")
-
-
-def test_each_panel_is_printed_for_its_own_face(panels):
-    parts = find_parts(panels)
-    assert [[face.name for face in part.job.faces] for part in parts] == [
-        [f"F{k}"] for k in range(1, 7)
-    ]
-    for part in parts:
-        assert part.unseen == ()
-        assert not part.job.supports
-        assert part.job.faces[0].embossing.T_part_facet[:3, 2] == pytest.approx((0, 0, 1))
-        assert len(part.job.faces[0].embossing.labels) >= 9
 
 
 def test_of_a_whole_body_what_looks_down_is_not_simulated(whole):
@@ -154,16 +196,11 @@ def test_a_part_is_left_until_all_its_faces_are_there(whole, tmp_path):
     assert part.left(replace(OPTIONS, seed=6), tmp_path)
 
 
-def test_touches_of_prints_are_of_printed_faces_and_right(panels, listing):
-    reader = Reader(open_lab(panels))
-    plan = TouchPlan(panels, 3, "typical", files=True, prints=listing)
-    found = [trial(plan, number, reader) for number in range(4)]
-    assert [(t.object, t.face, t.verdict) for t in found] == [("Cube", "F3", RIGHT)] * 4
-    assert math.sqrt(np.mean([t.error_mm**2 for t in found])) < 0.06
-    edge = draw_touch(replace(plan, kind="edge"), 1, reader)
-    assert (
-        edge.contact.scene.region.distance_mm(np.array([[edge.touch.x_mm, edge.touch.y_mm]]))[0] < 9
-    )
+def test_edges_of_prints_are_touched(panels, listing):
+    plan = TouchPlan(panels, 3, "typical", kind="edge", files=True, prints=listing)
+    edge = draw_touch(plan, 1, Reader(open_lab(panels)))
+    at = np.array([[edge.touch.x_mm, edge.touch.y_mm]])
+    assert edge.contact.scene.region.distance_mm(at)[0] < 9
 
 
 def test_a_print_brings_its_own_faults(panels, listing):

@@ -16,7 +16,6 @@ from recognizer.validation.pictures import (
     boxes_overlap,
     draw_answers,
     draw_errors,
-    draw_work_precision,
     label_points,
 )
 from recognizer.validation.report import environment
@@ -58,30 +57,6 @@ def test_names_of_crowded_points_do_not_overlap():
     assert_readable(figure, texts)
 
 
-def study_of_lookalikes():
-    """Readers and decoders that hardly differ, as they do on easy sets."""
-    names = ["as it is", "least", "one lattice", "more steps", "more candidates", "most"]
-    readers = [{"reader": name, "right": 199, "touches": 200, "rms_mm": 0.03} for name in names]
-    decoders = [
-        {"decoder": name, "right": right, "windows": 200}
-        for name, right in (("table", 63), ("serial", 63), ("milestones", 63), ("logarithm", 63),
-                            ("good tuple", 180), ("likelihood", 199),
-                            ("likelihood, registered cells", 199))
-    ]  # fmt: skip
-    contact = contact_study()
-    times = {"contact": contact.spent, "readers": [22.3, 18.6, 19.5, 26.3, 43.4, 83.0],
-             "decoders": [6e-4, 0.04, 1.7e-3, 3.9e-3, 0.07, 0.028, 0.023]}  # fmt: skip
-    return {"contact": contact.counted, "readers": readers, "decoders": decoders}, times
-
-
-def test_names_in_the_picture_of_error_against_run_time_do_not_overlap():
-    study, times = study_of_lookalikes()
-    figure, axes = figure_of(2, 2, (11.5, 8.0))
-    texts = draw_work_precision(axes, study, times, "tabs-19")
-    assert len(texts) == len(study["contact"]) + 2 * 6 + 7
-    assert_readable(figure, texts)
-
-
 def test_every_engine_is_in_the_picture_and_says_what_it_leaves_out():
     series = {line["series"] for line in contact_study().counted}
     assert series == {"tab, own engine", "pad, own engine", "tab, mujoco"}
@@ -109,16 +84,6 @@ def test_a_face_drawn_flat_has_a_dot_for_each_touch_where_it_was():
     assert at["#c9ced6"] == [("40.0", "70.0")]  # 2 px a mm, 30 px of title, y up
     assert at["#2a7f62"] == [("20.0", "50.0")]
     assert at["#d98c00"] == [("0.0", "110.0"), ("80.0", "30.0")]
-
-
-def test_faces_stand_side_by_side_and_wrap():
-    svg = draw_flat([square(f"F{k}", bad=k == 1) for k in range(1, 9)], 5.0)
-    titles = re.findall(r'<text x="(\d+)" y="(\d+)" fill="(#\w+)" font-weight', svg)
-    assert len({(x, y) for x, y, _ in titles}) == 8
-    assert len({y for _, y, _ in titles}) == 2  # 200 px each, 1080 px a row
-    assert [colour for *_, colour in titles].count("#c0392b") == 1
-    wide = int(re.search(r'width="(\d+)"', svg)[1])
-    assert wide <= 1090
 
 
 def test_many_right_touches_are_thinned_and_no_refused_one():

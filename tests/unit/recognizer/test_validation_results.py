@@ -31,29 +31,14 @@ UNTOLD = "too few touches to tell"
 def row(number, verdict="right", **changed):
     right = verdict == "right"
     plain = {
-        "number": number,
-        "kind": "face",
-        "surface": "face",
-        "level": "mismatch",
-        "object": "Cube",
-        "face": "F1",
-        "x_mm": 1.0,
-        "y_mm": 2.0,
-        "theta_deg": 30.0,
-        "force_n": 50.0,
-        "tilt_deg": 1.0,
-        "edge_mm": 12.0,
-        "symbols": 12,
-        "enough": True,
-        "verdict": verdict,
-        "reason": "ambiguous" if verdict == "rejected" else "",
+        "number": number, "kind": "face", "surface": "face", "level": "mismatch",
+        "object": "Cube", "face": "F1", "x_mm": 1.0, "y_mm": 2.0, "theta_deg": 30.0,
+        "force_n": 50.0, "tilt_deg": 1.0, "edge_mm": 12.0, "symbols": 12, "enough": True,
+        "verdict": verdict, "reason": "ambiguous" if verdict == "rejected" else "",
         "answer": {"right": "Cube/F1", "wrong": "Box/F2", "rejected": ""}[verdict],
-        "error_mm": 0.05 if right else NAN,
-        "error_deg": -0.2 if right else NAN,
-        "chi2": 2.0 if right else NAN,
-        "margin": 30.0,
-        "noise": 0.1,
-    }
+        "error_mm": 0.05 if right else NAN, "error_deg": -0.2 if right else NAN,
+        "chi2": 2.0 if right else NAN, "margin": 30.0, "noise": 0.1,
+    }  # fmt: skip
     return plain | changed
 
 
