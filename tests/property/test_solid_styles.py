@@ -76,7 +76,7 @@ def solids():
 
 @given(
     solids(),
-    st.sampled_from(["dense-4", "dense-8", "thesis-2"]),
+    st.sampled_from(sorted(ALPHABETS)),
     st.floats(-4.0, 4.0),
     st.sampled_from([0.0, 0.1]),
     st.integers(0, 2**32 - 1),
