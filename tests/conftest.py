@@ -33,6 +33,18 @@ def one_lab_key():
         yield
 
 
+@pytest.fixture
+def ask(capsys):
+    """Run a command in this process: code, stdout, stderr."""
+
+    def ask(command, *words):
+        capsys.readouterr()
+        code = command([str(word) for word in words])
+        return code, *capsys.readouterr()
+
+    return ask
+
+
 @pytest.fixture(scope="session")
 def postgresql_server():
     """URL of a real server; its absence is a failure, so that nothing goes untested."""

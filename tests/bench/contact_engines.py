@@ -13,17 +13,17 @@ CPU times with the surface, the least of the repetitions, medians over places an
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import statistics
+import sys
 import tempfile
-import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from contact_precision import BALL_MM, STIFF, TABLE, places, write_table
+from contact_precision import BALL_MM, STIFF, TABLE, places, three, write_table
 from manifold3d import Manifold
 
 from encoded_objects import encode
@@ -36,21 +36,17 @@ from probe.simulate.target import part_surface
 from probe.surface.body import body_of
 from probe.surface.mesh import mesh
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
+
 POINTS = (7, 19, 61)
 REFERENCE = 217
 DEEP_MM = 4.0  #: of the indenters
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--engine", default="mujoco")
-    parser.add_argument("--places", type=int, default=40, help="touches on each indenter")
-    parser.add_argument("--repeat", type=int, default=2, help="timings of each touch")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--write", action="store_true")
-    given = parser.parse_args()
+    """Print the lines; with `--write` they go into `precision.json`."""
+    given = runner.asked(__doc__, engine="mujoco", places=40, repeat=2, seed=1, write=False)
     found = {points: [] for points in POINTS}
     for case, (surface, force_n, wrist) in bodies().items():
         rng = np.random.default_rng([given.seed, 7])
@@ -121,13 +117,10 @@ def lines_of(engine, surface, touches, repeat):
     for points in POINTS:
         images, times = [], []
         for touch in touches:
-            spent = []
-            for _ in range(repeat):
-                start = time.process_time()
-                image = press(surface, sensor, touch, Tips(points)).forces_n
-                spent.append(time.process_time() - start)
-            images.append(image)
-            times.append(1e3 * min(spent))
+            work = partial(press, surface, sensor, touch, Tips(points))
+            made = [runner.clocked(work) for _ in range(repeat)]
+            images.append(made[-1][0].forces_n)
+            times.append(min(ms for _, ms in made))
         yield points, (apart(images, wanted), apart(images, others), statistics.median(times))
 
 
@@ -137,10 +130,6 @@ def apart(images, wanted):
         np.linalg.norm(a - b) / np.linalg.norm(b) for a, b in zip(images, wanted, strict=True)
     ]
     return math.sqrt(statistics.fmean(r * r for r in ratios))
-
-
-def three(value):
-    return float(f"{value:.3g}")
 
 
 if __name__ == "__main__":

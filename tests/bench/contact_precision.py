@@ -20,11 +20,11 @@ or refuses one, is left out of what `press` picks from by itself.
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import statistics
-import time
+import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,9 @@ from probe.contact.tips import Tips
 from probe.errors import ContactError
 from probe.surface.face import endless_face
 from probe.surface.indenters import RaisedStrip, TiltedPlane, Washer
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
 
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "probe" / "contact" / "precision.json"
@@ -139,10 +142,9 @@ def timed(surface, sensor, touches, levels, repeat):
     for number, touch in enumerate(touches):
         for _ in range(repeat):
             for level in levels:
-                start = time.process_time()
-                press(surface, sensor, touch, accuracy=level)
-                times[level][number].append(time.process_time() - start)
-    return {level: 1e3 * statistics.median(map(min, each)) for level, each in times.items()}
+                work = partial(press, surface, sensor, touch, accuracy=level)
+                times[level][number].append(runner.clocked(work)[1])
+    return {level: statistics.median(map(min, each)) for level, each in times.items()}
 
 
 def draw(known, path):
@@ -185,53 +187,39 @@ def draw(known, path):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--places", type=int, help="touches on each indenter; tab 48, pad 3")
-    parser.add_argument("--repeat", type=int, default=3, help="timings of each touch")
-    parser.add_argument("--case", action="append", help="only these indenters")
-    parser.add_argument("--overlay", choices=("tab", "pad"), help="only this overlay")
-    parser.add_argument("--write", action="store_true", help="write precision.json and the picture")
-    parser.add_argument("--draw", action="store_true", help="draw precision.json as it is, no more")
-    given = parser.parse_args()
+    """Measure what is asked for; `--overlay` tab or pad, `--case` some indenters."""
+    given = runner.asked(__doc__, seed=1, places=0, repeat=3, case=[""], overlay=["tab", "pad"],
+                         write=False, draw=False)  # fmt: skip
+    known = json.loads(TABLE.read_text())
     if given.draw:
-        draw(json.loads(TABLE.read_text()), PICTURE)
+        draw(known, PICTURE)
         return
-    lines = []
-    for kind in (given.overlay,) if given.overlay else ("tab", "pad"):
+    lines = {(p["overlay"], p["case"], p["level"]): p for p in known["cases"]}
+    for kind in given.overlay:
         sensor = SensorType(overlay=Overlay(kind=kind))
-        for case, (surface, on_tabs, on_pad, wrist) in cases(
-            np.random.default_rng(given.seed)
-        ).items():
-            if given.case and case not in given.case:
+        for case, (surface, *forces, wrist) in cases(np.random.default_rng(given.seed)).items():
+            if case not in given.case and given.case != [""]:
                 continue
-            force = on_tabs if kind == "tab" else on_pad
-            rng = np.random.default_rng([given.seed, 7])
+            rng, force = np.random.default_rng([given.seed, 7]), forces[kind == "pad"]
             touches = list(places(rng, given.places or PLACES[kind], force, wrist))
             for level, error, ms in measured(kind, case, surface, sensor, touches, given.repeat):
-                known = math.isfinite(error)
-                lines.append({"overlay": kind, "case": case, "level": level,
-                              "error": float(f"{error:.3g}") if known else None,
-                              "ms": float(f"{ms:.3g}") if known else None})  # fmt: skip
-    known = json.loads(TABLE.read_text())
-    anew = {(p["overlay"], p["case"]) for p in lines}
-    kept = [p for p in known["cases"] if (p["overlay"], p["case"]) not in anew]
-    order = [(p["overlay"], p["case"]) for p in known["cases"]]
-    lines = sorted(kept + lines, key=lambda p: order.index((p["overlay"], p["case"])))
-    levels = {}
-    for kind, names in LEVELS.items():
-        levels[kind] = []
-        for level in names:
-            here = [p for p in lines if (p["overlay"], p["level"]) == (kind, level)]
-            if here and all(p["error"] is not None for p in here):
-                worst = max(p["error"] for p in here)
-                ms = statistics.median(p["ms"] for p in here)
-                levels[kind].append({"level": level, "error": worst, "ms": ms})
-                print(f"{kind:4}{'worst':8}{level:12} error {worst:9.2e}   {ms:9.2f} ms")
+                lines[kind, case, level] = {"overlay": kind, "case": case, "level": level,
+                                            "error": three(error), "ms": three(ms)}  # fmt: skip
+    levels = {kind: [] for kind in LEVELS}
+    for kind, level in ((kind, level) for kind, names in LEVELS.items() for level in names):
+        here = [p for p in lines.values() if (p["overlay"], p["level"]) == (kind, level)]
+        if here and all(p["error"] is not None for p in here):
+            worst = max(p["error"] for p in here)
+            ms = statistics.median(p["ms"] for p in here)
+            levels[kind].append({"level": level, "error": worst, "ms": ms})
+            print(f"{kind:4}{'worst':8}{level:12} error {worst:9.2e}   {ms:9.2f} ms")
     if given.write:
-        write_table(known | {"cases": lines, "levels": levels})
+        write_table(known | {"cases": list(lines.values()), "levels": levels})
+
+
+def three(value):
+    """Return a figure to three digits, None where there is none."""
+    return float(f"{value:.3g}") if math.isfinite(value) else None
 
 
 def write_table(known):

@@ -24,12 +24,8 @@ without a database.
 
 from __future__ import annotations
 
-import argparse
-import subprocess
 import sys
-import tempfile
 import time
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +47,9 @@ from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.layout.torus import board_size
 from generator.pipeline.place import occupancy_with
 from generator.polyhedron import shapes
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
 
 CUBE = shapes.cube(60.0)
 STYLE = SymbolStyle()
@@ -200,21 +199,16 @@ def measured(url, array, objects):
             assert look(connection, k)[0][0] > 0
     opening = timed(look_opening, 20)[0]
     high, wide = board_size(held)
-    print(
-        f"{engine.dialect.name:>10} {objects:8d} {faces:8d} {held.used:9d} {placing:8.3f} "
-        f"{cpu:8.3f} {1e3 * taken:9.1f} {1e3 * looking:8.2f} {1e3 * opening:9.1f} {listing:7.2f} "
-        f"{held.used / (high * wide):7.3f} {held.density:7.3f}",
-        flush=True,
-    )
+    runner.row(engine.dialect.name, objects, faces, held.used, placing, cpu, 1e3 * taken,
+               1e3 * looking, 1e3 * opening, listing, held.used / (high * wide),
+               held.density)  # fmt: skip
 
 
 def scaled(urls, array, how, steps):
     engines = [open_database(url) for url in urls]
     objects, have = (blocks if how == "blocks" else mixed)(array), 0
-    print(
-        f"{'engine':>10} {'objects':>8} {'faces':>8} {'cells':>9} {'place s':>8} {'CPU s':>8} "
-        f"{'taken ms':>9} {'look ms':>8} {'+open ms':>9} {'list s':>7} {'opened':>7} {'array':>7}"
-    )
+    runner.table(("engine", "objects", "faces", "cells", "place s", "CPU s", "taken ms", "look ms",
+                  "+open ms", "list s", "opened", "array"))  # fmt: skip
     for want in steps:
         spent = fill(engines, array, objects, have, want)
         each = ", ".join(f"{1e3 * seconds / max(want - have, 1):.1f}" for seconds in spent)
@@ -230,58 +224,35 @@ def scaled(urls, array, how, steps):
 def filled(array, size):
     """Print how full the array gets when nothing fits any more."""
     taken, number, began = Occupancy.from_cells([], [], array), 0, time.process_time()
-    print(
-        f"mixture x {size:g}\n{'objects':>8} {'cells':>9} {'opened':>7} {'array':>7} {'CPU s':>8}"
-    )
+    runner.table(("objects", "cells", "opened", "array", "CPU s"))
 
-    def told():
+    def show():
         high, wide = board_size(taken)
-        share = taken.used / (high * wide)
-        spent = time.process_time() - began
-        print(f"{number:8d} {taken.used:9d} {share:7.3f} {taken.density:7.3f} {spent:8.0f}")
+        share, spent = taken.used / (high * wide), time.process_time() - began
+        runner.row(number, taken.used, share, taken.density, spent)
 
     for _, layout in mixed(array, size):
         taken = occupancy_with(taken, layout)
         number += 1
         if number % 1000 == 0:
-            told()
-            sys.stdout.flush()
-    told()
+            show()
+    show()
 
 
-def main() -> int:
-    options = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    options.add_argument("--engine", choices=("sqlite", "postgresql", "both"), default="both")
-    options.add_argument("--fill", choices=("blocks", "placed"), default="blocks")
-    options.add_argument("--objects", type=int, nargs="+", default=[2, 10, 167, 1000, 10000, 16667])
-    options.add_argument("--array", type=int, default=4095, help="rows")
-    options.add_argument("--full", action="store_true", help="how full the array gets")
-    options.add_argument("--size", type=float, default=1.0, help="of the objects of --full")
-    chosen = options.parse_args()
+def main() -> None:
+    """Print the tables."""
+    chosen = runner.asked(__doc__, engine="both", fill="blocks", array=4095, full=False, size=1.0,
+                          objects=[2, 10, 167, 1000, 10000, 16667])  # fmt: skip
     array = array_of(chosen.array)
-    print(f"array {array.rows} x {array.columns}")
+    print(f"array {array.rows} x {array.columns}, fill {chosen.fill}")
     if chosen.full:
         filled(array, chosen.size)
-        return 0
-    print(f"fill {chosen.fill}")
-    with ExitStack() as stack:
-        urls = []
-        if chosen.engine != "postgresql":
-            folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            urls.append(str(folder / "lab.db"))
-        if chosen.engine != "sqlite":
-            script = Path(__file__).parents[1] / "postgres.py"
-            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-            command = [sys.executable, script, "--durable"]
-            server = stack.enter_context(subprocess.Popen(command, text=True, **pipes))
-            urls.append(server.stdout.readline().strip())
-        scaled(urls, array, chosen.fill, sorted(chosen.objects))
-        if chosen.engine != "postgresql":
-            print(f"{Path(urls[0]).stat().st_size / 1e6:.0f} MB")
-    return 0
+        return
+    with runner.databases(chosen.engine, "--durable") as urls:
+        scaled(list(urls.values()), array, chosen.fill, sorted(chosen.objects))
+        if "sqlite" in urls:
+            print(f"{Path(urls['sqlite']).stat().st_size / 1e6:.0f} MB")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -1,7 +1,7 @@
 """Against the peers that can be installed: same number of cells, same damage, one run.
 
     python -m venv peers && peers/bin/pip install numpy pillow calib-targets==0.15.5
-    OPENBLAS_NUM_THREADS=1 PYTHONPATH=. peers/bin/python tests/bench/decoder_peers.py --seed 1
+    PYTHONPATH=. peers/bin/python tests/bench/decoder_peers.py --seed 1
 
 calib-targets decodes PuzzleBoard (501x501, binary, four rotations, soft likelihood and a
 margin gate). A board of 8x8 squares is drawn at random places of it; dots are inverted with
@@ -18,15 +18,19 @@ they are not in this run.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import io
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
 from decoder import Likelihood
 from generator.array import array_from
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
 
 DAMAGE = ((0.0, 0.0), (0.02, 0.0), (0.05, 0.0), (0.10, 0.0), (0.20, 0.0), (0.0, 0.2), (0.0, 0.4))
 SQUARES, SQUARE_MM, MARGIN_MM, DPI = 8, 10.0, 15.0, 150
@@ -34,25 +38,15 @@ SCALE = DPI / 25.4
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--boards", type=int, default=150)
-    parser.add_argument("--windows", type=int, default=1000)
-    options = parser.parse_args()
-    print(f"{'decoder':<32}{'wrong':>6}{'missing':>8} |{'right':>7}{'wrong':>7}{'reject':>7} |"
-          f"{'ms':>9}{'decode':>9}")  # fmt: skip
+    """Print a line for each decoder and damage; times in ms."""
+    options = runner.asked(__doc__, seed=1, boards=150, windows=1000)
+    runner.table(("decoder", "wrong", "missing", "right", "wrong", "reject", "ms", "decode"))
     for damage in DAMAGE:
         rng = np.random.default_rng([options.seed, int(100 * damage[0]), int(100 * damage[1])])
         for name, margin in (("calib-targets PuzzleBoard", None), ("  the same, gate open", 0.0)):
-            told(name, damage, puzzleboard(damage, options.boards, rng, margin))
+            runner.row(name, *damage, *puzzleboard(damage, options.boards, rng, margin))
         for name, registered in (("ours, all places", False), ("ours, 400 registered", True)):
-            told(name, damage, ours(damage, options.windows, rng, registered))
-
-
-def told(name: str, damage, outcome) -> None:
-    right, wrong, rejected, whole, decoding = outcome
-    print(f"{name:<32}{damage[0]:>6.2f}{damage[1]:>8.2f} |{right:>7.1f}{wrong:>7.2f}"
-          f"{rejected:>7.1f} |{whole:>9.3f}{decoding:>9.3f}", flush=True)  # fmt: skip
+            runner.row(name, *damage, *ours(damage, options.windows, rng, registered))
 
 
 def ours(damage, number: int, rng, registered: bool):
@@ -68,13 +62,14 @@ def ours(damage, number: int, rng, registered: bool):
     read = np.where(rng.random(read.shape) < damage[1], -1, read)
     decoder = Likelihood(array, rotations=(0, 1, 2, 3), prior=prior if registered else None)
     decoder.decode(read[:1])
-    start = time.process_time()
-    found = decoder.decode(read)
-    spent = (time.process_time() - start) / number * 1e3
+    found, spent = runner.clocked(decoder.decode, read)
     right = (found.rows == places[:, 0]) & (found.columns == places[:, 1])
     right &= found.rotations == 0
     given = found.answered
-    return (*(100 * x.mean() for x in (right & given, ~right & given, ~given)), spent, spent)
+    return (
+        *(100 * x.mean() for x in (right & given, ~right & given, ~given)),
+        *2 * [spent / number],
+    )
 
 
 def puzzleboard(damage, number: int, rng, margin: float | None):

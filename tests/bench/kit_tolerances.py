@@ -15,6 +15,7 @@ import math
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,19 +24,18 @@ import numpy as np
 from encoded_objects import Reader, encode, open_lab
 from encoded_objects.base.sensor_type import SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named
+from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.simulate.registered import registered_surface
-from probe.simulate.scene import TouchRanges, random_touches
+from probe.simulate.scene import Scene, TouchRanges, random_touches
 from probe.simulate.world.levels import TYPICAL, Level
 from probe.simulate.world.sensor import LevelSensor, SensorInstance, sample_sensor
 from recognizer.touch.recognise import recognise
-from recognizer.validation.statistics import chi2_quantile
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
 import runner
 
 SHAPES = {"Cube": {"cube": "80 mm"}, "Box": {"box": ["90 mm", "70 mm", "60 mm"]}}
-INSIDE = chi2_quantile(0.95)  #: chi square of three numbers at 95 %
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Defect:
     """How far the sensor that presses is off."""
 
     what: str
-    by: str
+    by: str = ""
     level: Level = TYPICAL
     sensor: SensorType | None = None  #: that presses, where it is another one
     moved_mm: float = 0.0  #: the whole overlay, along x
@@ -52,11 +52,13 @@ class Defect:
 
 def defects(sensor: SensorType) -> Iterator[Defect]:
     """Yield what is tried."""
-    yield Defect("none", "")
-    for by in (0.05, 0.15, 0.25, 0.4):
-        yield Defect("place of each tab", f"{by:g} mm", replace(TYPICAL, shift_mm=by))
-    for by in (0.03, 0.1, 0.15, 0.2, 0.3):
-        yield Defect("height of each tab", f"{by:g} mm", replace(TYPICAL, length_mm=by))
+    yield Defect("none")
+    for what, field, values in (
+        ("place of each tab", "shift_mm", (0.05, 0.15, 0.25, 0.4)),
+        ("height of each tab", "length_mm", (0.03, 0.1, 0.15, 0.2, 0.3)),
+        ("dome of a tip", "dome_mm", (0.2, 0.3, 0.5)),
+    ):
+        yield from (Defect(what, f"{by:g} mm", replace(TYPICAL, **{field: by})) for by in values)
     for by in (0.1, 0.25, 0.5):
         yield Defect("overlay over film", f"{by:g} mm", moved_mm=by)
     for by in (0.003, 0.006, 0.01, 0.02):
@@ -65,12 +67,9 @@ def defects(sensor: SensorType) -> Iterator[Defect]:
     for by in (-0.3, -0.15, 0.15, 0.3):
         tip = replace(overlay, tab_diameter_mm=overlay.tab_diameter_mm * (1 + by))
         yield Defect("diameter of a tip", f"{100 * by:+g} %", sensor=replace(sensor, overlay=tip))
-    for times in (0.5, 2.0, 4.0):
-        stiff = replace(overlay, young_mpa=overlay.young_mpa * times)
-        yield Defect("modulus of the silicone", f"x {times:g}",
-                     sensor=replace(sensor, overlay=stiff))  # fmt: skip
-    for by in (0.2, 0.3, 0.5):
-        yield Defect("dome of a tip", f"{by:g} mm", replace(TYPICAL, dome_mm=by))
+    for by in (0.5, 2.0, 4.0):
+        stiff = replace(overlay, young_mpa=overlay.young_mpa * by)
+        yield Defect("modulus of the silicone", f"x {by:g}", sensor=replace(sensor, overlay=stiff))
     for by in (3.0, 5.0):
         tilt = replace(TYPICAL, tilt_rad=math.radians(by))
         yield Defect("tilt of the housing", f"{by:g} degrees", tilt)
@@ -83,53 +82,46 @@ def instance_of(defect: Defect, sensor: SensorType, rng: np.random.Generator) ->
     return replace(drawn, shifts=drawn.shifts + moved / max(defect.level.shift_mm, 1e-12))
 
 
-def measure(
-    database: str, reader: Reader, defect: Defect, touches: int
-) -> tuple[int, int, float, float, float]:
-    """Return right, wrong, rms mm, rms degrees and the share inside."""
-    sensor, errors, inside, wrong = reader.sensor, [], 0, 0
-    scenes = [registered_surface(database, name, f"F{k}") for name in SHAPES for k in (1, 2, 3)]
-    area = math.prod(sensor.half_mm) / 12.7**2
+def touched(
+    scene: Scene, sensor: SensorType, defect: Defect, number: int
+) -> tuple[Touch, np.ndarray]:
+    """Return a touch amid a face and its counts."""
+    rng, area = np.random.default_rng([3, number]), math.prod(sensor.half_mm) / 12.7**2
+    ranges = TouchRanges(margin_mm=9.0, force_n=(20.0 * area, 120.0 * area))
+    for touch in random_touches(scene.region, rng, ranges):
+        tilt, towards = defect.level.tilt_rad or math.radians(2), rng.uniform(-math.pi, math.pi)
+        by = tilt * math.sqrt(rng.random())
+        at = replace(touch, tilt_x_rad=by * math.cos(towards), tilt_y_rad=by * math.sin(towards))
+        instance = instance_of(defect, sensor, rng)
+        worse = LevelSensor(defect.sensor or sensor, defect.level, instance=instance)
+        with suppress(ContactError):
+            return at, worse.read(scene, at, rng).counts
+    raise AssertionError
+
+
+def measure(scenes: list[Scene], reader: Reader, defect: Defect, touches: int) -> runner.Row:
+    """Return what becomes of touches, as `runner.outcome` does."""
+    trials = []
     for number in range(touches):
-        rng = np.random.default_rng([3, number])
         scene = scenes[number % len(scenes)]
-        ranges = TouchRanges(margin_mm=9.0, force_n=(20.0 * area, 120.0 * area))
-        for touch in random_touches(scene.region, rng, ranges):
-            tilt = defect.level.tilt_rad or math.radians(2)
-            towards = rng.uniform(-math.pi, math.pi)
-            by = tilt * math.sqrt(rng.random())
-            at = replace(
-                touch, tilt_x_rad=by * math.cos(towards), tilt_y_rad=by * math.sin(towards)
-            )
-            try:
-                used, instance = defect.sensor or sensor, instance_of(defect, sensor, rng)
-                worse = LevelSensor(used, defect.level, instance=instance)
-                counts = worse.read(scene, at, rng).counts
-                break
-            except ContactError:
-                continue
+        at, counts = touched(scene, reader.sensor, defect, number)
         answer = recognise(reader, reader.signal(counts), number)
-        if not answer:
-            continue
-        dx, dy = answer.x_mm - at.x_mm, answer.y_mm - at.y_mm
-        turn = math.remainder(math.radians(answer.theta_deg) - at.theta_rad, math.tau)
-        if (answer.object, answer.face) != (scene.object_name, scene.face) or math.hypot(
-            dx, dy
-        ) > 2:
-            wrong += 1
-            continue
-        off = np.array([dx, dy, turn])
-        inside += float(off @ np.linalg.solve(answer.covariance, off)) < INSIDE
-        errors.append((math.hypot(dx, dy), math.degrees(turn)))
-    rms = np.sqrt(np.mean(np.square(errors), axis=0)) if errors else np.full(2, math.nan)
-    return len(errors), wrong, float(rms[0]), float(rms[1]), inside / max(len(errors), 1)
+        trial = {"verdict": "rejected", "reason": answer.reason}
+        if answer:
+            turn = math.remainder(math.radians(answer.theta_deg) - at.theta_rad, math.tau)
+            off = np.array([answer.x_mm - at.x_mm, answer.y_mm - at.y_mm, turn])
+            mm, same = math.hypot(*off[:2]), (answer.object, answer.face)
+            right = same == (scene.object_name, scene.face) and mm <= 2
+            trial |= {"verdict": "right" if right else "wrong", "error_mm": mm,
+                      "error_deg": math.degrees(turn),
+                      "chi2": float(off @ np.linalg.solve(answer.covariance, off))}  # fmt: skip
+        trials.append(trial)
+    return runner.outcome(trials)
 
 
 def main() -> None:
     """Print the table."""
-    parser = runner.arguments(__doc__, touches=80)
-    parser.add_argument("--sensor-type", default="fsr-16")
-    given = runner.parse(parser)
+    given = runner.asked(__doc__, touches=80, sensor_type="fsr-16")
     sensor = sensor_type_named(given.sensor_type)
     with tempfile.TemporaryDirectory() as folder:
         database = f"{folder}/lab.db"
@@ -138,11 +130,13 @@ def main() -> None:
             encode(spec | {"output": {"lab_key": "VA11-DATE-0000-0002"}}, database=database,
                    formats=())  # fmt: skip
         reader = Reader(open_lab(database), sensor)
+        scenes = [registered_surface(database, n, f"F{k}") for n in SHAPES for k in (1, 2, 3)]
         runner.table(("dimension", "off by", "right", "wrong", "rms mm / degrees", "inside"))
         for defect in defects(sensor):
-            right, wrong, mm, deg, inside = measure(database, reader, defect, given.touches)
-            runner.row(defect.what, defect.by, f"{right} of {given.touches}", wrong,
-                       f"{mm:.3f} / {deg:.2f}", f"{100 * inside:.0f} %")  # fmt: skip
+            row = measure(scenes, reader, defect, given.touches)
+            runner.row(defect.what, defect.by, f"{row['right']} of {given.touches}", row["wrong"],
+                       f"{row['rms_mm']:.3f} / {row['rms_deg']:.2f}",
+                       f"{100 * row['inside']:.0f} %")  # fmt: skip
 
 
 if __name__ == "__main__":

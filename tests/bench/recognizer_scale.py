@@ -129,9 +129,7 @@ def measured(faces: int, touches: int) -> tuple[object, ...]:
 
 def main() -> None:
     """Print a line for each number of faces."""
-    parser = runner.arguments(__doc__, touches=40)
-    parser.add_argument("--faces", type=int, nargs="+", default=[10, 1000, 100000, 1000000])
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, touches=40, faces=[10, 1000, 100000, 1000000])
     runner.table(("faces", "array", "index, s", "ms a touch", "peak MB", "doubt", "right", "wrong",
                   "rejected"))  # fmt: skip
     for faces in asked.faces:

@@ -7,27 +7,27 @@ Process time on one core, medians; touches are those of `recognizer.validation`,
 
 from __future__ import annotations
 
-import argparse
-import os
-import time
+import sys
+from collections import defaultdict
 from dataclasses import replace
+from pathlib import Path
 
-for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(library, "1")
+import numpy as np
 
-import numpy as np  # noqa: E402
+from recognizer.touch.hypothesis import find_hypotheses
+from recognizer.touch.lab import open_lab
+from recognizer.touch.options import DEFAULTS, Effort
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import read_touch
+from recognizer.touch.signal import signal_of
+from recognizer.touch.symbols.fit import fit_lattices, search_image
+from recognizer.touch.verify import TouchImages, verify_hypotheses
+from recognizer.validation.draw import draw_touch
+from recognizer.validation.touch_plan import TouchPlan
+from recognizer.validation.trial import judge
 
-from recognizer.touch.hypothesis import find_hypotheses  # noqa: E402
-from recognizer.touch.lab import open_lab  # noqa: E402
-from recognizer.touch.options import DEFAULTS, Effort  # noqa: E402
-from recognizer.touch.reader import Reader  # noqa: E402
-from recognizer.touch.recognise import read_touch  # noqa: E402
-from recognizer.touch.signal import signal_of  # noqa: E402
-from recognizer.touch.symbols.fit import fit_lattices, search_image  # noqa: E402
-from recognizer.touch.verify import TouchImages, verify_hypotheses  # noqa: E402
-from recognizer.validation.draw import draw_touch  # noqa: E402
-from recognizer.validation.touch_plan import TouchPlan  # noqa: E402
-from recognizer.validation.trial import judge  # noqa: E402
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
 
 EFFORTS = {
     "1 lattice, 1 + 1 steps": Effort(1, 1, 1, 1),
@@ -38,59 +38,43 @@ EFFORTS = {
 }
 
 
-def clocked(action):
-    start = time.process_time()
-    found = action()
-    return found, 1e3 * (time.process_time() - start)
-
-
 def stages(reader, signals):
     """Return medians of the stages, ms."""
     prepared, first = reader.prepared[0], reader.options.first
     rows = []
     for signal in signals:
-        image, made = clocked(lambda s=signal: reader.image(s, prepared))
-        searches, coarse = clocked(lambda i=image: search_image(i, prepared.bank))
-        found, fitted = clocked(
-            lambda i=image, c=searches: fit_lattices(i, prepared.bank, first, c)
-        )
-        _, placed = clocked(lambda f=found: find_hypotheses(prepared.embossed, f))
-        touch = TouchImages(reader, signal)
-        _, read = clocked(lambda t=touch: verify_hypotheses(t, first))
-        _, whole = clocked(lambda s=signal: read_touch(reader, s))
+        image, made = runner.clocked(reader.image, signal, prepared)
+        searches, coarse = runner.clocked(search_image, image, prepared.bank)
+        found, fitted = runner.clocked(fit_lattices, image, prepared.bank, first, searches)
+        _, placed = runner.clocked(find_hypotheses, prepared.embossed, found)
+        _, read = runner.clocked(verify_hypotheses, TouchImages(reader, signal), first)
+        _, whole = runner.clocked(read_touch, reader, signal)
         rows.append((made, coarse, fitted, placed, read - made - coarse - fitted - placed, whole))
     names = ("image", "coarse search", "refinement", "places", "verification", "whole touch")
     return dict(zip(names, np.median(rows, axis=0), strict=True))
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--database", required=True)
-    parser.add_argument("--touches", type=int, default=40)
-    parser.add_argument("--seed", type=int, default=9)
-    parser.add_argument("--png")
-    options = parser.parse_args()
+    """Print the tables."""
+    options = runner.asked(__doc__, database="lab.db", touches=40, seed=9, png=str)
     reader = Reader(open_lab(options.database))
-    points = {}
+    points = defaultdict(list)
     for level in ("typical", "mismatch"):
         plan = TouchPlan(options.database, options.seed, level)
         touches = [draw_touch(plan, number, reader) for number in range(options.touches)]
         signals = [signal_of(each.counts.astype(float)) for each in touches]
-        print(f"{level}:")
-        for name, ms in stages(reader, signals).items():
-            print(f"  {name:16s} {ms:7.2f} ms")
+        runner.table((level, "ms"), stages(reader, signals).items())
+        runner.table((level, "ms", "rms mm", "right", "wrong"))
         for name, effort in EFFORTS.items():
             one = replace(reader, options=replace(DEFAULTS, first=effort, thorough=effort))
-            found = []
+            found, times = [], []
             for number, (touch, signal) in enumerate(zip(touches, signals, strict=True)):
-                reading, ms = clocked(lambda s=signal, r=one: read_touch(r, s))
-                found.append((judge(plan, number, touch, reading.answer, reader, ms / 1e3), ms))
-            right = [t for t, _ in found if t.verdict == "right"]
-            wrong = sum(t.verdict == "wrong" for t, _ in found)
-            rms = float(np.sqrt(np.mean([t.error_mm**2 for t in right])))
-            ms = float(np.median([m for _, m in found]))
-            points.setdefault(level, []).append((ms, rms, len(right) / len(found), name))
-            print(f"  {name:36s} {ms:7.1f} ms  rms {rms:.3f} mm  right {len(right)}, wrong {wrong}")
+                reading, ms = runner.clocked(read_touch, one, signal)
+                found.append(judge(plan, number, touch, reading.answer, reader, ms / 1e3))
+                times.append(ms)
+            line, ms = runner.outcome(found), float(np.median(times))
+            points[level].append((ms, line["rms_mm"], line["right"] / len(found), name))
+            runner.row(name, ms, line["rms_mm"], line["right"], line["wrong"])
     if options.png:
         draw(points, options.png)
 

@@ -154,12 +154,7 @@ def deviation(found: AsBuilt, true: tuple[float, float, float] | None) -> str:
 
 def main() -> None:
     """Print what each print is taken for, and poses before and after."""
-    parser = runner.arguments(__doc__, touches=30)
-    parser.add_argument("--level", choices=LEVELS, default="typical")
-    parser.add_argument("--only", choices=PRINTS)
-    parser.add_argument("--run", type=Path, help="of validate-set --surfaces printed")
-    parser.add_argument("--panels", type=int, default=12)
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, touches=30, level="typical", only=str, run=Path, panels=12)
     folder, before, after = Path(tempfile.mkdtemp()), [], []
     panels = (
         printed_panels(asked.run, asked.panels) if asked.run else scaled_panels(folder, asked.only)

@@ -48,9 +48,7 @@ def doubt_of_best(reader: Reader, signal: Signal, judged) -> float | None:
 
 def main() -> None:
     """Print a line for each set of touches."""
-    parser = runner.arguments(__doc__, "database", touches=400, seed=7)
-    parser.add_argument("--engine", default="own")
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, "database", touches=400, seed=7, engine="own")
     reader = Reader(open_lab(asked.database))
     limit = reader.options.doubt
     heads = ("of", "likeliest place true", f"and doubt <= {limit:g}", "answered")

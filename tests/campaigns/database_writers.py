@@ -20,13 +20,11 @@ import random
 import select as waiting
 import signal
 import sqlite3
-import subprocess
 import sys
-import tempfile
 import time
-from pathlib import Path
 
 import numpy as np
+import runner
 from sqlalchemy import func, select
 
 from generator.alphabet.known import alphabet_named
@@ -202,6 +200,7 @@ def wrong(url: str, acknowledged: dict[str, str]) -> list[str]:
 
 
 def run(name: str, url: str, chosen: argparse.Namespace) -> int:
+    """Let the writers write, and print what is wrong afterwards."""
     began = time.monotonic()
     writers, kills = campaign(
         url, chosen.writers, chosen.objects, chosen.kill_every, random.Random(chosen.seed)
@@ -212,37 +211,17 @@ def run(name: str, url: str, chosen: argparse.Namespace) -> int:
     if len(acknowledged) != chosen.writers * chosen.objects:
         failures.append(f"{len(acknowledged)} objects are acknowledged")
     races = sum(writer.lost_races for writer in writers)
-    print(
-        f"{name}: {chosen.writers} writers x {chosen.objects} objects in {spent:.0f} s, {kills} "
-        f"kills, {races} races lost and placed anew, {len(acknowledged)} acknowledged, "
-        f"{len(failures)} failures",
-        flush=True,
-    )
-    for failure in failures[:20]:
-        print("  " + failure)
+    print(f"{name}: {chosen.writers} writers x {chosen.objects} objects in {spent:.0f} s, {kills} "
+          f"kills, {races} races lost and placed anew, {len(acknowledged)} acknowledged, "
+          f"{len(failures)} failures", *failures[:20], sep="\n  ", flush=True)  # fmt: skip
     return 1 if failures else 0
 
 
 def main() -> int:
-    options = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    options.add_argument("--engine", choices=("sqlite", "postgresql", "both"), default="both")
-    options.add_argument("--writers", type=int, default=8)
-    options.add_argument("--objects", type=int, default=100, help="of each writer")
-    options.add_argument("--kill-every", type=float, default=0.3, help="mean, seconds")
-    options.add_argument("--seed", type=int, default=1)
-    chosen = options.parse_args()
-    code = 0
-    if chosen.engine != "postgresql":
-        with tempfile.TemporaryDirectory() as folder:
-            code |= run("sqlite", str(Path(folder) / "lab.db"), chosen)
-    if chosen.engine != "sqlite":
-        script = Path(__file__).parents[1] / "postgres.py"
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        with subprocess.Popen([sys.executable, script], text=True, **pipes) as server:
-            code |= run("postgresql", server.stdout.readline().strip(), chosen)
-    return code
+    """Run on each engine; `--kill-every` in seconds on average, `--objects` of each writer."""
+    chosen = runner.asked(__doc__, engine="both", seed=1, writers=8, objects=100, kill_every=0.3)
+    with runner.databases(chosen.engine) as urls:
+        return max(run(name, url, chosen) for name, url in urls.items())
 
 
 if __name__ == "__main__":

@@ -1,18 +1,21 @@
-"""Kill `encode-object` by signal 9 at random moments and look at what is left.
+"""Stop `encode-object` and `validate-set` at random moments and look at what is left.
 
     python tests/campaigns/interrupted.py --times 50 --seed 1
+    python tests/campaigns/interrupted.py --validate SPEC.yaml --touches 2000 --shard 100 --times 10
 
-After every kill: no file under its final name differs from the one that an undisturbed
-run writes, the database opens, and it knows the object with all its rows or not at all.
-Afterwards one undisturbed run must make the same bytes as ever. Exit code 1 otherwise.
+After every kill of `encode-object` by signal 9: no file under its final name differs from the one
+that an undisturbed run writes, the database opens, and it knows the object with all its rows or not
+at all; one more run makes the same bytes as ever. A run of `validate-set` is killed (with all its
+processes) or interrupted by Ctrl-C again and again and resumed to its end: the same bytes as
+without. Exit code 1 otherwise. `tests/loop/test_validate_set.py` does it in small.
 """
 
 from __future__ import annotations
 
 import argparse
 import hashlib
+import os
 import random
-import shutil
 import signal
 import sqlite3
 import subprocess
@@ -21,16 +24,19 @@ import tempfile
 import time
 from pathlib import Path
 
-SPEC = "name: Cube\nshape: {cube: 60 mm}\n"
+import runner
+
+SPEC = "name: Cube\nshape: {cube: 60 mm}\noutput: {lab_key: VA11-DATE-0000-0002}\n"
 ROWS = ("vertices", "faces", "edges", "placements", "cells", "parts", "provenance")
+COMPARED = ("shards/touches/*.parquet", "trials.parquet", "results.json")
 
 
-def command(folder: Path) -> list[str]:
-    database = f"sqlite:///{folder / 'lab.db'}"
-    entry = "from generator.command import main; main()"
-    spec = str(folder / "cube.yaml")
-    out = str(folder / "out")
-    return [sys.executable, "-c", entry, spec, "-o", out, "--database", database]
+def begin(folder: Path) -> list[str]:
+    """Write the spec into a new folder; return the command that makes it there."""
+    folder.mkdir()
+    (folder / "cube.yaml").write_text(SPEC)
+    return runner.command("generator", folder / "cube.yaml", "-o", folder / "out", "--database",
+                          f"sqlite:///{folder / 'lab.db'}")  # fmt: skip
 
 
 def digests(folder: Path) -> dict[str, str]:
@@ -52,9 +58,9 @@ def registered(folder: Path) -> dict[str, int]:
 
 
 def wrong(folder: Path, truth: dict[str, str], rows: dict[str, int]) -> list[str]:
-    seen = digests(folder)
+    """Return what a killed run left that may not be."""
+    seen, now = digests(folder), registered(folder)
     torn = [name for name, digest in seen.items() if truth.get(name) != digest]
-    now = registered(folder)
     if now not in ({}, rows):
         torn.append(f"half an object in the database: {now} of {rows}")
     if seen and not now:
@@ -62,50 +68,83 @@ def wrong(folder: Path, truth: dict[str, str], rows: dict[str, int]) -> list[str
     return torn
 
 
+def kill_encoding(root: Path, times: int, rng: random.Random) -> list[str]:
+    """Kill `encode-object` so often; return what was wrong."""
+    reference, began = root / "reference", time.monotonic()
+    subprocess.run(begin(reference), check=True, capture_output=True)
+    whole = time.monotonic() - began
+    truth, rows = digests(reference), registered(reference)
+    outcome, failures = {"without": 0, "with": 0, "finished": 0}, []
+    for i in range(times):
+        folder = root / f"{i:03d}"
+        command = begin(folder)
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        # Half of the kills fall into the last third, where things are written.
+        time.sleep(whole * (rng.uniform(0.6, 1.0) if i % 2 else rng.uniform(0.0, 1.0)))
+        process.kill()
+        killed = process.wait() == -signal.SIGKILL
+        failures += [f"kill {i}: {what}" for what in wrong(folder, truth, rows)]
+        outcome["finished" if not killed else "with" if registered(folder) else "without"] += 1
+        again = subprocess.run(command, capture_output=True, text=True, check=False)
+        if again.returncode or digests(folder) != truth:
+            failures.append(f"kill {i}: the next run did not mend it: {again.stderr}")
+        left = [p.name for p in (folder / "out").iterdir() if p.name not in truth]
+        failures += [f"kill {i}: {name} stays behind" for name in left]
+    print(f"{times} kills over {whole:.2f} s: object in the database after {outcome['with']}, not "
+          f"after {outcome['without']}, {outcome['finished']} had finished")  # fmt: skip
+    return failures
+
+
+def stop_validation(root: Path, asked: argparse.Namespace, rng: random.Random) -> list[str]:
+    """Stop and resume a run of `validate-set`; return the files that differ from those without."""
+    mine, like = root / "mine", root / "whole"
+    work = runner.command(
+        "recognizer.validation", asked.validate, "--touches", asked.touches, "--study", 0,
+        "--seed", asked.seed, "--shard", asked.shard, "-j", asked.jobs, "-o",
+    )  # fmt: skip
+    start = time.monotonic()
+    subprocess.run([*work, str(like)], check=True)
+    seconds = time.monotonic() - start
+
+    def going_on() -> list[str]:
+        return [*work, str(mine), *(["--resume"] if (mine / "asked.json").exists() else [])]
+
+    for number in range(asked.times):
+        process = subprocess.Popen(going_on(), start_new_session=True, stderr=subprocess.DEVNULL)
+        wait = rng.uniform(0.1, 1.5) * seconds / asked.times
+        how = rng.choice((signal.SIGKILL, signal.SIGINT))
+        try:
+            process.wait(wait)
+        except subprocess.TimeoutExpired:
+            if how == signal.SIGKILL:
+                os.killpg(process.pid, how)
+            else:
+                process.send_signal(how)
+        code, made = process.wait(), len(list(mine.glob(COMPARED[0])))
+        print(f"{number + 1:3d}  {how.name:8s} after {wait:6.1f} s: exit code {code:4d}, "
+              f"{made} shards", flush=True)  # fmt: skip
+    subprocess.run(going_on(), check=True)
+    whole = [path for pattern in COMPARED for path in sorted(like.glob(pattern))]
+    pairs = [(path, mine / path.relative_to(like)) for path in whole]
+    print(f"{len(whole)} files compared")
+    return [a.name for a, b in pairs if not b.exists() or a.read_bytes() != b.read_bytes()]
+
+
 def main() -> int:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--times", type=int, default=50)
-    options.add_argument("--seed", type=int, default=1)
-    chosen = options.parse_args()
-    rng = random.Random(chosen.seed)
-    root = Path(tempfile.mkdtemp(prefix="interrupted-"))
-    try:
-        reference = root / "reference"
-        reference.mkdir()
-        (reference / "cube.yaml").write_text(SPEC)
-        began = time.monotonic()
-        subprocess.run(command(reference), check=True, capture_output=True)
-        whole = time.monotonic() - began
-        truth, rows = digests(reference), registered(reference)
-        outcome = {"without": 0, "with": 0, "finished": 0}
-        failures: list[str] = []
-        for i in range(chosen.times):
-            folder = root / f"{i:03d}"
-            folder.mkdir()
-            (folder / "cube.yaml").write_text(SPEC)
-            process = subprocess.Popen(
-                command(folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-            )
-            # Half of the kills fall into the last third, where things are written.
-            time.sleep(whole * (rng.uniform(0.6, 1.0) if i % 2 else rng.uniform(0.0, 1.0)))
-            process.send_signal(signal.SIGKILL)
-            killed = process.wait() == -signal.SIGKILL
-            failures += [f"kill {i}: {what}" for what in wrong(folder, truth, rows)]
-            outcome["finished" if not killed else "with" if registered(folder) else "without"] += 1
-            again = subprocess.run(command(folder), capture_output=True, text=True, check=False)
-            if again.returncode or digests(folder) != truth:
-                failures.append(f"kill {i}: the next run did not mend it: {again.stderr}")
-            left = [p.name for p in (folder / "out").iterdir() if p.name not in truth]
-            failures += [f"kill {i}: {name} stays behind" for name in left]
-        print(f"{chosen.times} kills over {whole:.2f} s: object in the database after "
-              f"{outcome['with']}, not after {outcome['without']}, "
-              f"{outcome['finished']} had finished; {len(failures)} failures")  # fmt: skip
-        for failure in failures:
-            print("  " + failure)
-        return 1 if failures else 0
-    finally:
-        shutil.rmtree(root)
+    """Run as the options say."""
+    asked = runner.asked(
+        __doc__, times=50, seed=1, validate="", touches=2000, shard=1000, jobs=2
+    )  # fmt: skip
+    rng = random.Random(asked.seed)
+    with tempfile.TemporaryDirectory(prefix="interrupted-") as name:
+        if asked.validate:
+            failures = stop_validation(Path(name), asked, rng)
+        else:
+            failures = kill_encoding(Path(name), asked.times, rng)
+    print("\n  ".join([f"{len(failures)} failures", *failures]))
+    return 1 if failures else 0
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where the shell ignores it
     sys.exit(main())

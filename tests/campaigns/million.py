@@ -161,11 +161,8 @@ def run(asked: argparse.Namespace, finished: dict[str, dict[str, Any]]) -> None:
 
 def main() -> int:
     """Run what is left and print the table."""
-    parser = runner.arguments(__doc__, output=True, touches=1_000_000, jobs=1)
-    parser.add_argument("--prints", type=Path, help="printed surfaces of the forty objects")
-    parser.add_argument("--small-prints", type=Path, help="those of the small ones")
-    parser.add_argument("--table", action="store_true", help="of the touches that are there")
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, output=True, touches=1_000_000, jobs=1, prints=Path,
+                         small_prints=Path, table=False)  # fmt: skip
     asked.output = asked.output.absolute()
     summary = asked.output / SUMMARY
     finished = json.loads(summary.read_text()) if summary.exists() else {}

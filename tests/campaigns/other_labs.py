@@ -47,9 +47,7 @@ LIMITS = (math.inf, 1e-2, 1e-3, 1e-4)
 
 def main() -> None:
     """Touch what is not touched yet, and print the tables."""
-    parser = runner.arguments(__doc__, output=True, touches=0, seed=18)
-    parser.add_argument("--own", type=int, default=0, help="touches of the lab's own parts")
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, output=True, touches=0, own=0, seed=18)
     own, others = make_labs(asked.output, asked.seed)
     reader = Reader(open_lab(own), options=ReaderOptions(doubt=math.inf))
     for name, labs, number in (("touches", others, asked.touches), ("own", [own], asked.own)):

@@ -127,9 +127,7 @@ def table(folder: Path) -> None:
 
 
 def main() -> None:
-    parser = runner.arguments(__doc__, output=True)
-    parser.add_argument("--table", action="store_true", help="of the runs that are there")
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, output=True, table=False)
     for symbols, world in [] if asked.table else cells():
         print(f"{symbols.name} {world.name}", flush=True)
         run(symbols, world, asked.output)

@@ -1,6 +1,6 @@
 """Print one panel of each profile on several printers in simulation; how symbols come out.
 
-    python tests/campaigns/printed.py [-o docs/printed] [--size 60]
+    python tests/campaigns/printed.py [--pictures docs/printed] [--size 60]
     python tests/campaigns/printed.py --size 40 --pitches 4,4.5,5,5.5,6    # of profile large
 
 Prints a table (docs/printed.md holds it) and writes one picture for each combination. Needs
@@ -49,11 +49,7 @@ def panel(profile: str, pitch: str, size_mm: float, folder: Path) -> tuple[Objec
 
 
 def main() -> None:
-    options = runner.arguments(__doc__)
-    options.add_argument("-o", "--output", type=Path)
-    options.add_argument("--size", type=float, default=60.0)
-    options.add_argument("--pitches", default="", help="of profile large, in place of profiles")
-    asked = runner.parse(options)
+    asked = runner.asked(__doc__, pictures=Path, size=60.0, pitches="")
     panels = [("large", pitch) for pitch in asked.pitches.split(",")] if asked.pitches else SPECS
     runner.table(("profile", "print", "faults", "symbols", "overlap", "worst", "lost %",
                   "widened %", "height mm", "moved mm", "survive", "lost"))  # fmt: skip
@@ -82,9 +78,9 @@ def main() -> None:
                         sum(c.verdict == SURVIVES for c in checks),
                         sum(c.verdict == LOST for c in checks),
                     )  # fmt: skip
-                    if asked.output:
-                        asked.output.mkdir(parents=True, exist_ok=True)
-                        picture = asked.output / f"{profile}-{machine}-{faults}.png"
+                    if asked.pictures:
+                        asked.pictures.mkdir(parents=True, exist_ok=True)
+                        picture = asked.pictures / f"{profile}-{machine}-{faults}.png"
                         names = [glyph.name for glyph in plan.alphabet.glyphs]
                         title = f"{profile} on {machine}, faults {faults}"
                         picture.write_bytes(check_png(title, tiles, names))

@@ -147,11 +147,8 @@ class Touched:
 
 
 def main() -> None:
-    parser = runner.arguments(__doc__, output=True, seed=25)
-    parser.add_argument("--rounds", type=int, default=100, help="touches of each face")
-    parser.add_argument("--sensor-type", default=USUAL_SENSOR.name, metavar="T")
-    parser.add_argument("--save", action="store_true", help="the table, as the one that ships")
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, output=True, seed=25, rounds=100,
+                         sensor_type=USUAL_SENSOR.name, save=False)  # fmt: skip
     sensor = sensor_type_named(asked.sensor_type)
     touches = list(map(_touched, touch_faces(asked.output, asked.rounds, asked.seed, sensor)))
     if sensor.name != USUAL_SENSOR.name:

@@ -100,15 +100,12 @@ def compare(name: str, touches: Array, sensor: SensorType) -> None:
 
 
 def main() -> None:
-    parser = runner.arguments(__doc__)
-    parser.add_argument("folder", type=Path, help="-o of sensor_types.py")
-    parser.add_argument("--save", action="store_true", help="what ships")
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, "folder", save=False)
     runner.table(("type", "loaded", "touches", "usual sensor's", "promised", "answered"))
     kept = {}
     for name in shipped_names():
         sensor = sensor_type_named(name)
-        touches = touches_of(asked.folder / name, sensor)
+        touches = touches_of(Path(asked.folder) / name, sensor)
         if not len(touches):
             continue
         compare(name, touches, sensor)

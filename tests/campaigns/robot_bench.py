@@ -252,10 +252,7 @@ def tabulate_moves(lines: list[dict[str, Any]]) -> None:
 
 def main() -> None:
     """Run the trials that are left, and print the tables."""
-    parser = runner.arguments(__doc__, output=True, seed=1)
-    parser.add_argument("--trials", type=int, default=67)
-    parser.add_argument("--more", type=int, default=5)
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, output=True, seed=1, trials=67, more=5)
     folder = asked.output.with_suffix("")
     folder.mkdir(parents=True, exist_ok=True)
     made_before = (folder / "bench.db").exists()

@@ -1,8 +1,7 @@
 """What every campaign and benchmark does: options, processes, rows that resume, tables.
 
-    parser = runner.arguments(__doc__, "database", seed=7, touches=400, jobs=2)
-    options = runner.parse(parser)                  # with one BLAS thread
-    rows = runner.resume(file, jobs, work, options.jobs)
+    asked = runner.asked(__doc__, "database", seed=7, touches=400, jobs=2)
+    rows = runner.resume(file, jobs, work, asked.jobs)
     runner.table(("level", "right"), lines)
 
 A script imports it by `import runner`, one of `tests/bench` after
@@ -16,9 +15,12 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack, contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, TypeVar
@@ -31,35 +33,54 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 INSIDE_CHI2 = 7.814727903251179  #: 95 % quantile of chi2 with 3 degrees of freedom: x, y, turn
 
 
-def arguments(
-    doc: str | None, *names: str, output: bool = False, seed: int | None = None,
-    touches: int | None = None, jobs: int | None = None,
-) -> argparse.ArgumentParser:  # fmt: skip
-    """Return a parser that knows positional `names` and the usual options.
+def asked(doc: str | None, *names: str, output: bool = False, **options: Any) -> argparse.Namespace:
+    """Return the options of a script; it starts again with one BLAS thread if it has more.
 
-    `doc` is that of the script; `output`: it needs a folder or file, `-o`. Of `--seed`, `--touches`
-    and `-j` the defaults are given; None: no such option.
+    `names` are positional; `output`: a folder or file is needed, `-o`. Each of `options` is
+    `--NAME` with its default: False a switch, a list several values, a type no default.
     """
-    parser = argparse.ArgumentParser(description=(doc or "").splitlines()[0])
+    shown = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=doc, formatter_class=shown)
     for name in names:
         parser.add_argument(name)
     if output:
         parser.add_argument("-o", "--output", type=Path, required=True)
-    if seed is not None:
-        parser.add_argument("--seed", type=int, default=seed)
-    if touches is not None:
-        parser.add_argument("--touches", type=int, default=touches)
-    if jobs is not None:
-        parser.add_argument("-j", "--jobs", type=int, default=jobs, help="processes")
-    return parser
-
-
-def parse(parser: argparse.ArgumentParser) -> argparse.Namespace:
-    """Return the options; the script starts again with one BLAS thread if it has more."""
-    options = parser.parse_args()
+    for name, default in options.items():
+        flags = ("-j", "--jobs") if name == "jobs" else (f"--{name.replace('_', '-')}",)
+        if default is False:
+            parser.add_argument(*flags, action="store_true")
+        elif isinstance(default, list):
+            parser.add_argument(*flags, type=type(default[0]), nargs="*", default=default)
+        elif isinstance(default, type):
+            parser.add_argument(*flags, type=default)
+        else:
+            parser.add_argument(*flags, type=type(default), default=default)
+    given = parser.parse_args()
     if any(name not in os.environ for name in ONE_THREAD):
         os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | ONE_THREAD)
-    return options
+    return given
+
+
+def clocked(work: Callable[..., Result], *values: Any) -> tuple[Result, float]:
+    """Return what `work` makes of the values, and its processor time (ms)."""
+    start = time.process_time()
+    made = work(*values)
+    return made, 1e3 * (time.process_time() - start)
+
+
+@contextmanager
+def databases(engine: str, *options: str) -> Iterator[dict[str, str]]:
+    """Give new databases by name: `sqlite`, `postgresql` or `both`; options of `postgres.py`."""
+    with ExitStack() as stack:
+        urls = {}
+        if engine != "postgresql":
+            urls["sqlite"] = stack.enter_context(tempfile.TemporaryDirectory()) + "/lab.db"
+        if engine != "sqlite":
+            command = [sys.executable, str(Path(__file__).parents[1] / "postgres.py"), *options]
+            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+            server = stack.enter_context(subprocess.Popen(command, text=True, **pipes))
+            urls["postgresql"] = server.stdout.readline().strip()
+        yield urls
 
 
 def in_processes(

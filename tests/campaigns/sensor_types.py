@@ -1,8 +1,8 @@
 """Every shipped sensor type on symbols of the pitch that it proposes: right, wrong, refused.
 
-    python tests/campaigns/sensor_types.py -o out/types -j 2  # an hour; goes on where it was
-    python tests/campaigns/sensor_types.py -o out/types --rounds 1 fsr-8x8  # 500 touches of a type
-    python tests/campaigns/sensor_types.py -o out/types --table             # of what is there
+    python tests/campaigns/sensor_types.py -o out/types -j 2
+    python tests/campaigns/sensor_types.py -o out/types --rounds 1 --types fsr-8x8
+    python tests/campaigns/sensor_types.py -o out/types --table # of what is there
 
 Rounds of 500 touches a type, each with its own seed, so that all types have about as many whenever
 it is stopped: the usual kinds (faces, edges, corners, worn, blank and foreign surfaces) and levels
@@ -132,17 +132,13 @@ def table(folder: Path, names: list[str]) -> None:
 
 def main() -> None:
     """Run what is asked for and print the table."""
-    parser = runner.arguments(__doc__, output=True, jobs=1)
-    parser.add_argument("types", nargs="*", default=list(shipped_names()))
-    parser.add_argument("--rounds", type=int, default=10)
-    parser.add_argument("--worlds", default=",".join(WORLDS), help="own,mujoco,printed")
-    parser.add_argument("--table", action="store_true", help="of the runs that are there")
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, output=True, jobs=1, types=list(shipped_names()), rounds=10,
+                         worlds=list(WORLDS), table=False)  # fmt: skip
     folder = asked.output.absolute()
     runs = [
         (number, world, name)
         for number in range(0 if asked.table else asked.rounds)
-        for world in asked.worlds.split(",")
+        for world in asked.worlds
         for name in asked.types
         if WORLDS[world].serves(name)
     ]

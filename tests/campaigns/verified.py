@@ -2,13 +2,16 @@
 
     pip install lib3mf
     python tests/campaigns/verified.py --convex 300 --other 50 --seed 1 -j 2 -o verified.jsonl
+    python tests/campaigns/verified.py --symbols 30 --seed 7 -o symbols   # by slices
 
 Random shapes are made as panels, every second one as a whole body too. STEP is read by the CAD
 kernel (one valid solid, volume against the closed form), STL by pymeshlab (closed, two-manifold, no
 triangle cuts another), both 3MF of each plate by the library of the 3MF Consortium in strict mode;
 a GLB is welded by equal coordinates (no edge open or shared by more than two triangles); panels are
 put together by `T_object_part` and may neither overlap nor come nearer than the gap. Refused shapes
-are counted with their reason. Exit code 1 when a file fails.
+are counted with their reason. With `--symbols` written STL panels of so many shapes are cut at half
+the height of their symbols: an outline stands where the layout says, and is held against others of
+the same label by area, length and centroid in its own axes. Exit code 1 when a file fails.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 import runner
+from manifold3d import Manifold, Mesh
 
 from generator.errors import GeneratorError
 from generator.export.check import PanelFile, verify_fit, verify_step, verify_stl
@@ -38,6 +42,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from random_shapes import random_convex, random_nonconvex
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
+SAME = 0.02  #: mm, mm2: outlines of one label differ by less
+APART = 0.05  #: outlines of two labels differ by more
+NEAR = 0.45  #: of the pitch: from where it should stand
 
 
 def random_spec(kind: str, seed: int, number: int, folder: Path, parts: str = "panels") -> Path:
@@ -141,12 +148,91 @@ def model_faults(content: bytes, folder: Path) -> list[str]:
     return [str(reader.GetWarning(k)) for k in range(reader.GetWarningCount())]
 
 
+def solid_of(stl: bytes) -> Manifold:
+    """Return binary STL as a solid."""
+    count = int.from_bytes(stl[80:84], "little")
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+    corners = np.frombuffer(stl, record, count, 84)["corners"].reshape(-1, 3)
+    points, numbers = np.unique(corners, axis=0, return_inverse=True)
+    return Manifold(Mesh(points.astype(np.float32), numbers.reshape(-1, 3).astype(np.uint32)))
+
+
+def outline_of(loop: np.ndarray) -> tuple[float, np.ndarray, float]:
+    """Return signed area, centroid and length of a closed line."""
+    x, y = loop.T
+    ahead_x, ahead_y = np.roll(x, -1), np.roll(y, -1)
+    cross = x * ahead_y - ahead_x * y
+    area = cross.sum() / 2
+    centre = np.array([((x + ahead_x) * cross).sum(), ((y + ahead_y) * cross).sum()]) / 6 / area
+    return float(area), centre, float(np.hypot(ahead_x - x, ahead_y - y).sum())
+
+
+def count_symbols(spec: Path, counts: Counter[str]) -> None:
+    """Check all panels of a spec."""
+    plan = plan_object(read_specs([spec])[0])
+    layout = lay_out_object(plan, NO_CELLS)
+    parts, _ = parts_of(plan, layout)
+    style = plan.spec.style
+    shown: dict[int, np.ndarray] = {}
+    for part, face in zip(parts, layout.faces, strict=True):
+        solid = solid_of(b"".join(stl_chunks(triangles(part))))
+        cut = solid.slice(plan.spec.wall_mm + 0.5 * style.height_mm).to_polygons()
+        outlines = [outline_of(np.asarray(loop)) for loop in cut]
+        outlines = [outline for outline in outlines if outline[0] > 0]
+        counts["panels"] += 1
+        counts["symbols"] += len(face.labels)
+        used: set[int] = set()
+        own = [embossing for embossing in part.embossings if embossing.face is not None]
+        for at, label in zip(face.centres_mm, face.labels.tolist(), strict=True):
+            place = at + own[0].T_part_facet[:2, 3]
+            reach = NEAR * style.pitch_mm
+            near = [
+                k
+                for k, (_, centre, _) in enumerate(outlines)
+                if k not in used and np.hypot(*(centre - place)) < reach
+            ]
+            if len(near) != 1:
+                counts["missing"] += 1
+                continue
+            used.add(near[0])
+            area, centre, length = outlines[near[0]]
+            turn = own[0].rotation_rad
+            c, s = np.cos(turn), np.sin(turn)
+            x, y = centre - place
+            found = np.array([area, length, c * x + s * y, c * y - s * x])
+            counts["wrong"] += bool(label in shown and np.abs(shown[label] - found).max() > SAME)
+            shown.setdefault(label, found)
+        counts["extra"] += len(outlines) - len(used)
+    for one in shown:
+        for other in shown:
+            alike = one < other and np.abs(shown[one] - shown[other]).max() < APART
+            counts["labels that look alike"] += bool(alike)
+
+
+def find_symbols(shapes: int, seed: int) -> int:
+    """Slice panels of so many random shapes of the default profile and print what was found."""
+    counts: Counter[str] = Counter(missing=0, extra=0, wrong=0)
+    number = 0
+    with tempfile.TemporaryDirectory() as folder:
+        while counts["shapes"] < shapes:
+            kind = "other" if number % 3 == 2 else "convex"
+            spec = random_spec(kind, seed, number, Path(folder))
+            spec.write_text(spec.read_text().replace("profile: large\n", ""))
+            number += 1
+            try:
+                count_symbols(spec, counts)
+                counts["shapes"] += 1
+            except GeneratorError:
+                counts["refused"] += 1
+    print(", ".join(f"{counts[name]} {name}" for name in counts))
+    return 1 if counts["missing"] or counts["extra"] or counts["wrong"] else 0
+
+
 def main() -> int:
     """Make what is asked for and print the figures."""
-    parser = runner.arguments(__doc__, output=True, seed=1, jobs=2)
-    parser.add_argument("--convex", type=int, default=300)
-    parser.add_argument("--other", type=int, default=50)
-    asked = runner.parse(parser)
+    asked = runner.asked(__doc__, output=True, seed=1, jobs=2, convex=300, other=50, symbols=0)
+    if asked.symbols:
+        return find_symbols(asked.symbols, asked.seed)
     with tempfile.TemporaryDirectory() as name:
         paths = sorted((FIXTURES / "specs").glob("*.yaml"))
         for kind, count in (("other", asked.other), ("convex", asked.convex)):

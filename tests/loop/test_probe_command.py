@@ -15,6 +15,7 @@ import sys
 import termios
 import time
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 import pytest
@@ -45,15 +46,8 @@ def started(*words, **named):
 
 
 @pytest.fixture
-def asked(capsys):
-    """Run a command in this process: code, stdout, stderr."""
-
-    def ask(*words):
-        capsys.readouterr()
-        code = run([str(word) for word in words])
-        return code, *capsys.readouterr()
-
-    return ask
+def asked(ask):
+    return partial(ask, run)
 
 
 def wait_for(what, timeout_s=SHORT_S):
@@ -127,13 +121,13 @@ def test_a_recording_killed_by_signal_9_is_repaired(asked, tmp_path):
 class Terminal:
     """A command on a terminal of its own."""
 
-    def __init__(self, *words, columns=90):
+    def __init__(self, *words, columns=90, **environment):
         self.master, slave = pty.openpty()
         fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("4H", 24, columns, 0, 0))
         known = {name: os.environ[name] for name in os.environ if name not in ("NO_COLOR",)}
         self.process = subprocess.Popen(
             [*COMMAND, *map(str, words)], stdin=slave, stdout=slave, stderr=slave,
-            env={**known, "TERM": "xterm-256color"}, start_new_session=True,
+            env={**known, "TERM": "xterm-256color", **environment}, start_new_session=True,
             preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # Ctrl-C goes to it
         )  # fmt: skip
         os.close(slave)
@@ -297,9 +291,12 @@ def test_a_calibration_is_guided_through_the_firmware(asked, emulated, tmp_path)
     assert np.load(npy)[5:].mean(axis=0).sum() == pytest.approx(150, rel=0.03)
 
 
-def test_live_shows_that_the_probe_went_away_and_came_back(emulated):
-    with Terminal("live", emulated.url, columns=110) as terminal:
+def test_live_without_colours_shows_that_the_probe_went_away_and_came_back(emulated):
+    with Terminal("live", emulated.url, columns=110, NO_COLOR="1") as terminal:
         terminal.until("of FSR-uno, 10 bits")
+        terminal.until(r"[.:=+*#@-]{3}")
+        terminal.read()
+        assert not re.search(r"\x1b\[[34]8;", terminal.text)
         emulated.fault("unplug 0.5")
         terminal.until("the device went away; it is tried again")
         terminal.until("the port is open again after")

@@ -55,16 +55,6 @@ def test_an_average_leaves_spikes_out_and_knows_slow_noise():
     assert np.median(average_frames(slow).sigma) > 3 * np.median(average_frames(plain).sigma)
 
 
-def test_a_law_without_noise_is_found_exactly():
-    force = np.repeat(np.array([0.05, 0.1, 0.4, 1.0, 2.5])[:, None], 3, axis=1)
-    gain, exponent, broken = np.array([1e-4, 3e-5, 2e-4]), np.array([1, 0.7, 1.4]), [0.01, 0, 0.03]
-    read = law_s(force, gain, exponent, np.array(broken))
-    found = fit_laws(force, read, 1e-3 * read, read > 0, np.zeros(3, bool))
-    np.testing.assert_allclose(found.gain_s, gain, rtol=1e-4)
-    np.testing.assert_allclose(found.exponent, exponent, rtol=1e-4)
-    np.testing.assert_allclose(found.break_n, broken, atol=1e-5)
-
-
 def test_the_covariance_is_the_scatter_of_repeated_fits():
     rng = np.random.default_rng(0)
     force = np.repeat(np.array([0.1, 0.2, 0.5, 1.0, 2.0])[:, None], 3000, axis=1)

@@ -155,14 +155,6 @@ def test_six_decades_of_conductance_against_fifty_digits(name):
     assert np.abs(error).max() <= 1e-13  # asked: 1.7e-10
 
 
-def test_a_batch_is_what_its_networks_are_alone():
-    batch = np.stack(list(scenes(4).values()))
-    alone = [effective_resistances(g) for g in batch]
-    np.testing.assert_allclose(effective_resistances(batch), alone, rtol=1e-13)
-    alone = [transconductances(g, 0.1, 0.3) for g in batch]
-    np.testing.assert_allclose(transconductances(batch, 0.1, 0.3), alone, rtol=1e-12)
-
-
 def test_a_divider_by_hand():
     g = np.array([[1.0, 2.0], [3.0, 4.0]])
     current = transconductances(g, 0.0, 0.5)

@@ -4,6 +4,7 @@ import io
 import json
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -48,15 +49,8 @@ def bench(tmp_path_factory):
 
 
 @pytest.fixture
-def asked(capsys):
-    """Run a command: code, stdout, stderr."""
-
-    def ask(*words):
-        capsys.readouterr()
-        code = run([str(word) for word in words])
-        return code, *capsys.readouterr()
-
-    return ask
+def asked(ask):
+    return partial(ask, run)
 
 
 HEAVY = [
@@ -251,15 +245,20 @@ def test_bias_warns_of_drift_with_code_1(asked, bench):
 
 
 def test_touch_i_is_the_same_among_any_number_of_touches(asked, tmp_path):
-    for number in (1, 3):
-        words = ["--touches", number, "--noise", "quiet", "-o", tmp_path / f"{number}.h5"]
-        assert (
-            asked("simulate", "washer", "--overlay", "pad", "--accuracy", "footprint", *words)[0]
-            == 0
-        )
+    """What is given is so in all of them, what is not is drawn anew for each."""
+    for n in (1, 3):
+        given = ["simulate", "washer", "--overlay", "pad", "--accuracy", "footprint", "--x", "1.5"]
+        files = [tmp_path / f"{n}.{kind}" for kind in ("h5", "json", "png")]
+        more = zip(("-o", "--truth", "--png"), files, strict=True)
+        words = ["--touches", n, "--noise", "quiet", *(word for pair in more for word in pair)]
+        assert asked(*given, *words)[0] == 0
+        assert files[2].read_bytes().startswith(b"\x89PNG")
     few, many = (Recording(tmp_path / f"{n}.h5").block().counts for n in (1, 3))
     assert (few[0] == many[0]).all()
     assert not (many[0] == many[1]).all()
+    truth = json.loads((tmp_path / "3.json").read_text())["touches"]
+    assert [one["x_mm"] for one in truth] == [1.5] * 3
+    assert len({one["y_mm"] for one in truth}) == 3
 
 
 def test_boards_from_text():

@@ -110,6 +110,8 @@ def test_files_without_images_are_refused(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((70, 32, 32)))
     refused(tmp_path / "a.npy", r"no array of images \(N, 16, 16\) in it, but a \(70, 32, 32\)")
     refused(tmp_path / "a.npy", "give the --sensor-type mat-32x32, or reshape it")
+    np.savez(tmp_path / "two.npz", left=COUNTS, time=np.arange(70))
+    refused(tmp_path / "two.npz", "no array of images 'up' in it, but left", dataset="up")
     np.save(tmp_path / "b.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     refused(tmp_path / "b.npy", "it holds objects")
     np.save(tmp_path / "c.npy", COUNTS + 1j)

@@ -172,15 +172,6 @@ def test_faces_and_steps_that_are_none():
 # --- poses ------------------------------------------------------------------------------
 
 
-def test_a_touch_is_where_the_sensor_stands():
-    T = surface_to_sensor(12, -3, 0.7, 5)
-    touch = touch_at(T, 80)
-    assert (touch.x_mm, touch.y_mm, touch.theta_rad) == pytest.approx((12, -3, 0.7))
-    points = np.array([(1.0, 2.0), (-3.0, 0.5)])
-    on_plane = T @ np.vstack([points.T, [0, 0], [1, 1]])
-    assert touch.on_surface(points) == pytest.approx(on_plane[:2].T)
-
-
 def test_tilts_are_those_of_the_contact_models():
     a, b = 0.02, -0.03
     about_x = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
@@ -188,7 +179,8 @@ def test_tilts_are_those_of_the_contact_models():
     T = surface_to_sensor(1, 2, 0.5, 3)
     T[:3, :3] = T[:3, :3] @ about_x @ about_y
     touch = touch_at(T, 1)
-    assert (touch.theta_rad, touch.tilt_x_rad, touch.tilt_y_rad) == pytest.approx((0.5, a, b))
+    assert (touch.x_mm, touch.y_mm, touch.theta_rad) == pytest.approx((1, 2, 0.5))
+    assert (touch.tilt_x_rad, touch.tilt_y_rad) == pytest.approx((a, b))
     for x, y in ((10, 0), (0, 10), (-7, 4)):
         height = (T @ [x, y, 0, 1])[2]
         assert height == pytest.approx(3 + a * y - b * x, abs=2e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from encoded_objects.base.sensor_type_file import (
     sensor_type_named,
     shipped_names,
 )
+from probe.command import run
 from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.recording.read import Recording
@@ -106,6 +108,17 @@ def test_an_overlay_is_taken_as_usual():
     assert flexitac.with_overlay("tab") is flexitac
     assert SensorType(overlay=Overlay(kind="pad")).with_overlay("tab") == SensorType()
     assert pad.with_overlay("tab").overlay.tab_diameter_mm == pytest.approx(1.2666 * 2 / 1.5875)
+
+
+def test_ports_are_read_as_of_the_type_that_is_given(tmp_path, capsys):
+    recording, given = tmp_path / "a.h5", ["--sensor-type", "fsr-8x8"]
+    assert run(["record", "sim:", "-o", str(recording), "--frames", "2", *given]) == 0
+    held = Recording(recording)
+    assert (held.sensor_type().name, held.shape) == ("fsr-8x8", (8, 8))
+    assert run(["live", "sim:", "--seconds", "0.1", "--json", *given]) == 0
+    capsys.readouterr()
+    assert run(["info", "sim:", "--seconds", "0.1", "--json", *given]) == 0
+    assert json.loads(capsys.readouterr().out)["ident"]["columns"] == 8
 
 
 def test_frames_of_another_shape_are_not_recorded(tmp_path):

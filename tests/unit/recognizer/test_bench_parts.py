@@ -39,7 +39,6 @@ from recognizer.bench.message import FILTERS, filter_image, mosaic_message
 from recognizer.bench.reading import (
     AGAIN_S,
     RESTLESS_S,
-    PendingFrame,
     ReadTrigger,
     RecognitionThread,
 )
@@ -235,28 +234,6 @@ def newest(board, topic="touch"):
     """Return the newest message of a topic; None if there is none."""
     told = [json.loads(text) for text in board.news(Subscriber()) if isinstance(text, str)]
     return next((message for message in told if message["topic"] == topic), None)
-
-
-def test_a_touch_begins_without_the_answer_of_the_last_one():
-    board = Broker()
-    log = TouchLog(board)
-    log.begin(frame_of(1), 1e3)
-    assert (newest(board)["number"], newest(board)["state"]) == (1, "felt")
-    log.read(frame_of(2))
-    assert newest(board)["state"] == "reading"
-    log.conclude({"object": "Cube", "next": {"dx_mm": 3.0}}, answered=True)
-    assert newest(board)["answer"]["object"] == "Cube"
-    assert log.newest_answer()["next"] == {"dx_mm": 3.0}
-    log.move()
-    assert newest(board)["moving"]
-    log.begin(frame_of(3), 2e3)
-    told = newest(board)
-    assert (told["number"], told["answer"], told["moving"]) == (2, None, False)
-    log.read(frame_of(3))
-    log.conclude({"object": None}, answered=False)
-    log.lift()
-    assert (newest(board)["state"], newest(board)["contact"]) == ("refused", False)
-    assert [one["number"] for one in log.all()] == [1, 2]
 
 
 def test_what_was_only_brushed_leaves_no_record():
@@ -467,25 +444,6 @@ def thread():
     thread = RecognitionThread("", SensorType(), Broker())
     yield thread
     thread.close()
-
-
-def test_a_load_that_is_still_on_when_the_calibration_ends_is_no_touch(thread):
-    def look(value, *, load=False):
-        thread._read(PendingFrame(pressed(value), None, 0.0, load))
-        return [one["contact"] for one in thread.touches.all()]
-
-    assert look(900, load=True) == []
-    assert look(900) == []  # the calibration is made, the load still on
-    assert look(800) == []
-    assert look(0) == []
-    assert look(900) == [True]
-    assert look(0) == []  # it was not read
-
-
-def test_a_touch_of_a_recording_tells_when_in_it(thread):
-    thread._read(PendingFrame(pressed(900), None, 5.0, False, "mine.h5", 1.25))
-    (record,) = thread.touches.all()
-    assert (record["recording"], record["at_s"]) == ("mine.h5", 1.25)
 
 
 def test_images_are_flipped_for_all_but_the_recording(thread, tmp_path):

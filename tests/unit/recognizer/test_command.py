@@ -4,6 +4,7 @@ import json
 import math
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -70,16 +71,10 @@ def images(lab):
 
 
 @pytest.fixture
-def asked(capsys, lab, monkeypatch):
-    """Run the command beside the database: code, stdout, stderr."""
+def asked(ask, lab, monkeypatch):
+    """Run the command beside the database."""
     monkeypatch.chdir(lab)
-
-    def ask(*words):
-        capsys.readouterr()
-        code = run([str(word) for word in words])
-        return code, *capsys.readouterr()
-
-    return ask
+    return partial(ask, run)
 
 
 def assert_at(entry, touch, face="F1", mm=0.15, degrees=0.6):
