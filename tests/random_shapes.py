@@ -59,16 +59,8 @@ def extruded(
 ) -> Polyhedron:
     """Return a prism over a polygon with holes, or its frustum towards the z axis.
 
-    Parameters
-    ----------
-    loops
-        (k, 2) mm each; the outer loop counter-clockwise, then holes, clockwise.
-    height
-        mm, along z.
-    taper
-        Scale of the top about the origin; 1 makes a prism. Sides stay planar.
-    pose
-        Rotation (3, 3) to apply; none by default.
+    Loops are (k, 2) mm, the outer one counter-clockwise, then holes, clockwise. The top is scaled
+    by `taper` about the origin, all is turned by `pose` (3, 3). Faces: top, bottom, sides.
     """
     flat = np.concatenate(loops)
     bottom = np.column_stack([flat, np.zeros(len(flat))])

@@ -6,19 +6,14 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from reference.cube_panels import embossed
 from reference.indenters import half_plane
 
 from encoded_objects.base.sensor_type import Overlay, SensorType, choose_sensor_type
-from generator.alphabet.known import alphabet_named
-from generator.alphabet.outline import SymbolStyle, outlines
-from generator.array.profiles import profile
 from generator.export.meshes import stl_chunks
 from generator.export.step import step_chunks
-from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import cube
 from generator.polyhedron.winged import polyhedron
-from generator.printers import printer_named
-from generator.solid.panels import panels
 from generator.solid.triangulate import triangles
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.press import LEVELS, press
@@ -104,12 +99,7 @@ def far_panel():
     """A panel of a cube whose corner stands at (1000, 1000, 1000) mm."""
     near = cube(36.0)
     far = polyhedron("far", near.vertices + 1000.0, near.faces)
-    tiers = outlines(alphabet_named("dense-4"), SymbolStyle(chamfer_mm=0.0))
-    half = max(float(np.abs(ring).max()) for symbol in tiers for ring in symbol.rings[0])
-    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in far.faces]
-    nothing = np.zeros(0, np.int64)
-    layout = lay_out(far, profile().array(), 7.0, half, clearances, (nothing, nothing))
-    return panels(far, layout, tiers, 3.0, printer_named("fdm-0.4"), name="Far").parts[0]
+    return embossed(far, name="Far")[0]
 
 
 def test_case_10_a_file_in_its_own_frame_keeps_the_facets(far_panel):

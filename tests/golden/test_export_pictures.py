@@ -12,8 +12,8 @@ from PIL import Image
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.export.array_svg import FaceOnArray, array_svg
-from generator.export.colours import ANSWERED_RGB, BODY_RGB
-from generator.export.preview import HEIGHT, WIDTH, preview_png
+from generator.export.colours import ANSWERED_RGB
+from generator.export.preview import preview_png
 from generator.export.raster import rasterise
 from generator.layout.placement import FaceLayout, Placement
 from generator.polyhedron.shapes import cube
@@ -46,15 +46,6 @@ def texts(picture: ET.Element) -> list[str]:
 
 def uses(picture: ET.Element) -> set[tuple[float, float]]:
     return {(float(u.get("x", "")), float(u.get("y", ""))) for u in picture.iter(f"{SVG}use")}
-
-
-def test_each_cell_of_a_face_has_its_glyph() -> None:
-    picture = drawn(63, 65, face(10, 20, 63, 65))
-    assert uses(picture) == {(c + 0.5, r + 0.5) for r in range(7, 11) for c in range(20, 24)}
-    assert texts(picture)[0] == "A & B"
-    assert texts(picture).count("F1") == 1
-    outline = next(p for p in picture.iter(f"{SVG}path") if p.get("stroke-width") == "0.16")
-    assert outline.get("d") == "M20 11 24 11 24 7 20 7z"
 
 
 def test_a_face_over_the_corner_of_the_torus_appears_four_times() -> None:
@@ -95,38 +86,23 @@ def body_parts() -> list[Part]:
     return [Part("Cube", shape.vertices, facets, (), np.eye(4))]
 
 
-def test_the_preview_shows_a_plain_body_twice_on_paper() -> None:
-    parts = body_parts()
-    data = preview_png("Würfel", (60.0, 60.0, 60.0), parts, [triangles(p) for p in parts])
-    image = np.asarray(Image.open(io.BytesIO(data)))
-    assert image.shape == (HEIGHT, WIDTH, 3)
-    for half in (image[:, : WIDTH // 2], image[:, WIDTH // 2 :]):
-        body = np.unique(half[150:600, 100:500].reshape(-1, 3), axis=0, return_counts=True)
-        large = body[0][body[1] > 5000].astype(float)
-        assert len(large) >= 3  # three faces in three shades
-        tint = np.array(BODY_RGB) / np.linalg.norm(BODY_RGB)
-        for shade in large:
-            assert shade @ tint / np.linalg.norm(shade) > 0.999
-
-
 def test_faces_are_coloured_by_what_they_answer() -> None:
     parts = body_parts()
     meshes = [triangles(p) for p in parts]
     names = [facet.name for facet in parts[0].facets]
-    plain, low, high = (
-        np.asarray(Image.open(io.BytesIO(preview_png("C", (60, 60, 60), parts, meshes, shares))))
-        for shares in ({}, dict.fromkeys(names, (0.0, 0.5)), dict.fromkeys(names, (1.0, 1.0)))
-    )
-    for picture, rgb in ((low, ANSWERED_RGB[0]), (high, ANSWERED_RGB[2])):
+
+    def pixels(shares: dict[str, tuple[float, float]]) -> np.ndarray:
+        picture = preview_png("C", (60, 60, 60), parts, meshes, shares)
+        return np.asarray(Image.open(io.BytesIO(picture)))
+
+    plain = pixels({})
+    for share, rgb in (((0.0, 0.5), ANSWERED_RGB[0]), ((1.0, 1.0), ANSWERED_RGB[2])):
+        picture = pixels(dict.fromkeys(names, share))
         body = np.unique(picture[150:600, 100:500].reshape(-1, 3), axis=0, return_counts=True)
         shades = body[0][(body[1] > 5000) & (body[0] < 250).any(axis=1)].astype(float)  # no label
         assert len(shades) >= 3
         tint = np.array(rgb) / np.linalg.norm(rgb)
         assert all(shade @ tint / np.linalg.norm(shade) > 0.999 for shade in shades)
         assert (picture[50:80, 480:900] != plain[50:80, 480:900]).any()  # the legend
-    one = np.asarray(
-        Image.open(
-            io.BytesIO(preview_png("C", (60, 60, 60), parts, meshes, {names[0]: (0.0, 0.4)}))
-        )
-    )
+    one = pixels({names[0]: (0.0, 0.4)})
     assert (one[90:640] == plain[90:640]).all(axis=2).mean() > 0.6  # the other faces stay grey

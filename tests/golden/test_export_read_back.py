@@ -48,15 +48,14 @@ def part(request: pytest.FixtureRequest) -> Part:
 def engraved(part: Part) -> Part:
     """Return the part with its symbols cut in: every height turned about, narrower below."""
 
-    def turned(embossing):
-        tiers = tuple(
-            replace(symbol, z_mm=tuple(-z / 4 for z in symbol.z_mm)) for symbol in embossing.tiers
-        )
-        return replace(embossing, tiers=tiers)
+    def turned(symbol):
+        return replace(symbol, z_mm=tuple(-z / 4 for z in symbol.z_mm))
 
-    return replace(
-        part, embossings=tuple(e if e.face is None else turned(e) for e in part.embossings)
+    embossings = (
+        e if e.face is None else replace(e, tiers=tuple(map(turned, e.tiers)))
+        for e in part.embossings
     )
+    return replace(part, embossings=tuple(embossings))
 
 
 def written(part: Part, folder: Path) -> tuple[Path, Path]:
@@ -184,7 +183,7 @@ def test_3mf_passes_the_strict_reader(panel: Part, grouping: str, tmp_path: Path
     boxes = []
     while items.MoveNext():
         item = items.GetCurrent()
-        box = model.GetBuildItems and item.GetObjectResource().GetOutbox()
+        box = item.GetObjectResource().GetOutbox()
         shift = item.GetObjectTransform().Fields[3]
         boxes.append(
             [(box.MinCoordinate[i] + shift[i], box.MaxCoordinate[i] + shift[i]) for i in range(3)]

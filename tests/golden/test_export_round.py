@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-import numpy as np
 import pytest
+from reference.laid_symbols import layout_on_round_face
 
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.export.check import BENT_VOLUME, verify_step
 from generator.export.step import step_chunks
-from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.read import read_shape
 from generator.polyhedron.shapes import cone, cylinder
 from generator.solid import emboss_whole
@@ -30,20 +29,9 @@ SOLIDS = {
 
 def part_of(name, chamfer_mm=0.0):
     solid, centres, rotation = SOLIDS[name]
-    style = SymbolStyle(chamfer_mm=chamfer_mm)
-    tiers = outlines(alphabet_named("dense-4"), style)
-    none = np.empty(0, np.int64)
-    faces = [
-        FaceLayout(k, Placement(0, 0, 0.0, 0.0, 0.0), none, none, none, np.empty((0, 2)), 0)
-        for k in range(len(solid.faces))
-    ]
-    numbers = np.arange(len(centres))
-    carrier = solid.surfaces[0].carrier
-    faces[carrier] = FaceLayout(
-        carrier, Placement(0, 0, rotation, 0.0, 0.0), numbers, numbers, numbers + 1,
-        np.array(centres).reshape(-1, 2), 1,
-    )  # fmt: skip
-    return emboss_whole(solid, Layout("faces", style.pitch_mm, tuple(faces)), tiers, name)
+    tiers = outlines(alphabet_named("dense-4"), SymbolStyle(chamfer_mm=chamfer_mm))
+    layout = layout_on_round_face(solid, centres, range(1, len(centres) + 1), rotation)
+    return emboss_whole(solid, layout, tiers, name)
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,10 @@
-"""What README, CONTRIBUTING and the guide show runs, beside a registered cube."""
+"""What README, CONTRIBUTING, the guide and docs/examples show runs, and says what it promises."""
 
 from __future__ import annotations
 
+import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "docs" / "examples"
 BLOCKS = {
     f"{document.name}:{number}": code
     for document in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs/apriltag.md")
@@ -19,13 +22,20 @@ BLOCKS = {
 }
 
 
-@pytest.fixture
-def lab(tmp_path):
+@pytest.fixture(scope="module")
+def encoded(tmp_path_factory):
+    """A folder with the database of a registered cube."""
     from generator import encode
 
+    folder = tmp_path_factory.mktemp("lab")
     cube = ROOT / "fixtures" / "cube.yaml"
-    encode(cube, database=str(tmp_path / "lab.db"), folder=tmp_path / "out", formats=())
-    return tmp_path
+    encode(cube, database=str(folder / "lab.db"), folder=folder / "out", formats=())
+    return folder
+
+
+@pytest.fixture
+def lab(encoded, tmp_path):
+    return shutil.copytree(encoded, tmp_path, dirs_exist_ok=True)
 
 
 @pytest.mark.parametrize("block", BLOCKS)
@@ -56,3 +66,96 @@ def test_the_glossary_points_to_modules_that_are_there():
     places = re.findall(r"`(\w+/[\w/]+\.py)`", (ROOT / "docs" / "glossary.md").read_text())
     assert len(places) > 30
     assert [place for place in places if not (ROOT / place).is_file()] == []
+
+
+def said_by(script: str, folder: Path) -> str:
+    command = [sys.executable, str(EXAMPLES / f"{script}.py")]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+# What scripts say, where that is soon said.
+SAID = {
+    "decode_windows": r"row 1, column 61 \(t = 2206\)\n.*\n2206\n.*Cube/F1\n",
+    "encode_set": r"Cube:.*\nBox-1:.*\nBox-2:(?s:.*)\n\d+ of 65535 cells in use\n(?s:.*)",
+    "follow_port": r"(?s:.*)Cube/F1(?s:.*)",
+    "report": r"40 touches: \d+ right, 0 wrong, (?s:.*)True\n",
+    "scan": r"(?s:.*)touches: Plate\n",
+}
+
+
+@pytest.mark.parametrize("script", SAID)
+def test_example(script, tmp_path):
+    assert re.fullmatch(SAID[script], said_by(script, tmp_path))
+
+
+def test_build123d_bracket(tmp_path):
+    said = said_by("build123d_bracket", tmp_path)
+    before, after = map(int, re.findall(r"(?:volume|drilled) (\d+)", said))
+    assert 60 * 30 * 12 + 12 * 30 * 24 < before < 1.15 * (60 * 30 * 12 + 12 * 30 * 24)
+    # A hole of 3 mm through 12 mm, and through symbols of 1 mm where it meets them.
+    assert 84 < before - after < 100
+    assert {path.suffix for path in (tmp_path / "out" / "bracket").iterdir()} == {
+        ".html", ".png", ".stl", ".svg",
+    }  # fmt: skip
+
+
+def test_cadquery_wedge(tmp_path):
+    said = said_by("cadquery_wedge", tmp_path)
+    assert " on 6 panels" in said
+    extents = [float(n) for n in re.findall(r"([\d.]+) x ([\d.]+) x ([\d.]+) mm", said)[0]]
+    # Symbols on both sides; on the slanted top they end below its highest edge.
+    assert extents[0] == 51.6
+    assert extents[1] == 41.6
+    assert 40.0 < extents[2] < 41.6
+
+
+def test_simulate_and_read(tmp_path):
+    said = said_by("simulate_and_read", tmp_path)
+    assert "Cube/F3" in said.splitlines()[1]
+    assert float(re.findall(r"off by ([\d.]+) mm", said)[0]) < 0.1
+
+
+def test_read_recording(tmp_path):
+    said = said_by("read_recording", tmp_path).splitlines()
+    assert said[0] == "touches.h5: 40 frames, by simulated/tab"
+    assert len(said) == 6
+    assert sum("Cube/F2" in line for line in said) >= 3
+
+
+def test_ros2_node(tmp_path):
+    said = said_by("ros2_node", tmp_path)
+    x, y, z = (float(n) for n in re.findall(r"'[xyz]': ([-\d.e]+)", said))
+    assert said.startswith("Cube ")
+    assert (x**2 + y**2 + z**2) ** 0.5 < 0.02  # the origin is the middle of the face, in metres
+
+
+def test_own_sensor_data(tmp_path):
+    said = said_by("own_sensor_data", tmp_path).splitlines()
+    assert said[0].startswith("mine.h5: 2 frames")
+    assert ["Cube/F4" in line for line in said[1:]] == [True, True], said
+
+
+def test_trimesh_part(tmp_path):
+    (symbols,) = re.findall(r"^Block: 6 faces, (\d+) symbols", said_by("trimesh_part", tmp_path))
+    assert 320 < int(symbols) < 350  # of 5 mm; how faces are laid out depends on the lab's array
+
+
+def test_mujoco_bench(tmp_path):
+    """Three objects on a table, found by touch alone; poses as the simulator has them."""
+    told = [json.loads(line) for line in said_by("mujoco_bench", tmp_path).splitlines()]
+    assert [one["answer"] for one in told] == [one["object"] for one in told]
+    assert {one["object"] for one in told} == {"Cube", "Box", "Prism"}
+    assert max(one["position_mm"] for one in told) < 2.0
+    assert max(one["turn_deg"] for one in told) < 2.0
+    assert max(one["chi2"] for one in told) < 22.5  # 1 of 1,000 lies beyond
+
+
+def test_examples_are_short_and_all_shown_and_run():
+    scripts = {path.stem: path.read_text() for path in EXAMPLES.glob("*.py")}
+    long = {stem for stem, text in scripts.items() if text.count("\n") > 30}
+    assert long == {"mujoco_bench"}  # a world
+    shown = re.findall(r"examples/(\w+)\.py", (EXAMPLES.parent / "examples.md").read_text())
+    assert sorted(shown) == sorted(scripts)
+    assert {f"test_{stem}" for stem in scripts if stem not in SAID} <= set(globals())

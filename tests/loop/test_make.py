@@ -17,7 +17,6 @@ from generator.spec import read_specs
 ROOT = Path(__file__).parents[2]
 SPECS = ROOT / "fixtures" / "specs"
 GOLDEN = json.loads((ROOT / "fixtures" / "golden.json").read_text())
-ENTRY = "from generator.command import main; main()"
 
 
 def made(folder: Path, text: str, **options: object):
@@ -32,10 +31,6 @@ def registered(folder: Path, name: str):
         open_database(f"sqlite:///{folder / 'lab.db'}", writable=False)
     ) as connection:
         return read_object(connection, name)
-
-
-def digests(folder: Path) -> dict[str, str]:
-    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.iterdir())}
 
 
 def thesis_array() -> np.ndarray:
@@ -111,44 +106,3 @@ def test_placements_map_cells_to_symbol_centres(tmp_path):
         assert np.abs(u[:, 0] - (columns + 0.5) * p).max() < 1e-9
         assert ((rows + place.row) % 51 == face.rows).all()
         assert ((columns + place.column) % 1285 == face.columns).all()
-
-
-def test_registered_spec_gives_its_files_again_and_other_objects_other_cells(tmp_path):
-    text = "name: A\nshape: {cube: 40 mm}\n"
-    first = made(tmp_path, text, formats=("stl",))
-    before = digests(tmp_path / "out")
-    for path in (tmp_path / "out").iterdir():
-        path.unlink()
-    other = made(tmp_path, "name: B\nshape: {cube: 40 mm}\n", formats=("stl",))
-    again = made(tmp_path, text, formats=("stl",))
-    after = digests(tmp_path / "out")
-    assert again.objects[0].reused
-    assert not other.objects[0].reused
-    assert {name: after[name] for name in before} == before
-    a, b = (registered(tmp_path, name).layout.faces for name in "AB")
-    cells = [set(zip(f.rows.tolist(), f.columns.tolist(), strict=True)) for f in (*a, *b)]
-    assert sum(map(len, cells)) == len(set().union(*cells)) == again.used_cells
-    assert first.objects[0].symbols + other.objects[0].symbols == again.used_cells
-
-
-def test_dry_run_tells_what_will_be_made_and_writes_nothing(tmp_path):
-    text = "objects:\n- {name: A, shape: {cube: 40 mm}}\n- {name: B, shape: {cube: 40 mm}}\n"
-    dry = made(tmp_path, text, dry_run=True)
-    assert [path.name for path in tmp_path.iterdir()] == ["spec.yaml"]
-    done = made(tmp_path, text, formats=("stl",))
-    assert [(o.name, o.symbols, o.places, o.parts) for o in dry.objects] == [
-        (o.name, o.symbols, o.places, o.parts) for o in done.objects
-    ]
-    assert dry.used_cells == done.used_cells
-    of_set = {"spec-packing.csv", "spec-overview.pdf", "spec-build.html"}
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"A", "B", *of_set}
-
-
-def test_verified_files_are_kept_and_known(tmp_path):
-    result = made(tmp_path, "name: Cube\nshape: {cube: 30 mm}\n", verify=True)
-    cube = registered(tmp_path, "Cube")
-    assert len(cube.parts) == 12
-    for part in cube.parts:
-        file = tmp_path / part.file  # the database stands in this folder
-        assert file in result.objects[0].files
-        assert hashlib.sha256(file.read_bytes()).hexdigest() == part.sha256

@@ -22,6 +22,7 @@ ARRAY = PROFILES["one-touch"].array()
 CELLS = ARRAY.rows * ARRAY.columns
 SOLID = tetrahedron(60.0)
 
+engines = st.sampled_from(["sqlite", "sqlite", "sqlite", "postgresql"])  # a server is slow
 floats = st.floats(allow_nan=False, allow_infinity=False)
 positive = st.floats(min_value=1e-300, max_value=1e300)
 names = st.text(st.characters(blacklist_categories=["Cs"], blacklist_characters="\0"), min_size=1)
@@ -70,17 +71,10 @@ def registrations(draw):
     )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=30)
-@given(registration=registrations())
-def test_everything_comes_back_bit_for_bit(database_on, registration):
-    with database_on("sqlite") as url:
-        comes_back(open_database(url), registration)
-
-
-@settings(deadline=None, max_examples=8)
-@given(registration=registrations())
-def test_everything_comes_back_bit_for_bit_from_a_server(database_on, registration):
-    with database_on("postgresql") as url:
+@settings(deadline=None, max_examples=38)
+@given(engine=engines, registration=registrations())
+def test_everything_comes_back_bit_for_bit(database_on, engine, registration):
+    with database_on(engine) as url:
         comes_back(open_database(url), registration)
 
 
@@ -131,17 +125,10 @@ def small(name, first, count):
     )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=20)
-@given(steps=steps)
-def test_objects_never_share_a_cell(database_on, steps):
-    with database_on("sqlite") as url:
-        shares_no_cell(open_database(url), steps)
-
-
-@settings(deadline=None, max_examples=5)
-@given(steps=steps)
-def test_objects_on_a_server_never_share_a_cell(database_on, steps):
-    with database_on("postgresql") as url:
+@settings(deadline=None, max_examples=25)
+@given(engine=engines, steps=steps)
+def test_objects_never_share_a_cell(database_on, engine, steps):
+    with database_on(engine) as url:
         shares_no_cell(open_database(url), steps)
 
 

@@ -90,5 +90,3 @@ def test_database_gives_array_prior_object_and_face(tmp_path, monkeypatch, capsy
     assert run([worn, "--method", "likelihood", "--database", "lab.db", "--doubt", "0.05"]) == 0
     assert "Small, face F4" in capsys.readouterr().out
     assert run([text, "--database", "lab.db", "--profile", "thesis"]) == 2
-    assert run([text, "--database", "none.db"]) == 4
-    assert "none.db" in capsys.readouterr().err

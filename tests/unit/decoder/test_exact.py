@@ -1,28 +1,18 @@
-"""Exact conversion at every size and field, and at its edges."""
+"""Exact conversion at every size and field, at its edges, and on a lab's own array."""
 
 import numpy as np
 import pytest
+from reference.windows import every_window, windows_at
 
-from decoder import MethodError, WindowError, decode_exact, strength, strength_of_window
-from generator.array import PROFILES, array_from
+from decoder import MethodError, WindowError, decode, decode_exact, strength, strength_of_window
+from decoder.any_method import array_of_profile
+from decoder.errors import DecoderError
+from generator.array import PROFILES, array_from, profile
 from generator.array.polynomial import search_primitive
+from generator.errors import LabKeyError
 
 ROBUST = array_from({"family": "prba", "polynomial": "0x1655", "rows": 63, "columns": 65})
 METHODS = ("table", "serial", "milestones", "logarithm")
-
-
-def every_window(array, shape):
-    rows, columns = np.indices((array.rows, array.columns)).reshape(2, -1)
-    return rows, columns, windows_at(array, rows, columns, shape)
-
-
-def windows_at(array, rows, columns, shape):
-    rows = [[[(int(r) + i) % array.rows for i in range(shape[0])]] for r in rows]
-    columns = [[[(int(c) + j) % array.columns for j in range(shape[1])]] for c in columns]
-    return array.symbols(
-        np.array(rows, np.uint64).reshape(-1, shape[0], 1),
-        np.array(columns, np.uint64).reshape(-1, 1, shape[1]),
-    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -186,3 +176,41 @@ def test_any_set_of_cells():
     everywhere = np.indices((63, 65)).reshape(2, -1)
     words = ROBUST.symbols(everywhere[0][:, None] + cells[0], everywhere[1][:, None] + cells[1])
     assert able.distance == np.count_nonzero(words, axis=1).min()
+
+
+KEY = "0123-4567-89AB-CDER"
+
+
+@pytest.fixture(scope="module", params=["one-touch", "large"])
+def keyed(request):
+    return profile(request.param).array_of_lab(KEY)
+
+
+@pytest.mark.parametrize("method", ["table", "logarithm"])
+def test_exact_methods(keyed, method):
+    rng = np.random.default_rng(3)
+    rows, columns = (rng.integers(size, size=50) for size in (keyed.rows, keyed.columns))
+    windows = windows_at(keyed, rows, columns, keyed.window)
+    found = decode_exact(keyed, windows, method)
+    assert found.answered.all()
+    np.testing.assert_array_equal(found.rows, rows)
+    np.testing.assert_array_equal(found.columns, columns)
+
+
+def test_the_window_that_no_place_shows_is_the_one_of_the_term_0(keyed):
+    assert keyed.permutation[0] != 0
+    empty = np.full(keyed.window, keyed.permutation[0])
+    assert not decode_exact(keyed, empty).answered.any()
+    assert decode_exact(keyed, np.zeros(keyed.window, np.int64)).answered.all()
+
+
+def test_a_key_says_whose_array(keyed):
+    windows = windows_at(keyed, [5], [7], keyed.window)
+    name = "one-touch" if keyed.rows == 63 else "large"
+    own = decode(windows[0], profile=name, lab_key=KEY)
+    published = decode(windows[0], profile=name)
+    assert (own.row, own.column) != (published.row, published.column)
+    with pytest.raises(DecoderError, match="the same array in every lab"):
+        array_of_profile("thesis", KEY)
+    with pytest.raises(LabKeyError):
+        array_of_profile("one-touch", "0123")

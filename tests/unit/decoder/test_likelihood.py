@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from reference.windows import every_window
 
 from decoder import Likelihood, MethodError, WindowError, decode_good_tuple, decode_likelihood
 from decoder.ordered import Ordered
@@ -20,12 +21,6 @@ ARRAYS = {
     "product": PROFILES["product"].array(),
     "one row": array_from({"family": "prbs", "order": 2, "degree": 8}),
 }
-
-
-def every_window(array, shape):
-    rows, columns = np.indices((array.rows, array.columns)).reshape(2, -1)
-    a, b = np.indices(shape)
-    return rows, columns, array.symbols(rows[:, None, None] + a, columns[:, None, None] + b)
 
 
 @pytest.mark.parametrize("name", ARRAYS)

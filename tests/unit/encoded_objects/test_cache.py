@@ -24,16 +24,11 @@ def test_made_once_and_read_back():
     assert [file.name for file in cache_folder("kind").iterdir()] == ["key"]
 
 
-def test_deleted_at_any_time():
+@pytest.mark.parametrize("damaged", [None, b"", b"abc", b"\0\0\0\0content"])
+def test_deleted_or_damaged_file_is_made_again(damaged):
     cached_bytes("kind", "key", lambda: b"content")
-    (cache_folder("kind") / "key").unlink()
-    assert cached_bytes("kind", "key", lambda: b"again") == b"again"
-
-
-@pytest.mark.parametrize("damaged", [b"", b"abc", b"\0\0\0\0content"])
-def test_damaged_file_is_made_again(damaged):
-    cached_bytes("kind", "key", lambda: b"content")
-    (cache_folder("kind") / "key").write_bytes(damaged)
+    file = cache_folder("kind") / "key"
+    file.unlink() if damaged is None else file.write_bytes(damaged)
     assert cached_bytes("kind", "key", lambda: b"content") == b"content"
     assert cached_bytes("kind", "key", never) == b"content"
 

@@ -1,15 +1,18 @@
-"""A command's process: what its start leaves out, its help page, and how it ends."""
+"""A command: its process, its help page, its options, declared once for it and for Python."""
 
 import json
 import subprocess
 import sys
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import pytest
 from typer.testing import CliRunner
 
 from encoded_objects.base import console
-from encoded_objects.base.options import Argument, Option, command
+from encoded_objects.base.errors import UsageError
+from encoded_objects.base.options import Argument, Json, Option, Options, command
 
 PROGRAM = """
 import gc, json, os, sys
@@ -94,12 +97,67 @@ def test_errors_beside_help_are_told(capsys):
     assert "four" in capsys.readouterr().err
 
 
-def test_stand_ins_are_gone_afterwards(monkeypatch):
-    for name in (*console.UNUSED_BY_HELP, "typer.rich_utils"):
-        monkeypatch.delitem(sys.modules, name, raising=False)
-    monkeypatch.setitem(console.UNUSED_BY_HELP, "rich.markdown", ())  # typer asks for it
-    console._import_help_page()
-    assert not set(console.UNUSED_BY_HELP) & set(sys.modules)
-    from rich.markdown import Markdown
+@dataclass(frozen=True, slots=True)
+class CookOptions(Options):
+    """What is cooked, and how."""
 
-    assert Markdown("*x*").parsed
+    dish: Annotated[Path | None, Argument("What to cook.", "DISH")] = None
+    heat: Annotated[str, Option("How hot.", choices=("low", "medium", "high"))] = "low"
+    pots: Annotated[int, Option("How many pots.", "N", names=("-p", "--pots"), least=1)] = 2
+    keep_warm: Annotated[bool, Option("Go on at low heat.")] = False
+    as_json: Json = False
+
+    def check(self) -> None:
+        if self.keep_warm and self.heat != "low":
+            raise UsageError("--keep-warm needs low heat")
+
+
+taken: list[object] = []
+kitchen = console.application()
+
+
+@command(kitchen, version_of="do", parts=lambda: {"stove": "gas"})
+def cook(options: CookOptions, salt: Annotated[float, Option("Grams.")] = 1.5) -> int:
+    """Cook."""
+    taken.append((options, salt))
+    return 0 if options.dish else 1
+
+
+def run(*words: str) -> int:
+    taken.clear()
+    return console.run("do", lambda _: kitchen, list(words), bare=True)
+
+
+def test_fields_and_parameters_are_options():
+    assert run("soup", "--heat", "high", "-p", "3", "--json", "--salt", "2") == 0
+    assert taken == [(CookOptions(Path("soup"), "high", 3, as_json=True), 2.0)]
+    assert run() == 1
+    assert taken == [(CookOptions(), 1.5)]
+
+
+def test_checks_hold_for_python_too():
+    with pytest.raises(UsageError, match="give low, medium or high"):
+        CookOptions(heat="hot")
+    with pytest.raises(UsageError, match="needs low heat"):
+        CookOptions(heat="high", keep_warm=True)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["soup"], ["--pots=4", "soup", "--salt", ".5"], ["-p", "7", "--keep-warm", "--json"],
+     ["--heat", "low", "--heat", "high"], []],
+)  # fmt: skip
+def test_a_plain_line_is_read_as_typer_reads_it(words):
+    taken.clear()
+    kitchen.read_plain(words)()
+    kitchen.for_typer()(words, standalone_mode=False)()
+    assert taken[0] == taken[1]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["soup", "stew"], ["--pots", "0"], ["--pots", "many"], ["--pots", "1" * 5000], ["--nope"],
+     ["-p3"], ["--heat"], ["--json=yes"], ["--salt", "-1"], ["--", "soup"], ["--keep-war"]],
+)  # fmt: skip
+def test_all_else_is_left_to_typer(words):
+    assert kitchen.read_plain(words) is None

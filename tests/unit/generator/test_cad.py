@@ -50,7 +50,9 @@ def test_the_same_solid_again_keeps_its_cells_and_another_is_refused(tmp_path):
     assert again.layout.faces[0].rows.tolist() == first.layout.faces[0].rows.tolist()
     with pytest.raises(DatabaseError, match="another spec"):
         encoded(tmp_path, block(31.0))
-    assert not encoded(tmp_path, block(31.0), replace=True).reused
+    replaced = encoded(tmp_path, block(31.0), replace=True)
+    assert not replaced.reused
+    assert replaced.layout.faces[0].placement == first.layout.faces[0].placement  # freed for it
 
 
 def test_settings_are_those_of_a_spec_and_errors_name_them(tmp_path):

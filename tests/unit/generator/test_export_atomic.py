@@ -98,15 +98,6 @@ def test_leftovers_of_a_killed_process_are_removed_and_those_of_a_living_one_kep
     assert [path.name for path in tmp_path.iterdir()] == ["b.stl"]
 
 
-def test_a_file_where_the_folder_should_be(tmp_path: Path) -> None:
-    (tmp_path / "out").write_bytes(b"")
-    for folder in (tmp_path / "out", tmp_path / "out" / "cube"):
-        with pytest.raises(GeneratorError) as caught, Staging(folder):
-            pass
-        assert caught.value.place == str(folder)
-        assert "-o" in caught.value.fix
-
-
 def test_a_folder_under_the_name_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "a.stl").mkdir()
     with (

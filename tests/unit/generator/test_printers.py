@@ -62,7 +62,6 @@ def test_own_printers_count_by_their_values_known_ones_by_their_names(tmp_path) 
 @pytest.mark.parametrize(
     ("text", "place", "fix"),
     [
-        ("ender3", "c.yaml:3:18", "did you mean 'ender-3'?"),
         ("{like: ender-3, layers: 1}", "c.yaml:3:34", "did you mean 'layer'?"),
         ("{bed: 300 mm}", "c.yaml:3:24", "write bed: 250 x 210 mm"),
         ("mine.yaml", "mine.yaml:1:1", "did you mean 'layer'?"),

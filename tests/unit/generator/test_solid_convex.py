@@ -28,22 +28,20 @@ def box(x, y, z, at=(0, 0, 0)):
     return Manifold.cube((x, y, z)).translate(at)
 
 
-def test_a_convex_body_is_its_own_piece():
-    found = convex_pieces(*mesh_of(box(3, 4, 5)))
-    assert volumes(found) == pytest.approx([60])
+@pytest.mark.parametrize(
+    ("body", "pieces"),
+    [
+        (lambda: box(3, 4, 5), [60]),
+        # a channel: its two sides meet nothing but the floor, no membrane holds them together
+        (lambda: box(10, 10, 10) - box(10, 4, 5, (0, 3, 5)), [500, 150, 150]),
+        (lambda: box(2, 2, 2) + box(3, 3, 3, (9, 0, 0)), [27, 8]),
+    ],
+    ids=["convex", "channel", "apart"],
+)
+def test_bodies_come_apart_in_convex_pieces(body, pieces):
+    found = convex_pieces(*mesh_of(body()))
+    assert volumes(found) == pytest.approx(pieces, rel=1e-6)
     assert found.depth_mm == 0
-
-
-def test_a_channel_comes_apart_in_three_boxes():
-    """The two sides meet nothing but the floor: no membrane holds them together."""
-    found = convex_pieces(*mesh_of(box(10, 10, 10) - box(10, 4, 5, (0, 3, 5))))
-    assert volumes(found) == pytest.approx([500, 150, 150], rel=1e-6)
-    assert found.depth_mm == 0
-
-
-def test_bodies_apart_are_pieces_of_their_own():
-    found = convex_pieces(*mesh_of(box(2, 2, 2) + box(3, 3, 3, (9, 0, 0))))
-    assert volumes(found) == pytest.approx([27, 8])
 
 
 def test_a_ring_is_cut_until_no_piece_stands_out_far(monkeypatch):

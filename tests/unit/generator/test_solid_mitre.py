@@ -1,9 +1,12 @@
-"""Mitres, insets, numbers on backs, and triangles of points on a line."""
+"""Mitres, insets, numbers and names on backs, and triangles of points on a line."""
+
+from __future__ import annotations
 
 import math
 
 import numpy as np
 import pytest
+from random_shapes import extruded
 
 from generator.errors import SolidError
 from generator.layout.placement import Layout
@@ -19,6 +22,7 @@ from generator.solid import (
     top_inset_mm,
     top_insets_mm,
 )
+from generator.solid.marks import NameMark, Pen, name_places
 from generator.solid.part import in_frame, turn
 from generator.solid.plate import inset, mitre, regular, shared_insets
 from generator.solid.triangulate import triangulate_rings, without_slivers
@@ -32,20 +36,20 @@ SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
 @pytest.mark.parametrize(
     "degrees", [5, 30, 60, 70.53, 89.9, 90, 90.1, 110, 179, 180, 200, 270, 350]
 )
-@pytest.mark.parametrize("wall", [1.0, 3.0, 8.0])
-def test_sides_print_without_support_inside_the_bisecting_plane(printer, degrees, wall):
+def test_sides_print_without_support_inside_the_bisecting_plane(printer, degrees):
     theta = math.radians(degrees)
-    side = mitre(theta, wall, printer)
     slope = 1 / math.tan(theta / 2)
     steepest = math.tan(printer.overhang_max_rad)
-    assert side.top_mm >= 0.0
-    assert side.back_mm - side.top_mm <= (wall - side.land_mm) * steepest + 1e-12
-    assert (side.land_mm > 0) == (degrees <= 90)
-    for depth in np.linspace(0.0, wall, 50):  # never beyond the bisecting plane
-        share = max(0.0, depth - side.land_mm) / (wall - side.land_mm)
+    for wall in (1.0, 3.0, 8.0):
+        side = mitre(theta, wall, printer)
+        assert side.top_mm >= 0.0
+        assert side.back_mm - side.top_mm <= (wall - side.land_mm) * steepest + 1e-12
+        assert (side.land_mm > 0) == (degrees <= 90)
+        depth = np.linspace(0.0, wall, 50)
+        share = np.maximum(0.0, depth - side.land_mm) / (wall - side.land_mm)
         stands_back = side.top_mm + share * (side.back_mm - side.top_mm)
         apart = (stands_back - depth * slope) * math.sin(theta / 2)
-        assert apart >= 0.07 - 1e-9  # half the gap
+        assert apart.min() >= 0.07 - 1e-9  # half the gap: never beyond the bisecting plane
 
 
 def test_mitre_of_a_cube_by_hand():
@@ -141,12 +145,8 @@ def test_numbers_keep_clear_of_edges_and_each_other(side):
                 for loop in back.loops
             ]
             R = turn(embossing.rotation_rad)
-            feet = [
-                embossing.tiers[label].rings[0][0] @ R.T + centre
-                for label, centre in zip(
-                    embossing.labels.tolist(), embossing.centres_mm, strict=True
-                )
-            ]
+            placed = zip(embossing.labels.tolist(), embossing.centres_mm, strict=True)
+            feet = [embossing.tiers[label].rings[0][0] @ R.T + at for label, at in placed]
             assert not edges_cross([*rings, *feet])
             assert points_inside(np.concatenate(feet), rings).all()
             assert min(embossing.tiers[0].z_mm) >= -2.0 / 3
@@ -200,20 +200,6 @@ def test_points_on_a_line_are_kept_without_flat_triangles():
         triangulate_rings([outer, hole + np.array([1.5, 0.0])], np.arange(13), "plate")
 
 
-def test_numbers_without_room_make_one_short_warning():
-    solid = solid_box((60.0, 60.0, 7.0))
-    made = panels(solid, EMPTY, (), 2.0, FDM)
-    warning, nameless = made.warnings
-    assert nameless == "no room for a name on the back of F2, F3, F4, F5: mark by hand"
-    backs = [k for k in range(6) if f"F{k + 1}" in warning]
-    written = [
-        {name.split()[0] for e in part.embossings for name in e.names} for part in made.parts
-    ]
-    assert backs == [k for k in range(6) if len(written[k]) < 4]
-    assert warning.startswith("no room for the numbers of ")
-    assert len(warning) < 250
-
-
 TEXTS = [
     # box, what its backs say in the order of faces; the sixth as the first
     ((60.0, 60.0, 60.0), "COURSE BLOCK-12", [["COURSE", "BLOCK-12"]] * 5),
@@ -257,3 +243,27 @@ def test_a_triangle_thinner_than_stl_holds_is_flipped_away():
     rounded = points.astype(np.float32).astype(float)
     assert triangle_areas(rounded[found]).min() > 1.0
     assert triangle_areas(points[found]).sum() == pytest.approx(25.0 + 5.0 * OFF_MM, rel=1e-12)
+
+
+def test_backs_of_narrow_legs_bear_a_code():
+    legs = [(0, 0), (60, 0), (60, 12), (12, 12), (12, 40), (0, 40)]
+    bracket = extruded([np.array(legs, float)], 60.0)  # its ends are the faces 0 and 1
+    made = panels(bracket, EMPTY, (), 3.0, FDM, name="Bracket", code="AB12")
+    assert not [warning for warning in made.warnings if "mark by hand" in warning]
+    on_ells = [{e.names[0].split(" figure")[0] for e in part.embossings} for part in made.parts[:2]]
+    named = [{text.replace(" ", "") for text in texts if "AB12" in text} for texts in on_ells]
+    assert named == [{"AB12F1"}, {"AB12F2"}]
+
+
+def test_a_name_in_a_leg_keeps_clear_of_its_sides():
+    ring = np.array([(0.0, 0), (53.8, 0), (53.8, 5.8), (5.8, 5.8), (5.8, 33.8), (0, 33.8)])
+    pen = Pen(0.8, 0.8, 0.8)
+    block = next(name_places(NameMark((((("AB12 F1"),),),)), [ring], [pen], ()))
+    (box,) = block
+    assert pen.clear <= box.centre[1] - box.half[1]
+    assert box.centre[1] + box.half[1] <= 5.8 - pen.clear
+
+
+def test_no_room_is_no_place():
+    ring = np.array([(0.0, 0), (20, 0), (20, 5.0), (0, 5.0)])
+    assert not list(name_places(NameMark(((("AB12 F1",),),)), [ring], [Pen(0.8, 0.8, 0.8)], ()))

@@ -1,26 +1,41 @@
-"""Symbols on round faces: closed, of the right volume, at the right height."""
+"""Symbols on round faces: closed, of the right volume and height, as cylinders and cones too."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference.laid_symbols import is_closed, layout_on_round_face, mesh_volume
 
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.errors import SolidError
-from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.plane.polygon import signed_area
 from generator.polyhedron.development import development
 from generator.polyhedron.shapes import cone, cylinder
+from generator.polyhedron.winged import Face
 from generator.printers import printer_named
-from generator.solid import body_mesh, emboss_whole, prove_closed, symbol_meshes, triangles, volume
-from generator.solid.analytic import bend_problem
-from generator.solid.closed import edges_once
+from generator.solid import (
+    body_mesh,
+    emboss_whole,
+    prove_closed,
+    round_volume,
+    symbol_meshes,
+    triangles,
+    volume,
+)
+from generator.solid.analytic import (
+    BEND_ERROR_MM,
+    RoundSurfaceMap,
+    analytic_faces,
+    bend_lines,
+    bend_problem,
+)
 from generator.solid.measure import symbol_volume
 from generator.solid.wrapped import NUDGE_MM, Knife, strip_of
 
@@ -28,40 +43,20 @@ STYLE = SymbolStyle()
 TIERS = outlines(alphabet_named("dense-4"), STYLE)
 
 
-def layout_on(solid, centres, labels, rotation=0.0):
-    """Symbols at places in the development of the side, as a layout has them."""
-    none = np.empty(0, np.int64)
-    faces = [
-        FaceLayout(k, Placement(0, 0, 0.0, 0.0, 0.0), none, none, none, np.empty((0, 2)), 0)
-        for k in range(len(solid.faces))
-    ]
-    carrier = solid.surfaces[0].carrier
-    numbers = np.arange(len(labels))
-    faces[carrier] = FaceLayout(
-        carrier, Placement(0, 0, rotation, 0.0, 0.0), numbers, numbers,
-        np.array(labels), np.array(centres, float), 1,
-    )  # fmt: skip
-    return Layout("faces", STYLE.pitch_mm, tuple(faces))
-
-
-def mesh_volume(mesh):
-    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
-    return float((a * np.cross(b, c)).sum() / 6)
-
-
-def is_closed(mesh):
-    start = mesh.triangles.ravel()
-    return edges_once(start, np.roll(mesh.triangles, -1, axis=1).ravel())
-
-
 SOLIDS = {"cylinder": cylinder(60, 80), "cone": cone(80, 80, 40), "pointed": cone(80, 70)}
+EXACT_MM3 = {
+    "cylinder": math.pi * 30**2 * 80,
+    "cone": math.pi * 80 / 3 * (40**2 + 40 * 20 + 20**2),
+    "pointed": math.pi * 70 / 3 * 40**2,
+}
 CENTRES = [(20.0, 12.0), (27.3, 14.0), (40.0, 30.0), (12.0, 24.5), (33.0, 16.0)]
 
 
 @pytest.mark.parametrize("kind", SOLIDS)
 def test_wrapped_symbols_make_one_closed_part(kind):
     solid = SOLIDS[kind]
-    part = emboss_whole(solid, layout_on(solid, CENTRES, [0, 1, 2, 3, 1], 0.3), TIERS, "Part")
+    layout = layout_on_round_face(solid, CENTRES, [0, 1, 2, 3, 1], 0.3)
+    part = emboss_whole(solid, layout, TIERS, "Part")
     prove_closed(part)
     mesh = triangles(part)
     assert is_closed(mesh)
@@ -73,15 +68,13 @@ def test_wrapped_symbols_make_one_closed_part(kind):
     assert is_closed(symbols)
     assert mesh_volume(body) + mesh_volume(symbols) == pytest.approx(volume(part), rel=1e-12)
     flat = sum(symbol_volume(TIERS[label]) for label in (0, 1, 2, 3, 1))
-    plain = volume(
-        emboss_whole(solid, layout_on(solid, np.empty((0, 2)), np.empty(0, int)), TIERS, "")
-    )
+    plain = volume(emboss_whole(solid, layout_on_round_face(solid, [], []), TIERS, ""))
     assert flat < volume(part) - plain < flat * (1 + 1.0 / 20)
 
 
 def test_tops_lie_at_their_height_over_the_facets():
     solid = SOLIDS["cylinder"]
-    part = emboss_whole(solid, layout_on(solid, CENTRES, [0, 1, 2, 3, 1]), TIERS, "Part")
+    part = emboss_whole(solid, layout_on_round_face(solid, CENTRES, [0, 1, 2, 3, 1]), TIERS, "Part")
     d = development(solid, solid.surfaces[0])
     tops = [facet for facet in part.facets if facet.name.endswith("/top")]
     assert tops
@@ -117,20 +110,20 @@ def test_corners_on_a_line_are_moved_off_it():
     d = development(solid, solid.surfaces[0])
     # A symbol upright on a line: edges of its strokes would run along other lines, too.
     on_line = [(float(d.low[k][0]) + 1e-12, 8.0 * k) for k in range(2, 7)]
-    part = emboss_whole(solid, layout_on(solid, on_line, [0, 1, 2, 3, 0]), TIERS, "Part")
+    part = emboss_whole(solid, layout_on_round_face(solid, on_line, [0, 1, 2, 3, 0]), TIERS, "Part")
     prove_closed(part)
     mesh = triangles(part)
-    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
     assert is_closed(mesh)
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
     assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 1e-9
 
 
 def test_a_symbol_over_the_seam_is_refused():
     solid = SOLIDS["cylinder"]
     with pytest.raises(SolidError, match="reaches over the side"):
-        emboss_whole(solid, layout_on(solid, [(2.0, 30.0)], [0]), TIERS, "Part")
+        emboss_whole(solid, layout_on_round_face(solid, [(2.0, 30.0)], [0]), TIERS, "Part")
     with pytest.raises(SolidError, match="lies beside its face"):
-        emboss_whole(solid, layout_on(solid, [(-2.0, 30.0)], [0]), TIERS, "Part")
+        emboss_whole(solid, layout_on_round_face(solid, [(-2.0, 30.0)], [0]), TIERS, "Part")
 
 
 def test_a_hole_that_is_too_narrow_is_told():
@@ -143,3 +136,74 @@ def test_a_hole_that_is_too_narrow_is_told():
     assert "narrows strokes to 0.79 mm" in bend_problem(hole, TIERS, thin, printer)
     high = dataclasses.replace(STYLE, height_mm=31.0)
     assert "meet in its middle" in bend_problem(hole, TIERS, high, printer)
+
+
+def plain_face(solid):
+    (surface,) = solid.surfaces
+    (face,) = analytic_faces(solid, {}, TIERS, {surface.carrier: surface.facets})
+    return face, development(solid, surface)
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_volume_of_the_body_is_that_of_the_round_solid(name):
+    solid = SOLIDS[name]
+    part = emboss_whole(solid, layout_on_round_face(solid, [], []), TIERS, name)
+    assert volume(part) + round_volume(part) == pytest.approx(EXACT_MM3[name], rel=1e-9)
+    (face,) = part.analytic
+    assert face.closed
+    assert face.facets == solid.surfaces[0].facets
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_lines_keep_their_length_and_stay_on_the_face(name):
+    face, flat = plain_face(SOLIDS[name])
+    place = RoundSurfaceMap(face, flat)
+    starts = np.array([[20.0, 12.0], [33.0, 16.0], [25.0, 20.0]])
+    steps = np.array([[4.0, 0.0], [0.0, 3.0], [2.0, -2.5]])
+    curves = bend_lines(place, starts, steps, np.zeros(3), np.arange(3))
+    t = np.linspace(0.0, 1.0, 401)
+    for start, step, curve in zip(starts, steps, curves, strict=True):
+        own = np.vstack([curve, place(start + step, np.array(0.0))])
+        n = len(own) - 1
+        weights = np.array([math.comb(n, k) * t**k * (1 - t) ** (n - k) for k in range(n + 1)])
+        points = weights.T @ own
+        length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+        assert length == pytest.approx(np.hypot(*step), rel=3e-4)
+        off = np.hypot(points[:, 0], points[:, 1]) - face.radius_at(points[:, 2], np.zeros(401))
+        assert np.abs(off).max() < 2 * BEND_ERROR_MM
+
+
+def test_heights_are_distances_from_the_face():
+    face, flat = plain_face(SOLIDS["cone"])
+    place = RoundSurfaceMap(face, flat)
+    at = np.array([[30.0, 20.0]])
+    foot, top = place(at, np.zeros(1)), place(at, np.ones(1))
+    assert np.linalg.norm(top - foot) == pytest.approx(1.0)
+    along = place(at + np.array([0.0, 1e-5]), np.zeros(1)) - foot
+    assert abs(float((top - foot)[0] @ along[0])) < 1e-9
+
+
+def test_symbols_on_the_face_stand_where_those_of_the_mesh_do():
+    solid = SOLIDS["cylinder"]
+    layout = layout_on_round_face(solid, [(20.0, 12.0), (40.0, 30.0)], [0, 1], rotation=0.3)
+    part = emboss_whole(solid, layout, TIERS, "part")
+    (face,) = part.analytic
+    T = face.T_part_axis
+    strip = {v for k in face.facets for loop in part.facets[k].loops for v in loop}
+    vertices = part.vertices[sorted(strip)]
+    for symbol in face.symbols:
+        assert symbol.z_mm == (0.0, STYLE.height_mm)
+        for tier in symbol.rings:
+            for edge in tier[0]:
+                corner = edge[0] @ T[:3, :3].T + T[:3, 3]
+                assert np.linalg.norm(vertices - corner, axis=1).min() < 0.03  # chord error
+
+
+def test_a_rim_on_several_faces_keeps_its_facets():
+    solid = cylinder(60, 80)
+    top = solid.faces[-1].loops[0]
+    half = len(top) // 2
+    split = [Face("F3", ((*top[: half + 1],),)), Face("F4", ((*top[half:], top[0]),))]
+    bent = replace(solid, faces=(*solid.faces[:-1], *split))
+    (surface,) = bent.surfaces
+    assert analytic_faces(bent, {}, TIERS, {surface.carrier: surface.facets}) == ()
