@@ -115,18 +115,6 @@ def test_a_scan_is_recognised(labs, asked, tmp_path, profile, face, seed, most, 
     check(entries, truth, name, face)
 
 
-def test_the_thesis_reads_a_whole_face(labs, asked, tmp_path):
-    folder = labs["thesis"]
-    url = f"sqlite:///{folder / 'lab.db'}"
-    touched = tmp_path / "scan.h5"
-    truth = record_scan(touched, url, "Cube thesis", "F1", seed=6, theta=0.8)
-    code, entries, _ = asked(touched, "--database", url, "--method", "thesis")
-    assert code == 0
-    assert entries[0]["object"] is None
-    assert entries[-1]["touches"] > len(truth) / 2
-    check(entries, truth, "Cube thesis", "F1")
-
-
 def test_the_thesis_says_which_edges_a_touch_feels(labs, asked, capsys, tmp_path):
     """A cube without symbols at its edge x = 0: where the edge runs, against the truth."""
     url = f"sqlite:///{labs['thesis'] / 'lab.db'}"

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
@@ -19,27 +18,27 @@ TOUCHES = 8
 
 
 @pytest.fixture(scope="module")
-def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def spec(tmp_path_factory):
     """A tile: its two large faces bear symbols, and are sliced."""
     path = tmp_path_factory.mktemp("specs") / "tile.yaml"
     path.write_text("name: Tile\nshape: {box: [28 mm, 28 mm, 10 mm]}\nsymbols: {pitch: 5 mm}\n")
     return path
 
 
-def touch(spec: Path, folder: Path, *more: str) -> int:
+def touch(spec, folder, *more):
     return run([str(spec), "--surfaces", "printed", "--faults", "usual", "--touches", str(TOUCHES),
                 "--kinds", "face", "--levels", "typical", "--study", "0", "-o", str(folder),
                 *more])  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def printed(spec: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def printed(spec, tmp_path_factory):
     folder = tmp_path_factory.mktemp("printed")
     assert touch(spec, folder) == 0
     return folder
 
 
-def test_what_the_beads_leave_is_read(printed: Path) -> None:
+def test_what_the_beads_leave_is_read(printed):
     results = json.loads((printed / "results.json").read_text())
     said = results["printed"]
     assert (said["profile"], said["faults"], said["faces"]) == ("fdm-0.4-0.2", "usual", 2)
@@ -54,10 +53,8 @@ def test_what_the_beads_leave_is_read(printed: Path) -> None:
     assert "printed, faults usual" in (printed / "report.html").read_text()
 
 
-def test_prints_are_shared_and_results_are_the_same(
-    spec: Path, printed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(*_arguments: object) -> None:
+def test_prints_are_shared_and_results_are_the_same(spec, printed, tmp_path, monkeypatch):
+    def refuse(*_arguments):
         pytest.fail("nothing is left to slice")
 
     monkeypatch.setattr(slicer, "_run", refuse)
@@ -67,7 +64,7 @@ def test_prints_are_shared_and_results_are_the_same(
     assert not (tmp_path / "run" / "printed").exists()
 
 
-def test_a_run_goes_on_where_a_print_is_missing(spec: Path, printed: Path) -> None:
+def test_a_run_goes_on_where_a_print_is_missing(spec, printed):
     before = (printed / "trials.parquet").read_bytes()
     gone = sorted((printed / "printed" / "surfaces").glob("*.npy"))[0]
     content = gone.read_bytes()
@@ -84,19 +81,14 @@ def test_a_run_goes_on_where_a_print_is_missing(spec: Path, printed: Path) -> No
         (("--faults", "worse"), "unknown fault 'worse'"),
     ],
 )
-def test_what_is_wrong_is_said_before_anything_is_made(
-    spec: Path, tmp_path: Path, more: tuple[str, ...], said: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+def test_what_is_wrong_is_said_before_anything_is_made(spec, tmp_path, more, said, capsys):
     asked = [str(spec), "--surfaces", "printed", "-o", str(tmp_path / "run"), *more]
     assert run(asked) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
 
 
-def test_without_prusaslicer_the_package_is_named(
-    spec: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_prusaslicer_the_package_is_named(spec, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(slicer.shutil, "which", lambda _name: None)
     assert run([str(spec), "--surfaces", "printed", "-o", str(tmp_path / "run")]) == 2
     assert "apt-get install prusa-slicer" in capsys.readouterr().err

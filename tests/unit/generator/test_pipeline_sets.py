@@ -181,7 +181,7 @@ def cells_held(engine):
 
 def two_jobs(folder):
     """Return an empty database, and what makes A and B."""
-    jobs = [MakeJob(plan_object(one), folder / one.name, ("stl",)) for one in specs(folder)[:2]]
+    jobs = [MakeJob(plan_object(one), folder / one.name, ()) for one in specs(folder)[:2]]
     return open_database(f"sqlite:///{folder / 'lab.db'}"), jobs
 
 

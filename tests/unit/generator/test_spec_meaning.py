@@ -347,6 +347,7 @@ def test_starter_shows_the_values_that_hold_without_it():
 def test_words_of_people():
     assert starter_named("Parallelepiped")[0] == "box"
     assert starter_named("triangular-prism")[0] == "triangular_prism"
+    assert "encode-object mine.yaml" in starter_named("cube", "mine.yaml")[1]
     assert format_option("STEP, .stl,step") == ("step", "stl")
     with pytest.raises(SpecError, match="no format is named"):
         format_option(" , ")
