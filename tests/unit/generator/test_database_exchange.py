@@ -55,13 +55,22 @@ def held(url, name):
 
 
 def sound(url):
-    """Check that the bits of taken cells are those of the cells; return the cells by array."""
+    """Check that the bits of taken cells are those of the cells, and none is held twice."""
     with read_transaction(open_database(url, writable=False)) as connection:
         numbers = {entry.array_id for entry in list_objects(connection)}
         for number in numbers:
             cells = held_cells(connection, number)[:, :2]
             assert np.array_equal(np.stack(occupied_cells(connection, number), axis=1), cells)
             assert len(np.unique(cells, axis=0)) == len(cells)
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    """A file with a cube of another lab."""
+    folder = tmp_path_factory.mktemp("exported")
+    make(str(folder / "lab.db"), "Cube")
+    export_objects(str(folder / "lab.db"), folder / "cube.db")
+    return folder / "cube.db"
 
 
 @pytest.fixture
@@ -140,16 +149,13 @@ def test_an_object_on_cells_that_are_held_is_refused_by_name(new_database, lab_u
     sound(lab_url)
 
 
-def test_a_name_that_is_held_can_be_changed(new_database, lab_url, file):
-    theirs = new_database("sqlite")
-    make(theirs, "Cube")
-    export_objects(theirs, file)
+def test_a_name_that_is_held_can_be_changed(lab_url, exported):
     make(lab_url, "Cube", solid=cube(40.0), profile="large")
     with pytest.raises(DatabaseError, match="'Cube' is the name of another object") as caught:
-        import_objects(lab_url, str(file))
+        import_objects(lab_url, str(exported))
     assert "--rename 'Cube=NEW'" in caught.value.fix
     for outcome in ("copied", "known"):
-        done = import_objects(lab_url, str(file), renamed={"Cube": "Their cube"})
+        done = import_objects(lab_url, str(exported), renamed={"Cube": "Their cube"})
         assert getattr(done, outcome) == ("Their cube",)
     assert names(lab_url) == ["Cube", "Their cube"]
     sound(lab_url)
@@ -185,14 +191,11 @@ def test_a_failed_export_leaves_what_is_there(new_database, file):
     assert [path.name for path in file.parent.iterdir()] == ["exchange.db"]
 
 
-def test_a_rehearsed_import_changes_nothing(new_database, lab_url, file):
-    theirs = new_database("sqlite")
-    make(theirs, "Cube")
-    export_objects(theirs, file)
-    assert import_objects(lab_url, str(file), dry_run=True).copied == ("Cube",)
+def test_a_rehearsed_import_changes_nothing(lab_url, exported):
+    assert import_objects(lab_url, str(exported), dry_run=True).copied == ("Cube",)
     assert not database_exists(lab_url)
     make(lab_url, "Other", profile="large", solid=cube(60.0))
-    assert import_objects(lab_url, str(file), dry_run=True).copied == ("Cube",)
+    assert import_objects(lab_url, str(exported), dry_run=True).copied == ("Cube",)
     assert names(lab_url) == ["Other"]
     with read_transaction(open_database(lab_url)) as connection:
         assert len(occupied_cells(connection, 2)[0]) == 0
@@ -210,15 +213,6 @@ DAMAGE = {
     "the alphabet": ("UPDATE alphabets SET definition = '{}'", "alphabet"),
     "a foreign key": ("UPDATE faces_to_vertices SET vertex_id = 99 WHERE vertex_id = 1", "lost"),
 }  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def exported(tmp_path_factory):
-    """A file with a cube, to be damaged in copies."""
-    folder = tmp_path_factory.mktemp("exported")
-    make(str(folder / "lab.db"), "Cube")
-    export_objects(str(folder / "lab.db"), folder / "cube.db")
-    return folder / "cube.db"
 
 
 @pytest.mark.parametrize("what", DAMAGE)
