@@ -12,7 +12,7 @@ outline, holes and all. Thesis 6.3.
 `answers.json` is the table, measured (docs/folds.md): flat faces, a sensor of 25.4 mm whose centre
 lies on the face and whose plate rests there, 20 to 120 N, symbols of 4.5 to 7 mm. Of that, other
 sensor types answer a share that was measured too (`answers_of_types.json`,
-`tests/campaigns/promised_types.py`).
+`tests/campaigns/promised.py --types`).
 
 M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018), for the recurrence.
 """

@@ -7,13 +7,13 @@ Each figure is processor time of one thread with start-up and all files (medians
 of a product of two 1000 x 1000 matrices of numpy, measured just before it: the quotients of two
 machines, or of a quiet and a busy one, can be compared; the seconds cannot. Reading is the time of
 one call in a running process. Peers emboss the same vertical symbols (`embossing.py`, imports left
-out); what takes longer than `--limit` is left out. `docs/benchmarks.json` keeps the records of
+out); what takes longer than `--limit` CPU seconds is left out, with `--small` also 20,184 symbols,
+the set and peers. `docs/benchmarks.json` keeps the records of
 releases, the page and its picture show the last two.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
@@ -25,11 +25,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import NamedTuple
 
-for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[library] = "1"
-
-from embossing import DRAFTED, OURS, WAYS, actual, run  # noqa: E402
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
+from embossing import DRAFTED, OURS, WAYS, actual, run
 
 # This process stays small: what it starts would count its memory as a peak of its own.
 HERE = Path(__file__).resolve()
@@ -99,18 +99,17 @@ print(json.dumps(min(times)))
 """
 
 
-@dataclass(frozen=True)
-class Figure:
-    """What one thing costs."""
+class Figure(NamedTuple):
+    """What one thing costs; 0 MB: not asked."""
 
     cpu_s: float
     ratio: float  #: of `cpu_s` to the product
-    peak_mb: float = 0.0  #: of memory; 0: not asked
+    peak_mb: float = 0.0
 
-    @classmethod
-    def of(cls, cpu_s: float, product_s: float, peak_mb: float = 0.0) -> Figure:
-        """Return it rounded to what is repeatable."""
-        return cls(float(f"{cpu_s:.3g}"), float(f"{cpu_s / product_s:.3g}"), round(peak_mb))
+
+def figure(cpu_s: float, product_s: float, peak_mb: float = 0.0) -> Figure:
+    """Return a figure rounded to what is repeatable."""
+    return Figure(float(f"{cpu_s:.3g}"), float(f"{cpu_s / product_s:.3g}"), round(peak_mb))
 
 
 @dataclass(frozen=True)
@@ -144,7 +143,7 @@ class Tree:
             if child.returncode:
                 raise RuntimeError(f"{command[3:]}: {err.read().decode()[-2000:]}")
             cpu_s = used.ru_utime + used.ru_stime
-            return Figure.of(cpu_s, product_s, used.ru_maxrss / 1024), out.read().decode()
+            return figure(cpu_s, product_s, used.ru_maxrss / 1024), out.read().decode()
 
     def command(self, name: str, *arguments: object, cwd: Path | None = None) -> Figure:
         """Run one of the tree's commands."""
@@ -162,7 +161,7 @@ def product() -> float:
 
 def median(figures: list[Figure]) -> Figure:
     """Return the figure of median ratio."""
-    return sorted(figures, key=lambda figure: figure.ratio)[len(figures) // 2]
+    return sorted(figures, key=lambda one: one.ratio)[len(figures) // 2]
 
 
 def measure(tree: Tree, found: dict[str, Figure], keep: Callable[[], None], *, large: bool) -> None:
@@ -227,7 +226,7 @@ def _inside(tree: Tree, code: str, *arguments: object) -> Figure:
     """Return the time that the code itself took and printed."""
     product_s = product()
     whole, printed = tree.process(code, *arguments)
-    return Figure.of(json.loads(printed.splitlines()[-1]), product_s, whole.peak_mb)
+    return figure(json.loads(printed.splitlines()[-1]), product_s, whole.peak_mb)
 
 
 def peers(symbols: int, limit_s: float) -> dict[str, Figure]:
@@ -238,7 +237,7 @@ def peers(symbols: int, limit_s: float) -> dict[str, Figure]:
             continue
         product_s, name = product(), "this project" if way == OURS else way
         if made := run(way, symbols, limit_s):
-            found[name] = Figure.of(made.cpu_s, product_s, made.peak_mb)
+            found[name] = figure(made.cpu_s, product_s, made.peak_mb)
         told = f"{found[name].cpu_s:9.4g} s" if name in found else "left out: over the limit"
         print(f"{name:52} {told}", flush=True)
     return found
@@ -323,15 +322,9 @@ def draw(records: dict[str, dict], path: Path) -> None:
 
 def main() -> None:
     """Measure, keep the record, make the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tree", type=Path, default=HERE.parents[2])
-    parser.add_argument("--label", default="unreleased", help="a release, as 0.2.0")
-    parser.add_argument("--limit", type=float, default=60.0, help="CPU seconds for a peer")
-    parser.add_argument(
-        "--small", action="store_true", help="without 20,184 symbols, the set and peers"
-    )
-    parser.add_argument("-o", "--output", type=Path, default=DOCS)
-    options = parser.parse_args()
+    options = runner.asked(__doc__, tree=str(HERE.parents[2]), label="unreleased", limit=60.0,
+                           small=False, output=str(DOCS))  # fmt: skip
+    options.tree, options.output = Path(options.tree), Path(options.output)
     file = options.output / "benchmarks.json"
     records = json.loads(file.read_text()) if file.exists() else {}
     figures: dict[str, Figure] = {}
@@ -347,9 +340,9 @@ def main() -> None:
         """Write what is known: a run that is stopped leaves that much."""
         records[options.label] = {
             "machine": machine,
-            "figures": {name: vars(figure) for name, figure in figures.items()},
+            "figures": {name: one._asdict() for name, one in figures.items()},
             "peer_symbols": actual(384),
-            "peers": {name: vars(figure) for name, figure in rivals.items()},
+            "peers": {name: one._asdict() for name, one in rivals.items()},
         }
         file.write_text(json.dumps(records, indent=1) + "\n")
         (options.output / "benchmarks.md").write_text(page(records))

@@ -1,6 +1,6 @@
 """Embossing a cube: this project against booleans of CAD kernels and of meshes, side by side.
 
-    python tests/bench/embossing.py --symbols 24,150,600,2400 --limit 120
+    python tests/bench/embossing.py --symbols 24 150 600 2400 --limit 120 [--ways this]
 
 A cube carries 6 k^2 symbols of the alphabet dense-4, at 7 mm. Each way makes the same solid
 from the same outlines, writes STEP (manifold3d cannot), meshes it and writes STL:
@@ -13,21 +13,21 @@ Every way's volume is compared with the closed form. A way that takes longer tha
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import os
 import resource
-import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
 
 if TYPE_CHECKING:
     from generator.alphabet.outline import Tiers
@@ -257,34 +257,26 @@ WAYS: dict[str, Callable[[Scene, Path], Made]] = {
 }
 
 
-@dataclass(frozen=True)
-class Run:
+class Run(NamedTuple):
     """What one way cost on one number of symbols."""
 
     cpu_s: float
     peak_mb: float
     volume_error: float
     solids: int
-    step_mb: float
 
 
 def measure(way: str, symbols: int) -> None:
     """Run one way in this process; print one line of JSON."""
-    for module in ("cadquery", "build123d", "manifold3d"):
-        if way.startswith(module):
+    for module in ("cadquery", "build123d", "manifold3d", "generator.export.step"):
+        if way.startswith(module) or module.startswith("generator"):
             import_module(module)  # before the clock starts
-    import_module("generator.export.step")
     made = scene(symbols, math.radians(10) if way == DRAFTED else 0.0)
     with tempfile.TemporaryDirectory() as folder:
-        start = time.process_time()
-        ask = WAYS[way](made, Path(folder))
-        cpu_s = time.process_time() - start
+        ask, ms = runner.clocked(WAYS[way], made, Path(folder))
         peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        step = Path(folder) / "cube.step"
-        step_mb = step.stat().st_size / 1e6 if step.exists() else 0.0
     volume, solids = ask()
-    error = abs(volume / closed_form_mm3(made) - 1)
-    print(json.dumps([cpu_s, peak_mb, error, solids, step_mb]))
+    print(json.dumps([ms / 1e3, peak_mb, abs(volume / closed_form_mm3(made) - 1), solids]))
 
 
 def run(way: str, symbols: int, limit_s: float) -> Run | None:
@@ -304,53 +296,33 @@ def run(way: str, symbols: int, limit_s: float) -> Run | None:
     return made if made.cpu_s <= limit_s else None
 
 
-def median_run(way: str, symbols: int, limit_s: float) -> Run | None:
-    """Run this project several times, others once; the run of median time."""
-    runs = [run(way, symbols, limit_s) for _ in range(REPEATS if way in (OURS, DRAFTED) else 1)]
-    finished = [one for one in runs if one is not None]
-    middle = statistics.median_low([one.cpu_s for one in finished]) if finished else None
-    return next((one for one in finished if one.cpu_s == middle), None)
-
-
 def actual(symbols: int) -> int:
     """Return the number of symbols of the scene."""
     return 6 * (math.isqrt(math.ceil(symbols / 6) - 1) + 1) ** 2
 
 
-def table(ways: list[str], counts: list[int], limit_s: float) -> bool:
-    """Print CPU, memory and volume of every way on every count; whether all volumes agree."""
-    results: dict[tuple[str, int], Run] = {}
-    print(f"{'CPU s | peak MB | volume error':28}", *(f"{actual(n):>24} symbols" for n in counts))
-    for way in ways:
-        line: list[str] = []
-        for count in counts:
-            made = median_run(way, count, limit_s)
-            if made is None:
-                line.append(f"{f'over {limit_s:g} s':>32}")
-                break
-            results[way, count] = made
-            solids = "" if made.solids == 1 else f" {made.solids} solids!"
-            figures = f"{made.cpu_s:9.3f} | {made.peak_mb:5.0f} | {made.volume_error:.0e}{solids}"
-            line.append(f"{figures:>32}")
-        print(f"{way:28}", *line, flush=True)
-    return all(one.volume_error <= VOLUME_TOLERANCE and one.solids == 1 for one in results.values())
-
-
 def main() -> int:
-    """Read the arguments, run, print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--symbols", default="24,150,600,2400", help="numbers, with commas")
-    parser.add_argument("--limit", type=float, default=120.0, help="CPU seconds for one way")
-    parser.add_argument("--ways", default="", help=f"of {', '.join(WAYS)}; with ';'")
-    parser.add_argument("--measure", default="", help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
-    counts = [int(count) for count in arguments.symbols.split(",")]
-    if arguments.measure:
-        measure(arguments.measure, counts[0])
+    """Print a line for every way and count; 1 where a volume is wrong."""
+    asked = runner.asked(
+        __doc__, symbols=[24, 150, 600, 2400], limit=120.0, ways=list(WAYS), measure=""
+    )
+    if asked.measure:
+        measure(asked.measure, asked.symbols[0])
         return 0
-    ways = arguments.ways.split(";") if arguments.ways else list(WAYS)
+    wrong = 0
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
-    return 0 if table(ways, counts, arguments.limit) else 1
+    runner.table(("way", "symbols", "CPU s", "peak MB", "volume error", "solids"))
+    for way in asked.ways:
+        for count in asked.symbols:
+            repeats = REPEATS if way in (OURS, DRAFTED) else 1
+            made = list(filter(None, (run(way, count, asked.limit) for _ in range(repeats))))
+            if not made:
+                runner.row(way, actual(count), f"over {asked.limit:g} s", "", "", "")
+                break
+            middle = sorted(made)[(len(made) - 1) // 2]
+            wrong += middle.volume_error > VOLUME_TOLERANCE or middle.solids != 1
+            runner.row(way, actual(count), *middle)
+    return 1 if wrong else 0
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ face are compared with the reader's answers at the same places without a page.
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
 import os
@@ -33,6 +32,8 @@ from websockets.asyncio.client import connect
 from encoded_objects import Reader, open_lab, simulate
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
+import runner
 from bench_page import CHROMIUM, FLAGS, opened, rest, running, shown, until
 
 STATIC = Path(__file__).parents[2] / "recognizer" / "bench" / "static"
@@ -90,22 +91,21 @@ def spread(times_ms):
     return f"median {statistics.median(found):.0f} ms, p95 {late:.0f} ms"
 
 
-def at_rates(browser, database, rates, seconds):
-    """Print a line per rate of the source."""
-    for rate in rates:
-        with (
-            served(database, f"touch:?rate={rate}") as (address, pid),
-            opened(browser, address) as page,
-        ):
-            time.sleep(2)
-            before = page.evaluate("[bench.frames, bench.paints]")
-            page.evaluate("bench.latency_ms.length = 0")
-            meter = Meter(pid)
-            time.sleep(seconds)
-            frames, paints, late = page.evaluate("[bench.frames, bench.paints, bench.latency_ms]")
-            print(f"{rate:3.0f} Hz: {(frames - before[0]) / seconds:.1f}/s to the page, "
-                  f"{(paints - before[1]) / seconds:.1f}/s painted, latency {spread(late)}, "
-                  f"{meter}")  # fmt: skip
+def at_rate(browser, database, rate, seconds):
+    """Print a line for a rate of the source."""
+    with (
+        served(database, f"touch:?rate={rate}") as (address, pid),
+        opened(browser, address) as page,
+    ):
+        time.sleep(2)
+        before = page.evaluate("[bench.frames, bench.paints]")
+        page.evaluate("bench.latency_ms.length = 0")
+        meter = Meter(pid)
+        time.sleep(seconds)
+        frames, paints, late = page.evaluate("[bench.frames, bench.paints, bench.latency_ms]")
+        print(f"{rate:3.0f} Hz: {(frames - before[0]) / seconds:.1f}/s to the page, "
+              f"{(paints - before[1]) / seconds:.1f}/s painted, latency {spread(late)}, "
+              f"{meter}")  # fmt: skip
 
 
 def clicked(page, across, down):
@@ -242,22 +242,17 @@ def soak(database, seconds):
 
 
 def main():
-    asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    asked.add_argument("--database", default="lab.db")
-    asked.add_argument("--seconds", type=float, default=15.0)
-    asked.add_argument("--rates", type=float, nargs="*", default=[50, 100, 200])
-    asked.add_argument("--touches", type=int, default=20)
-    asked.add_argument("--round", default="", help="a round object, whose mantle is clicked on")
-    asked.add_argument("--pages", type=int, nargs="*", default=[0, 1, 20])
-    asked.add_argument("--deaf", type=int, default=64, help="pages that never read")
-    asked.add_argument("--soak", type=float, default=0.0, metavar="SECONDS")
-    given = asked.parse_args()
+    """Print the figures; `--round NAME` a round object, `--deaf` pages that never read."""
+    given = runner.asked(
+        __doc__, database="lab.db", seconds=15.0, rates=[50.0, 100.0, 200.0], touches=20, round="",
+        pages=[0, 1, 20], deaf=64, soak=0.0,
+    )  # fmt: skip
     rng = random.Random(1)
-    size = sum(file.stat().st_size for file in STATIC.iterdir())
-    print(f"the page: {size / 1000:.0f} kB")
+    print(f"the page: {sum(file.stat().st_size for file in STATIC.iterdir()) / 1000:.0f} kB")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
-        at_rates(browser, given.database, given.rates, given.seconds)
+        for rate in given.rates:
+            at_rate(browser, given.database, rate, given.seconds)
         if given.touches:
             with (
                 served(given.database, "touch:?hold=0.6") as (address, _),

@@ -3,18 +3,19 @@
     python tests/campaigns/promised.py -o out/promised --save    # touches, table, check: an hour
     python tests/campaigns/promised.py -o out/promised --rounds 0  # of the touches that are there
     python tests/campaigns/promised.py -o out/gel --sensor-type gel-24x32 --rounds 9
+    python tests/campaigns/promised.py -o out/types --types [--save]  # touches of sensor_types.py
 
-Two sets of solids by default: a table that is made from the first is checked on 60 faces of all
-sizes of the second. With `--save` a table of both is kept (`generator/layout/answers.json`). In
-each round every face is touched once, anywhere, and in every third round again where the answer's
-`next` says, up to three times; so any number of rounds is a fair sample. A touch is looked at as
-`generator.layout.recognition_rate` sees it. What is there is kept, and an interrupted run goes on.
+A table that is made from the first of two sets of solids is checked on 60 faces of all sizes of the
+second; `--save` keeps a table of both (`generator/layout/answers.json`). In each round every face
+is touched once, anywhere, and in every third round again where the answer's `next` says, up to
+three times; so any number of rounds is a fair sample. A touch is looked at as
+`generator.layout.recognition_rate` sees it. A step over a re-entrant edge may end on another face,
+which counts as not answered. What is there is kept, and an interrupted run goes on.
 
-Of another sensor type than `fsr-16` every third solid of the second set is touched, at the pitch
-that the type proposes, and held against what `encode-object --sensor-type` promises; that was set
-by other touches (`promised_types.py`).
-
-A step over a re-entrant edge may end on another face, which is told and counted as not answered.
+Of another sensor type every third solid of the second set is touched, at the pitch that the type
+proposes, and held against what `encode-object --sensor-type` promises. That was set by `--types
+--save`: each type's share of the usual sensor's answers (`AnsweredShare`) is the likeliest for its
+touches inside faces, at edges and corners (`generator/layout/answers_of_types.json`).
 """
 
 from __future__ import annotations
@@ -29,10 +30,11 @@ from typing import Any
 import numpy as np
 import runner
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize
 
 from encoded_objects import encode
 from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
-from encoded_objects.base.sensor_type_file import sensor_type_named
+from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 from generator.database.open import open_if_there
 from generator.database.read import object_names, read_object
 from generator.database.transaction import read_transaction
@@ -41,6 +43,7 @@ from generator.layout.recognition_rate import (
     AnswerTable,
     SensorView,
     answered_at_once,
+    answered_share,
     measured_answers,
     sensor_view,
     views_at,
@@ -61,6 +64,10 @@ CLASSES_MM = (0.0, 16.0, 22.0, 30.0, 45.0, 1e3)  #: narrower side of a face
 LAB_KEY = "0123-4567-89AB-CDER"
 RESIN_MM = 4.0  #: pitch below which strokes are too fine for a filament printer
 EVERY = 3  #: rounds, of which one goes on until a touch is answered
+KINDS = ("face", "edge", "corner")
+BINS = (0.0, 0.4, 0.6, 0.8, 0.95, 1.001)  #: of the loaded share, in the table
+STRENGTH = 0.02  #: of the pull of both numbers to 0, of the weights of a fit
+SHIPPED = Path(__file__).parents[2] / "generator" / "layout"
 
 Solid = dict[str, Any]
 
@@ -148,7 +155,10 @@ class Touched:
 
 def main() -> None:
     asked = runner.asked(__doc__, output=True, seed=25, rounds=100,
-                         sensor_type=USUAL_SENSOR.name, save=False)  # fmt: skip
+                         sensor_type=USUAL_SENSOR.name, save=False, types=False)  # fmt: skip
+    if asked.types:
+        compare_types(asked.output, save=asked.save)
+        return
     sensor = sensor_type_named(asked.sensor_type)
     touches = list(map(_touched, touch_faces(asked.output, asked.rounds, asked.seed, sensor)))
     if sensor.name != USUAL_SENSOR.name:
@@ -161,7 +171,7 @@ def main() -> None:
         compare([t for t in touches if t.group == "check"], one)
     if asked.save:
         text = json_of(measured_table(touches), len(touches))
-        (Path(__file__).parents[2] / "generator/layout/answers.json").write_text(text)
+        (SHIPPED / "answers.json").write_text(text)
 
 
 def _touched(values: dict[str, Any]) -> Touched:
@@ -325,7 +335,7 @@ def _terms(seen: ArrayLike, loaded: ArrayLike, pitch_mm: ArrayLike) -> Points:
     return np.stack([np.ones_like(seen), seen, loaded, pitch, seen * loaded], axis=-1)
 
 
-def _fit(x: Points, y: Points, steps: int = 30, ridge: float = 0.02) -> Points:
+def _fit(x: Points, y: Points, steps: int = 30, ridge: float = STRENGTH) -> Points:
     """Return the weights of a logistic regression of y (n,) on x (n, k), by Newton's method."""
     weights = np.zeros(x.shape[1])
     for _ in range(steps):
@@ -334,6 +344,83 @@ def _fit(x: Points, y: Points, steps: int = 30, ridge: float = 0.02) -> Points:
         curve = (x * (p * (1 - p))[:, None]).T @ x + ridge * np.eye(len(weights))
         weights = weights + np.linalg.solve(curve, slope)
     return weights
+
+
+def touches_of(folder: Path, sensor: SensorType) -> Points:
+    """Return (N, 3) of a type's touches: the usual sensor's probability, loaded share, right."""
+    rows = [row for one in sorted(folder.glob("own-*")) for row in runner.rows_of(one)]
+    if not rows:
+        return np.empty((0, 3))
+    engine = open_if_there(f"sqlite:///{folder / 'lab.db'}", writable=False)
+    assert engine is not None, f"{folder}: touches of a lab that is not there"
+    with read_transaction(engine) as connection:
+        held = {n: read_object(connection, n) for n in {r["object"] for r in rows} - {""}}
+    return np.array([
+        _seen(row, held[row["object"]], sensor) for row in rows
+        if row["object"] and row["kind"] in KINDS and row["level"] in LEVELS
+    ]).reshape(-1, 3)  # fmt: skip
+
+
+def _seen(row: dict[str, Any], held: Any, sensor: SensorType) -> tuple[float, float, bool]:
+    face = next(face for face in held.faces if face.name == row["face"])
+    layout = next(one for one in held.layout.faces if one.face == face.face_id)
+    pitch = held.style.pitch_mm
+    view = sensor_view(sensor, held.alphabet["reach"] * pitch + held.style.stroke_mm / 2)
+    at, turn = np.array([[row["x_mm"], row["y_mm"]]]), np.radians([row["theta_deg"]])
+    views = views_at(face.polygon_mm, layout, pitch, view, at, turn)
+    table = measured_answers()
+    usual = table.at(pitch / sensor.coarseness, views.seen, views.loaded)
+    return float(usual[0]), float(views.loaded[0]), row["verdict"] == "right"
+
+
+def likeliest(touches: Points) -> tuple[float, float]:
+    """Return constant and weight of the loaded share, of the share of the usual answers.
+
+    More load is never worse.
+    """
+    usual, loaded, right = touches.T
+
+    def loss(logit: Points) -> float:
+        p = np.clip(usual / (1 + np.exp(-(logit[0] + logit[1] * loaded))), 1e-9, 1 - 1e-9)
+        likelihood = np.where(right > 0, np.log(p), np.log1p(-p)).sum()
+        return float(STRENGTH / 2 * logit @ logit - likelihood)
+
+    constant, by_loaded = minimize(loss, np.zeros(2), bounds=[(None, None), (0.0, None)]).x
+    return round(float(constant), 2), round(float(by_loaded), 2)
+
+
+def compare_type(name: str, touches: Points, sensor: SensorType) -> None:
+    """Print promised and answered by how much of the sensor is loaded."""
+    usual, loaded, right = touches.T
+    share = answered_share(sensor)
+    promised = usual if share is None else usual * share.at(loaded)
+    for low, high in [*itertools.pairwise(BINS), (BINS[0], BINS[-1])]:
+        some = (loaded >= low) & (loaded < high)
+        if some.any():
+            p, q = promised[some], right[some]
+            chance = np.sqrt((p * (1 - p)).sum()) / len(p)
+            runner.row(name, f"{low:g} to {min(high, 1):g}", len(p), f"{usual[some].mean():.2f}",
+                       f"{p.mean():.2f} +- {chance:.2f}", f"{q.mean():.2f}")  # fmt: skip
+
+
+def compare_types(folder: Path, *, save: bool) -> None:
+    """Hold what is promised to each type against the touches of `sensor_types.py`."""
+    runner.table(("type", "loaded", "touches", "usual sensor's", "promised", "answered"))
+    kept = {}
+    for name in shipped_names():
+        sensor = sensor_type_named(name)
+        touches = touches_of(folder / name, sensor)
+        if not len(touches):
+            continue
+        compare_type(name, touches, sensor)
+        if name != USUAL_SENSOR.name:
+            kept[name] = {
+                "touches": len(touches), "across_mm": round(sensor.across_mm, 2),
+                "pitch_mm": sensor.symbol_pitch_mm, "logit": likeliest(touches),
+            }  # fmt: skip
+    if save:
+        lines = ",\n".join(f"  {json.dumps(n)}: {json.dumps(one)}" for n, one in kept.items())
+        (SHIPPED / "answers_of_types.json").write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
 
 
 def json_of(table: AnswerTable, touches: int) -> str:
