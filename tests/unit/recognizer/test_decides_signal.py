@@ -215,6 +215,8 @@ def test_a_contact_rises_by_seven_deviations_of_readings_on_a_scale(sigmas, cont
 def test_a_contact_rises_by_six_deviations_of_a_noisy_type():
     assert contact_counts(SensorType(noise=4.0)) == pytest.approx(24.0)
     assert contact_counts(SensorType(noise=1.0)) == pytest.approx(8.0)
+    assert contact_counts(SensorType(bits=12)) == pytest.approx(8.0 * 4095 / 1023)
+    assert contact_counts(SensorType(exponent=0.5)) == pytest.approx(64.0)  # forces are squares
 
 
 def rising(strong):
