@@ -16,7 +16,7 @@ SET = """objects:
 
 
 def test_a_campaign_over_worlds(tmp_path, monkeypatch):
-    few = {"COPIES": 2, "SMALL_PITCHES": (3.3,), "LAB_OBJECTS": 2, "OTHER_LABS": 1}
+    few = {"COPIES": 2, "SMALL_PITCHES": (3.3,), "LAB_OBJECTS": 1, "OTHER_LABS": 1}
     for name, count in few.items():  # each object takes time to make, as does each process
         monkeypatch.setattr(encoded_set, name, count)
     here = SimpleNamespace(

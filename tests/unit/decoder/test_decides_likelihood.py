@@ -22,6 +22,11 @@ PRODUCT = array_from({"family": "prpa", "factors": {
 MIXED = array_from({"family": "prmvpa", "factors": {
     "rows": {"order": 2, "degree": 3}, "columns": {"order": 4, "degree": 2}}})  # fmt: skip
 ARRAYS = {"binary": BINARY, "quaternary": QUATERNARY, "product": PRODUCT}
+OTHER_FIELDS = {
+    **{f"GF({q})": array_from({"family": "prmva", "order": q, "degree": n})
+       for q, n in ((3, 6), (5, 4), (8, 2), (9, 3))},
+    "one row": array_from({"family": "prbs", "order": 2, "degree": 8}),
+}  # fmt: skip
 ALL_TURNS = (0, 1, 2, 3)
 
 
@@ -64,11 +69,14 @@ def drawn(array, shape, seed, scale=1.5):
     return scale * np.random.default_rng(seed).normal(size=(*shape, array.order))
 
 
-@pytest.mark.parametrize("turns", [(0,), (3, 1), ALL_TURNS])
-@pytest.mark.parametrize("name", ARRAYS)
+@pytest.mark.parametrize(
+    ("name", "turns"),
+    [(name, turns) for name in ARRAYS for turns in ((0,), (3, 1), ALL_TURNS)]
+    + [(name, (0,)) for name in OTHER_FIELDS],
+)
 def test_doubt_margin_and_place_are_those_of_bayes_rule(name, turns):
-    array = ARRAYS[name]
-    for seed, shape in enumerate([(4, 4), (3, 5), (5, 3)]):
+    array = (ARRAYS | OTHER_FIELDS)[name]
+    for seed, shape in enumerate([(1, 14)] if name == "one row" else [(4, 4), (3, 5), (5, 3)]):
         scores = drawn(array, shape, seed)
         ranked, doubt, _ = bayes(array, scores, turns)
         found = Likelihood(array, rotations=turns, doubt=1.0).decode(scores)

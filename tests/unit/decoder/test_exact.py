@@ -169,15 +169,6 @@ def test_errors_and_erasures():
     assert (lost.errors, lost.erasures, lost.identifies, lost.rank) == (0, 0, False, 2)
 
 
-def test_any_set_of_cells():
-    rng = np.random.default_rng(0)
-    cells = np.nonzero(rng.random((7, 7)) < 0.5)
-    able = strength(ROBUST, *cells)
-    everywhere = np.indices((63, 65)).reshape(2, -1)
-    words = ROBUST.symbols(everywhere[0][:, None] + cells[0], everywhere[1][:, None] + cells[1])
-    assert able.distance == np.count_nonzero(words, axis=1).min()
-
-
 KEY = "0123-4567-89AB-CDER"
 
 

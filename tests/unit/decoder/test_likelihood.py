@@ -14,44 +14,11 @@ ROBUST = array_from({"family": "prba", "polynomial": "0x1655", "rows": 63, "colu
 ARRAYS = {
     "thesis": PROFILES["thesis"].array(),
     "GF(4)": PROFILES["one-touch"].array(),
-    "GF(8)": array_from({"family": "prmva", "order": 8, "degree": 4}),
     "GF(3)": array_from({"family": "prmva", "order": 3, "degree": 6}),
     "GF(9)": array_from({"family": "prmva", "order": 9, "degree": 3}),
-    "GF(5)": array_from({"family": "prmva", "order": 5, "degree": 4}),
     "product": PROFILES["product"].array(),
     "one row": array_from({"family": "prbs", "order": 2, "degree": 8}),
 }
-
-
-@pytest.mark.parametrize("name", ARRAYS)
-def test_soft_scores_are_ranked_as_by_comparison_with_every_place(name):
-    array = ARRAYS[name]
-    shape = {"one row": (1, 14), "thesis": (5, 5)}.get(name, (4, 4))
-    rng = np.random.default_rng(3)
-    scores = rng.normal(size=(6, *shape, array.order)).astype(np.float32)
-    scores[:, 0, 1] = 0  # a cell that is not seen
-    rows, columns, windows = every_window(array, shape)
-    high = scores - scores.max(axis=-1, keepdims=True)
-    every = np.take_along_axis(
-        high[:, None], windows[None, ..., None], axis=-1
-    )[..., 0].sum(axis=(2, 3), dtype=np.float64)  # fmt: skip
-    best = every.argmax(axis=1)
-    likelihoods = np.exp(every)
-    nothing = 0.01 / 0.99 * rows.size * np.exp(high).mean(-1, dtype=float).prod(axis=(1, 2))
-    total = likelihoods.sum(axis=1) + nothing
-    found = Likelihood(array, doubt=1.0).decode(scores)
-    np.testing.assert_array_equal(found.rows, rows[best])
-    np.testing.assert_array_equal(found.columns, columns[best])
-    ordered = np.sort(every, axis=1)
-    np.testing.assert_allclose(found.margins, ordered[:, -1] - ordered[:, -2], atol=2e-4)
-    doubts = 1 - likelihoods[np.arange(6), best] / total
-    np.testing.assert_allclose(found.doubts, doubts, rtol=1e-3)
-    listed = Likelihood(array).decode(scores, top=5)
-    for i in range(6):
-        places = np.argsort(-every[i], kind="stable")[:5]
-        assert [(c.row, c.column) for c in listed.candidates[i]] == list(
-            zip(rows[places], columns[places], strict=True)
-        )
 
 
 @pytest.mark.parametrize("name", ["thesis", "GF(4)", "GF(3)", "GF(9)"])

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import chdir
 from importlib import import_module
 from pathlib import Path
 
@@ -84,10 +85,18 @@ def test_output_into_a_closed_pipe_is_no_traceback():
     assert messages == b""
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("made")
+    with chdir(folder):
+        make()
+    return folder
+
+
 @pytest.fixture
-def cube():
+def cube(made):
     """A cube that is registered in lab.db, with its files."""
-    make()
+    shutil.copytree(made, ".", dirs_exist_ok=True)
 
 
 def test_show_tells_missing_and_changed_files(cube, capsys):

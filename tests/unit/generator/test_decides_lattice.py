@@ -177,24 +177,27 @@ def test_of_equal_places_more_cells_are_taken():
     assert len(found.cells[0]) == 7
 
 
-def rising(values):
-    return bool((np.diff(values) > 0).all())
+def in_quarter(quarter, number):
+    """A rank test that so many cells in a line pass where they are turned by so many quarters."""
+
+    def identifies(rows, columns):
+        along = (columns, -rows, -columns, rows)[quarter]
+        return len(rows) == number and bool((np.diff(along) > 0).all())
+
+    return identifies
 
 
-@pytest.mark.parametrize(
-    ("identifies", "quarter"),
-    [
-        (lambda rows, columns: len(rows) == 4 and rising(columns), 0),
-        (lambda rows, columns: len(rows) == 4 and rising(-rows), 1),
-        (lambda rows, columns: len(rows) == 4 and rising(-columns), 2),
-        (lambda rows, columns: len(rows) == 4 and rising(rows), 3),
-    ],
-)
-def test_where_no_window_fits_the_cells_that_pass_the_rank_test_are_the_place(identifies, quarter):
-    strip = rectangle(room(4, 2.0), room(1, 1.0))
+@pytest.mark.parametrize("quarter", range(4))
+@pytest.mark.parametrize(("number", "margin_mm"), [(4, 0.5), (2, None)])
+def test_the_most_cells_that_pass_the_rank_test_are_the_place_in_their_turn(
+    quarter, number, margin_mm
+):
+    strip = rectangle(room(4, 2.0), room(1, 1.0 if number == 4 else 2.0))
+    identifies = in_quarter(quarter, number)
     found = choose_lattice([region(strip)], HALF, PITCH, WINDOW, identifies)
-    assert (found.places, found.quarter, len(found.cells[0])) == ((1,), quarter, 4)
-    assert found.margin_mm == pytest.approx(0.5, abs=1e-5)
+    assert (found.places, found.quarter, len(found.cells[0])) == ((1,), quarter, number)
+    if margin_mm:
+        assert found.margin_mm == pytest.approx(margin_mm, abs=1e-5)
 
 
 def test_fewer_cells_are_taken_where_more_of_them_do_not_pass():
@@ -213,22 +216,10 @@ def test_fewer_cells_are_taken_where_more_of_them_do_not_pass():
     assert len(fewer.cells[0]) == max(n for n in tried if n < 4)  # the most that pass
 
 
-def test_of_the_cells_that_pass_the_most_are_taken_in_the_turn_that_passes():
+def test_all_cells_are_taken_where_any_pass():
     strip = [region(rectangle(room(4, 2.0), room(1, 2.0)))]
     found = choose_lattice(strip, HALF, PITCH, WINDOW, lambda *_: True)
     assert len(found.cells[0]) == 4
-    for quarter, passes in (
-        (0, lambda rows, columns: rising(columns)),
-        (1, lambda rows, columns: rising(-rows)),
-        (2, lambda rows, columns: rising(-columns)),
-        (3, lambda rows, columns: rising(rows)),
-    ):
-
-        def identifies(rows, columns, passes=passes):
-            return len(rows) == 2 and passes(rows, columns)
-
-        found = choose_lattice(strip, HALF, PITCH, WINDOW, identifies)
-        assert (found.places, found.quarter, len(found.cells[0])) == ((1,), quarter, 2)
     two = [*strip, region(rectangle(room(1, 0.5), room(1, 0.5), y=63.0))]
     found = choose_lattice(two, HALF, PITCH, WINDOW, lambda rows, _: len(rows) == 2)
     assert found.places == (1, 0)
@@ -237,10 +228,11 @@ def test_of_the_cells_that_pass_the_most_are_taken_in_the_turn_that_passes():
 def test_one_of_two_faces_that_passes_the_rank_test_is_enough():
     strips = [rectangle(room(4, 2.0), room(1, 1.0)), rectangle(room(2, 2.0), 9.0, y=63.0)]
     regions = [region(loop) for loop in strips]
-    found = choose_lattice(regions, HALF, PITCH, WINDOW, lambda rows, _: len(rows) == 4)
-    assert found.places == (1, 0)
-    found = choose_lattice(regions, HALF, PITCH, WINDOW, lambda rows, _: len(rows) == 2)
-    assert found.places == (0, 1)
+    for number, places in ((4, (1, 0)), (2, (0, 1))):
+        found = choose_lattice(
+            regions, HALF, PITCH, WINDOW, lambda rows, _, number=number: len(rows) == number
+        )
+        assert found.places == places
 
 
 def test_the_rank_test_is_not_asked_where_a_window_fits():

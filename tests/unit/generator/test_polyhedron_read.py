@@ -33,10 +33,18 @@ def refused(path, scale=1.0):
     return caught.value
 
 
-def written(folder, name, content):
-    path = folder / name
-    path.write_bytes(content.encode() if isinstance(content, str) else content)
-    return path
+@pytest.fixture
+def written(tmp_path):
+    """Write a file of a name with a text, bytes, or triangles (of an STL file)."""
+
+    def write(name, content):
+        if isinstance(content, str):
+            content = content.encode()
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else binary_stl(content))
+        return path
+
+    return write
 
 
 def binary_stl(triangles):
@@ -53,32 +61,32 @@ def triangles_of(solid):
     return [t for f in solid.faces for t in fan(solid.vertices[list(f.loops[0])])]
 
 
-def test_unit_of_a_step_file_is_honoured(tmp_path):
+def test_unit_of_a_step_file_is_honoured(written):
     text = (SHAPES_FOLDER / "cube_with_hole.step").read_text()
-    centimetres = written(tmp_path, "cm.stp", text.replace("SI_UNIT(.MILLI.,", "SI_UNIT(.CENTI.,"))
+    centimetres = written("cm.stp", text.replace("SI_UNIT(.MILLI.,", "SI_UNIT(.CENTI.,"))
     assert volume(read_shape(centimetres)) == pytest.approx(
         1000 * (60**3 - 60 * HEXAGON), rel=1e-12
     )
 
 
 def test_a_scaled_round_face_is_divided_as_finely():
-    plain, inches = (read_shape(SHAPES_FOLDER / "block_with_bore.step", s) for s in (1.0, 25.4))
-    assert volume(inches) == pytest.approx(25.4**3 * volume(plain), rel=1e-3)
-    assert len(inches.surfaces) == len(plain.surfaces)
-    assert all(surface.chord_error_mm <= 0.02 for surface in inches.surfaces)
+    plain, large = (read_shape(SHAPES_FOLDER / "block_with_bore.step", s) for s in (1.0, 6.0))
+    assert volume(large) == pytest.approx(6**3 * volume(plain), rel=1e-3)
+    assert len(large.surfaces) == len(plain.surfaces)
+    assert all(surface.chord_error_mm <= 0.02 for surface in large.surfaces)
 
 
-def test_obj_with_non_convex_polygons_negative_numbers_and_textures(tmp_path):
+def test_obj_with_non_convex_polygons_negative_numbers_and_textures(written):
     profile = [(0, 0), (80, 0), (80, 20), (20, 20), (20, 60), (0, 60)]
     lines = ["# an L", "mtllib l.mtl", "o L"]
     lines += [f"v {x} {y} {z}" for z in (0, 40) for x, y in profile]
     lines += ["vn 0 0 1", "f -12//1 -7//1 -8//1 -9//1 -10//1 -11//1", "f 7/1/1 8/2 9 10 11 12"]
     lines += [f"f {k + 1} {(k + 1) % 6 + 1} {(k + 1) % 6 + 7} {k + 7}" for k in range(6)]
-    solid = read_shape(written(tmp_path, "l.obj", "\n".join(lines).replace("10 11", "10 \\\n11")))
+    solid = read_shape(written("l.obj", "\n".join(lines).replace("10 11", "10 \\\n11")))
     assert (len(solid.faces), volume(solid)) == (8, pytest.approx(2400 * 40))
 
 
-def test_slivers_and_points_on_edges_vanish(tmp_path):
+def test_slivers_and_points_on_edges_vanish(written):
     # A cube whose front has a point on its upper edge, filled on the top by a flat triangle.
     cube = SHAPES["cube"](side=60)
     a, b, c, d = cube.vertices[[4, 5, 6, 7]]
@@ -87,37 +95,38 @@ def test_slivers_and_points_on_edges_vanish(tmp_path):
     triangles = [t for k in (0, 2, 3, 4) for t in fan(cube.vertices[list(cube.faces[k].loops[0])])]
     triangles += [(front[0], front[1], m), (front[1], b, m), (front[0], m, a)]
     triangles += [(a, b, c), (a, c, d), (a, m, b)]
-    solid = read_shape(written(tmp_path, "m.stl", binary_stl(triangles)))
+    solid = read_shape(written("m.stl", triangles))
     assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (8, 12, 6)
 
 
-def test_open_mesh_gives_the_place_and_the_count(tmp_path):
-    triangles = triangles_of(SHAPES["cube"](side=60))[:-1]
-    error = refused(written(tmp_path, "open.stl", binary_stl(triangles)))
-    assert "not closed: 3 edges have one face only, the first from (" in error.cause
-    assert "repair the mesh" in error.fix
-    assert error.place.endswith("open.stl")
+CUBE = triangles_of(SHAPES["cube"](side=60))
 
 
-def test_other_broken_meshes_are_told_apart(tmp_path):
-    triangles = triangles_of(SHAPES["cube"](side=60))
-    doubled = refused(written(tmp_path, "d.stl", binary_stl([*triangles, triangles[0]])))
-    assert "3 edges have more than two faces" in doubled.cause
-    turned = refused(written(tmp_path, "t.stl", binary_stl([triangles[0][::-1], *triangles[1:]])))
-    assert "disagree about outside" in turned.cause
-    flat = [(p, q, r) for p, q, r in triangles[:2]] + [(r, q, p) for p, q, r in triangles[:2]]
-    assert "it is flat" in refused(written(tmp_path, "f.stl", binary_stl(flat))).cause
-    dot = [np.zeros((3, 3))] * 4
-    assert "smaller than a rounding" in refused(written(tmp_path, "0.stl", binary_stl(dot))).cause
+@pytest.mark.parametrize(
+    ("triangles", "says"),
+    [
+        (CUBE[:-1], "not closed: 3 edges have one face only, the first from ("),
+        ([*CUBE, CUBE[0]], "3 edges have more than two faces"),
+        ([CUBE[0][::-1], *CUBE[1:]], "disagree about outside"),
+        ([*CUBE[:2], *(t[::-1] for t in CUBE[:2])], "it is flat"),
+        ([np.zeros((3, 3))] * 4, "smaller than a rounding"),
+    ],
+    ids=["open", "doubled", "turned", "flat", "dot"],
+)
+def test_broken_meshes_are_told_apart(written, triangles, says):
+    error = refused(written("broken.stl", triangles))
+    assert says in error.cause
+    assert error.fix
+    assert error.place.endswith("broken.stl")
 
 
-def test_bodies_are_counted_and_described(tmp_path):
-    cube = np.array(triangles_of(SHAPES["cube"](side=60)))
+def test_bodies_are_counted_and_described(written):
+    cube = np.array(CUBE)
     middle = cube.mean(axis=(0, 1))
     small = middle + 200 + (cube - middle) / 3
     void = (middle + (cube - middle) / 2)[:, ::-1]
     many = np.concatenate([small, cube, void])
-    error = refused(written(tmp_path, "3.stl", binary_stl(many)))
+    error = refused(written("3.stl", many))
     x, y, z = middle
     assert error.cause == (
         f"3 separate bodies: 60 x 60 x 60 mm about ({x:g}, {y:g}, {z:g}), a void of 30 x 30 x 30 "
@@ -126,7 +135,7 @@ def test_bodies_are_counted_and_described(tmp_path):
     )
     assert "boolean union" in error.fix
     six = np.concatenate([cube + 100 * k for k in range(6)])
-    assert ", 2 smaller; one" in refused(written(tmp_path, "6.stl", binary_stl(six))).cause
+    assert ", 2 smaller; one" in refused(written("6.stl", six)).cause
 
 
 def prism(ring, height, caps):
@@ -142,32 +151,32 @@ def prism(ring, height, caps):
     return found
 
 
-def test_a_notch_of_a_rounding_is_welded_and_it_is_said(tmp_path):
+def test_a_notch_of_a_rounding_is_welded_and_it_is_said(written):
     """The mouth of a notch 1.2 um wide is closed, so that its outline touches itself."""
     ring = [(0, 0), (100, 0), (100, 20), (50, 20), (50.0006, 19.9992), (49.9994, 19.9992),
             (50, 20), (0, 20)]  # fmt: skip
     faces = [f"f {' '.join(str(k + 1) for k in reversed(range(8)))}", "f 9 10 11 12 13 14 15 16"]
     faces += [f"f {k + 1} {(k + 1) % 8 + 1} {(k + 1) % 8 + 9} {k + 9}" for k in range(8)]
     points = [f"v {x} {y} {z}" for z in (0, 30) for x, y in ring]
-    solid = read_shape(written(tmp_path, "notch.obj", "\n".join(points + faces)))
+    solid = read_shape(written("notch.obj", "\n".join(points + faces)))
     assert len(solid.faces) == 6
     assert volume(solid) == pytest.approx(100 * 20 * 30, rel=1e-6)
     assert solid.notes == ("points nearer than 0.0023 mm were joined",)
 
 
-def test_slivers_of_a_wall_do_not_join_the_top(tmp_path):
+def test_slivers_of_a_wall_do_not_join_the_top(written):
     """Between two walls that meet the top stands one 1.5 um wide, and a sliver of the top."""
     ring = [(0, 0), (100, 0), (100, 60), (60, 60.0015), (60, 60), (0, 60)]
     found = prism(ring, 40, [(0, k, k + 1) for k in range(1, 5)])
-    solid = read_shape(written(tmp_path, "w.stl", binary_stl(found)))
+    solid = read_shape(written("w.stl", found))
     assert volume(solid) == pytest.approx(100 * 60 * 40, rel=1e-4)
 
 
-def test_obj_in_utf_16_is_read_and_other_bytes_are_named(tmp_path):
+def test_obj_in_utf_16_is_read_and_other_bytes_are_named(written):
     for encoding in ("utf-16", "utf-8-sig"):
-        solid = read_shape(written(tmp_path, "t.obj", TETRAHEDRON.encode(encoding)))
+        solid = read_shape(written("t.obj", TETRAHEDRON.encode(encoding)))
         assert volume(solid) == pytest.approx(60**3 / 6)
-    error = refused(written(tmp_path, "t.obj", TETRAHEDRON.encode("utf-16-le")))
+    error = refused(written("t.obj", TETRAHEDRON.encode("utf-16-le")))
     assert (error.cause, error.fix[:15]) == (
         "it is no plain text: byte 1 is zero",
         "save it as text",
@@ -187,16 +196,16 @@ def sphere(rows, columns, radius=30.0):
     ]
 
 
-def test_a_sphere_stays_blank(tmp_path):
-    solid = read_shape(written(tmp_path, "s.stl", binary_stl(sphere(24, 48))))
+def test_a_sphere_stays_blank(written):
+    solid = read_shape(written("s.stl", sphere(24, 48)))
     assert len(solid.blank) == len(solid.faces) == 1152
     assert {face.name.partition(".")[0] for face in solid.faces} == {"F1"}
     assert "1 curved region stays blank, 1152 of 1152 facets: F1 about (0, 0, 0)" in solid.notes[-1]
 
 
-def test_too_many_faces_are_counted_not_called_curved(tmp_path, monkeypatch):
+def test_too_many_faces_are_counted_not_called_curved(written, monkeypatch):
     monkeypatch.setattr(merge, "MOST_FACETS", 1000)
-    error = refused(written(tmp_path, "s.stl", binary_stl(sphere(24, 48))))
+    error = refused(written("s.stl", sphere(24, 48)))
     assert error.cause.startswith("1152 planar faces, the smallest of ")
     assert error.cause.endswith(" mm^2; 1000 are allowed")
 
@@ -209,28 +218,28 @@ def rounded_bar(steps):
     return prism(ring, 50, [(0, k, k + 1) for k in range(1, len(ring) - 1)])
 
 
-def test_planar_faces_of_a_rounded_mesh_keep_their_symbols(tmp_path):
-    solid = read_shape(written(tmp_path, "r.stl", binary_stl(rounded_bar(100))))
+def test_planar_faces_of_a_rounded_mesh_keep_their_symbols(written):
+    solid = read_shape(written("r.stl", rounded_bar(100)))
     blank = [solid.faces[face].name for face in solid.blank]
     assert blank == ["F7", *(f"F7.{k}" for k in range(2, 101))]
     plain = [f.name for k, f in enumerate(solid.faces) if k not in solid.blank]
     assert sorted(plain) == [f"F{k}" for k in range(1, 7)]
     assert volume(solid) == pytest.approx(50 * (2400 - 100 + 25 * np.pi), rel=1e-4)
     assert "100 of 106 facets: F7 about (55, 35, 25)" in solid.notes[-1]
-    few = read_shape(written(tmp_path, "f.stl", binary_stl(rounded_bar(20))))
+    few = read_shape(written("f.stl", rounded_bar(20)))
     assert (len(few.faces), few.blank) == (26, ())
 
 
-def test_corners_on_other_edges_are_joined(tmp_path):
+def test_corners_on_other_edges_are_joined(written):
     """One side of a box has an edge that its neighbours have in two and three pieces."""
     found = prism([(0, 0), (30, 0), (30, 20), (0, 20)], 10, [])
     found += [((0, 0, 10), (10, 0, 10), (0, 20, 10)), ((10, 0, 10), (18, 0, 10), (0, 20, 10)),
               ((18, 0, 10), (30, 0, 10), (0, 20, 10)), ((30, 0, 10), (30, 20, 10), (0, 20, 10)),
               ((15, 0, 0), (0, 0, 0), (0, 20, 0)), ((30, 0, 0), (15, 0, 0), (0, 20, 0)),
               ((30, 0, 0), (0, 20, 0), (30, 20, 0))]  # fmt: skip
-    solid = read_shape(written(tmp_path, "t.stl", binary_stl(found)))
+    solid = read_shape(written("t.stl", found))
     assert (len(solid.faces), volume(solid)) == (6, pytest.approx(6000.0))
-    gap = refused(written(tmp_path, "g.stl", binary_stl(found[:-1])))
+    gap = refused(written("g.stl", found[:-1]))
     assert "not closed" in gap.cause
 
 
@@ -240,13 +249,13 @@ def test_step_without_the_kernel_says_what_to_install(monkeypatch):
     assert "pip install 'encoded-objects[cad]'" in error.fix
 
 
-def test_step_that_crashes_the_kernel_is_refused(tmp_path):
+def test_step_that_crashes_the_kernel_is_refused(written):
     # Digits changed at random: kernel 7.9 ends with signal 11 on this one.
     content = bytearray((SHAPES_FOLDER / "cube_with_hole.step").read_bytes())
     rng = np.random.default_rng(2)
     for _ in range(rng.integers(1, 40)):
         content[rng.integers(900, len(content) - 60)] = ord("0") + rng.integers(0, 10)
-    error = refused(written(tmp_path, "damaged.step", bytes(content)))
+    error = refused(written("damaged.step", bytes(content)))
     assert "damaged" in error.fix
 
 
@@ -279,8 +288,8 @@ def test_step_that_crashes_the_kernel_is_refused(tmp_path):
         ("a", "x", "a", "no suffix"),
     ],
 )
-def test_bad_files_give_place_cause_and_way_out(tmp_path, name, content, place, says):
-    error = refused(written(tmp_path, name, content))
+def test_bad_files_give_place_cause_and_way_out(tmp_path, written, name, content, place, says):
+    error = refused(written(name, content))
     assert error.place == str(tmp_path / place)
     assert says in error.cause
     assert error.fix
@@ -293,10 +302,10 @@ def test_missing_and_large_files(tmp_path, monkeypatch):
     assert "MB are allowed" in refused(SHAPES_FOLDER / "l_bracket.stl").cause
 
 
-def test_faces_of_a_file_are_named_with_the_file(tmp_path):
+def test_faces_of_a_file_are_named_with_the_file(written):
     # A notch whose tip cuts through the back of the bar.
     ring = [(0, 0), (60, 0), (60, 60), (30, -5), (0, 60)]
     found = prism(ring, 40, [(0, 1, 3), (1, 2, 3), (0, 3, 4)])
-    error = refused(written(tmp_path, "c.stl", binary_stl(found)))
-    assert error.place == str(tmp_path / "c.stl")
+    error = refused(written("c.stl", found))
+    assert error.place.endswith("c.stl")
     assert "face F1: the edge between vertices 4 and 6 runs through it" in error.cause

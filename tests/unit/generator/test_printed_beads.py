@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -96,15 +97,19 @@ def some_beads(rng: np.random.Generator, count: int = 40) -> Beads:
                  height)  # fmt: skip
 
 
+def each_bead(beads: Beads) -> Iterator[tuple]:
+    """Ends, top, width and height of each."""
+    sizes = (beads.top_mm, beads.width_mm, beads.height_mm)
+    return zip(beads.start_mm, beads.end_mm, *sizes, strict=True)
+
+
 def test_from_above_the_highest_of_all_beads_counts(rng: np.random.Generator) -> None:
     beads = some_beads(rng)
     low, step, shape = np.array([-0.53, -0.51]), 0.13, (45, 40)
     heights = heights_from_above(beads, low, shape, step)
     x, y = low[0] + step * np.arange(40), low[1] + step * np.arange(45)
     expected = np.full(shape, -np.inf)
-    for a, b, top, w, h in zip(
-        beads.start_mm, beads.end_mm, beads.top_mm, beads.width_mm, beads.height_mm, strict=True
-    ):
+    for a, b, top, w, h in each_bead(beads):
         way = b - a
         for i, yy in enumerate(y):
             for j, xx in enumerate(x):
@@ -127,8 +132,7 @@ def test_sideways_the_outermost_of_all_beads_counts(rng: np.random.Generator) ->
         for j in range(0, shape[1], 3):
             t = low[0] + step * j
             reach = -np.inf
-            for a, b, top, w, h in zip(beads.start_mm, beads.end_mm, beads.top_mm, beads.width_mm,
-                                       beads.height_mm, strict=True):  # fmt: skip
+            for a, b, top, w, h in each_bead(beads):
                 if not top - h <= z <= top:
                     continue
                 way, points = b - a, np.stack([np.full(len(n), t), n], axis=1)

@@ -130,7 +130,6 @@ def test_names_and_numbers() -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("worse", "unknown fault 'worse'"),
         ("flow=1,bad", "unknown fault 'bad'"),
         ("backlash=0.1", "did you mean backlash_mm"),
         ("flow=much", "flow 'much'"),

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from generator.errors import GeneratorError
 from generator.pipeline.plan import plan_object
-from generator.printers import PRINTERS, known_printers, printer_named
 from generator.spec import ObjectSpec, SpecError, read_specs
 
 CUBE = "name: Cube\nshape: {cube: 60 mm}\n"
@@ -18,19 +16,6 @@ def spec_of(folder: Path, text: str) -> ObjectSpec:
     path = folder / "c.yaml"
     path.write_text(CUBE + text)
     return read_specs([path])[0]
-
-
-def test_machines_have_beds_and_the_limits_of_their_nozzles() -> None:
-    a1 = printer_named("bambu-a1-mini-0.2")
-    assert (a1.bed_mm, a1.nozzle_mm, a1.layer_mm) == ((180.0, 180.0), 0.2, 0.1)
-    assert a1.stroke_min_mm == PRINTERS["fdm-0.25"].stroke_min_mm
-    assert printer_named("ender-3").stroke_min_mm == PRINTERS["fdm-0.4"].stroke_min_mm
-    assert printer_named("voron-300-0.6").layer_mm == 0.3
-    assert len({printer.name for printer in known_printers()}) == len(list(known_printers())) > 15
-    for wrong in ("ender", "ender-3-0.5", "prusa-sl1s-0.4", "bambu"):
-        with pytest.raises(GeneratorError, match=f"unknown printer '{wrong}'") as caught:
-            printer_named(wrong)
-        assert "prusa-mk4" in caught.value.fix
 
 
 @pytest.mark.parametrize(

@@ -72,10 +72,23 @@ def over_a_corner(found):
     return replace(image, forces=forces, loaded=loaded), gain
 
 
-def starts(gain, count=6):
+def started(name, count=6):
+    """Return the image of a scene, and poses and gains beside the true ones."""
+    image, gain = SCENES[name]()
     draw = np.random.default_rng(11)
     pose = TRUE + draw.normal(0, [0.2, 0.2, 0.05, 0.1, 0.1, 0.03, 0.003], (count, 7))
-    return pose, gain * draw.lognormal(0, 0.05, (count, 4))
+    gains = gain * draw.lognormal(0, 0.05, (count, 4))
+    if name.endswith("each gain"):
+        image = replace(image, falls=np.repeat(image.falls, count, axis=0) * gains[:, 1:2])
+    return image, pose, gains
+
+
+def over_corners(count, seed):
+    """Return an image over a corner, and lattices anywhere on it."""
+    image, gain = over_a_corner(scene(tilt=0.6))
+    pose = np.zeros((count, 7))
+    pose[:, :3] = np.random.default_rng(seed).random((count, 3)) * [5.0, 5.0, 6.3]
+    return image, pose, np.repeat(gain, count, axis=0)
 
 
 def given(cells):
@@ -89,10 +102,7 @@ def nothing(cells):
 @pytest.mark.parametrize("labels_at", [None, given], ids=["chosen", "given"])
 @pytest.mark.parametrize("name", SCENES)
 def test_one_evaluation(name, labels_at):
-    image, gain = SCENES[name]()
-    pose, gains = starts(gain)
-    if name.endswith("each gain"):
-        image = replace(image, falls=np.repeat(image.falls, len(pose), axis=0) * gains[:, 1:2])
+    image, pose, gains = started(name)
     expected, fast = (
         one.refine_lattices(image, pose, gains, steps=0, labels_at=labels_at)
         for one in (touch_loops, fit)
@@ -108,19 +118,14 @@ def test_one_evaluation(name, labels_at):
     "name", ["flat", "hanging in the air", "over a corner", "weak, beside noise", "a pad"]
 )
 def test_the_same_pose_is_reached(name):
-    image, gain = SCENES[name]()
-    pose, gains = starts(gain)
+    image, pose, gains = started(name)
     reached = [one.refine_lattices(image, pose, gains, steps=8) for one in (touch_loops, fit)]
     assert np.abs(reached[0].pose[:, :3] - reached[1].pose[:, :3]).max() < 1e-6
     assert np.abs(reached[0].value - reached[1].value).max() < 1e-3
 
 
 def test_cells_seen_by_their_rim_alone_show_what_the_reference_says():
-    image, gain = over_a_corner(scene(tilt=0.6))
-    draw = np.random.default_rng(3)
-    pose = np.zeros((60, 7))
-    pose[:, :3] = draw.random((60, 3)) * [5.0, 5.0, 6.3]
-    gains = np.repeat(gain, 60, axis=0)
+    image, pose, gains = over_corners(60, 3)
     found = [one.refine_lattices(image, pose, gains, steps=0).normal for one in (touch_loops, fit)]
     size = np.sqrt(np.einsum("bii->bi", found[0]))
     away = np.abs(found[0] - found[1]) / (size[:, :, None] * size[:, None, :])
@@ -128,10 +133,8 @@ def test_cells_seen_by_their_rim_alone_show_what_the_reference_says():
 
 
 def test_whether_a_symbol_is_worn_is_what_the_reference_says():
-    image, gain = over_a_corner(scene(tilt=0.6))
-    pose = np.zeros((60, 7))
-    pose[:, :3] = np.random.default_rng(5).random((60, 3)) * [5.0, 5.0, 6.3]
-    lattices = touch_loops.refine_lattices(image, pose, np.repeat(gain, 60, axis=0), steps=0)
+    image, pose, gains = over_corners(60, 5)
+    lattices = touch_loops.refine_lattices(image, pose, gains, steps=0)
     worn = []
     for one in (touch_loops, fit):
         fits = one.score_cells(image, lattices)
@@ -170,10 +173,7 @@ def test_the_sources_are_compiled_without_a_warning(tmp_path):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_cells_score_alike(name):
-    image, gain = SCENES[name]()
-    pose, gains = starts(gain)
-    if name.endswith("each gain"):
-        image = replace(image, falls=np.repeat(image.falls, len(pose), axis=0) * gains[:, 1:2])
+    image, pose, gains = started(name)
     lattices = touch_loops.refine_lattices(image, pose, gains, steps=0)
     expected = touch_loops.score_cells(image, lattices)
     for one, other in zip(fit.score_cells(image, lattices), expected, strict=True):

@@ -67,20 +67,6 @@ def test_nothing_is_said_of_few_touches_or_of_what_no_touch_loaded():
     assert not answering_of(images).dead[:, 12:].any()
 
 
-def test_many_dead_tactels_are_found_among_each_other():
-    images = pressed(60)
-    gone = np.random.default_rng(5).random((16, 16)) < 0.4
-    images[:, gone] = 0.0
-    for at in HOT:
-        images[:, *at] = images[:, 1, 1]
-    found = answering_of(images)
-    live = ~gone
-    for at in (*DEAD, *HOT):
-        live[at] = False
-    assert found.dead[gone].mean() > 0.97
-    assert not found.dead[live].any()
-
-
 def test_a_floating_network_is_inverted_up_to_a_scale():
     rng = np.random.default_rng(1)
     g = np.where(rng.random((16, 16)) < 0.4, rng.uniform(0.3, 1.0, (16, 16)), 1e-3)
