@@ -26,14 +26,14 @@ SHORTEST_EDGE_MM = 2.0  #: shorter edges carry nothing and print badly
 _TRIES = 200
 
 
-def random_convex(rng: np.random.Generator, shortest_mm: float = SHORTEST_EDGE_MM) -> Polyhedron:
-    """Return a convex polyhedron without edges shorter than `shortest_mm`."""
-    return _first_good(rng, (_cloud, _lattice, _truncated_block), shortest_mm)
+def random_convex(rng: np.random.Generator) -> Polyhedron:
+    """Return a convex polyhedron without short edges."""
+    return _first_good(rng, (_cloud, _lattice, _truncated_block))
 
 
-def random_nonconvex(rng: np.random.Generator, shortest_mm: float = SHORTEST_EDGE_MM) -> Polyhedron:
-    """Return a non-convex polyhedron, of genus 0 or 1, without edges below `shortest_mm`."""
-    return _first_good(rng, (_star, _steps, _frame, _block_with_boss), shortest_mm)
+def random_nonconvex(rng: np.random.Generator) -> Polyhedron:
+    """Return a non-convex polyhedron, of genus 0 or 1, without short edges."""
+    return _first_good(rng, (_star, _steps, _frame, _block_with_boss))
 
 
 def convex_hull(points: Floats) -> Polyhedron:
@@ -76,9 +76,7 @@ def extruded(
 
 
 def _first_good(
-    rng: np.random.Generator,
-    makers: Sequence[Callable[[np.random.Generator], Polyhedron]],
-    shortest_mm: float,
+    rng: np.random.Generator, makers: Sequence[Callable[[np.random.Generator], Polyhedron]]
 ) -> Polyhedron:
     maker = makers[int(rng.integers(len(makers)))]
     for _ in range(_TRIES):
@@ -86,12 +84,9 @@ def _first_good(
             solid = maker(rng)
         except ShapeError:
             continue  # a draw that touches itself; the next one is as random
-        if min(edge_length(solid, k) for k in range(len(solid.edges))) >= shortest_mm:
+        if min(edge_length(solid, k) for k in range(len(solid.edges))) >= SHORTEST_EDGE_MM:
             return solid
-    raise ShapeError(
-        f"no random solid has edges of {shortest_mm:g} mm or more after {_TRIES} draws",
-        fix="ask for shorter edges",
-    )
+    raise RuntimeError(f"no random solid without short edges after {_TRIES} draws")
 
 
 def _cloud(rng: np.random.Generator) -> Polyhedron:

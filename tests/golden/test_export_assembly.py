@@ -7,6 +7,7 @@ import struct
 
 import numpy as np
 import pytest
+from reference.kernel import named_parts
 
 from generator.export.colours import BODY_RGB
 from generator.export.meshes import glb_bytes
@@ -29,49 +30,6 @@ def parts():
     return panels(solid, EMPTY, (), 3.0, printer_named("fdm-0.4"), name="Würfel", code="K").parts
 
 
-def read_assembly(path):
-    """Return the free shapes: name, and of each component name, shape where it is, colour."""
-    from OCP.Quantity import Quantity_Color, Quantity_TOC_sRGB
-    from OCP.STEPCAFControl import STEPCAFControl_Reader
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDataStd import TDataStd_Name
-    from OCP.TDF import TDF_Label, TDF_LabelSequence
-    from OCP.TDocStd import TDocStd_Document
-    from OCP.XCAFDoc import (
-        XCAFDoc_ColorSurf,
-        XCAFDoc_ColorTool,
-        XCAFDoc_DocumentTool,
-        XCAFDoc_ShapeTool,
-    )
-
-    def name_of(label):
-        found = TDataStd_Name()
-        assert label.FindAttribute(TDataStd_Name.GetID_s(), found)
-        return found.Get().ToExtString()
-
-    document = TDocStd_Document(TCollection_ExtendedString("x"))
-    reader = STEPCAFControl_Reader()
-    reader.SetColorMode(True)
-    reader.SetNameMode(True)
-    reader.ReadFile(str(path))
-    reader.Transfer(document)
-    free = TDF_LabelSequence()
-    XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(free)
-    assert free.Length() == 1
-    whole = free.Value(1)
-    held = TDF_LabelSequence()
-    XCAFDoc_ShapeTool.GetComponents_s(whole, held)
-    components = []
-    for k in range(1, held.Length() + 1):
-        own, colour = TDF_Label(), Quantity_Color()
-        XCAFDoc_ShapeTool.GetReferredShape_s(held.Value(k), own)
-        assert XCAFDoc_ColorTool.GetColor_s(own, XCAFDoc_ColorSurf, colour)
-        rgb = colour.Values(Quantity_TOC_sRGB)
-        shape = XCAFDoc_ShapeTool.GetShape_s(held.Value(k))
-        components.append((name_of(held.Value(k)), shape, rgb))
-    return name_of(whole), components
-
-
 def test_panels_stand_where_they_belong_with_names_and_colours(parts, tmp_path):
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.BRepGProp import BRepGProp
@@ -79,7 +37,7 @@ def test_panels_stand_where_they_belong_with_names_and_colours(parts, tmp_path):
 
     path = tmp_path / "a.step"
     path.write_bytes(b"".join(assembly_chunks("Würfel", parts)))
-    name, components = read_assembly(path)
+    name, components = named_parts(path)
     assert name == "Würfel"
     assert [component[0] for component in components] == [f"Würfel-F{k}" for k in range(1, 6)]
     for (_, shape, rgb), part in zip(components, parts, strict=True):

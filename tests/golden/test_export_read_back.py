@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reference.cube_panels import cube_panels, embossed
+from reference.kernel import named_parts
 
 from generator.errors import SolidError
 from generator.export.check import STEP_VOLUME, verify_step, verify_stl
@@ -84,37 +85,9 @@ def test_engraved_symbols(panel: Part, tmp_path: Path) -> None:
 
 
 def test_names_and_colours_in_step(part: Part, tmp_path: Path) -> None:
-    from OCP.Interface import Interface_Static
-    from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
-    from OCP.STEPCAFControl import STEPCAFControl_Controller, STEPCAFControl_Reader
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDataStd import TDataStd_Name
-    from OCP.TDF import TDF_ChildIterator, TDF_LabelSequence
-    from OCP.TDocStd import TDocStd_Document
-    from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
-
-    def name_of(label) -> str:
-        name = TDataStd_Name()
-        return (
-            name.Get().ToExtString() if label.FindAttribute(TDataStd_Name.GetID_s(), name) else ""
-        )
-
     step, _ = written(part, tmp_path)
-    STEPCAFControl_Controller.Init_s()
-    Interface_Static.SetIVal_s("read.stepcaf.subshapes.name", 1)
-    document = TDocStd_Document(TCollection_ExtendedString("document"))
-    reader = STEPCAFControl_Reader()
-    reader.SetNameMode(True)
-    reader.SetColorMode(True)
-    reader.ReadFile(str(step))
-    assert reader.Transfer(document)
-    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
-    free = TDF_LabelSequence()
-    shapes.GetFreeShapes(free)
-    assert free.Length() == 1
-    assert name_of(free.Value(1)) == part.name
-
+    name, faces = named_parts(step)
+    assert name == part.name
     expected: Counter[tuple[str, bool]] = Counter((facet.name, False) for facet in part.facets)
     for embossing in part.embossings:
         facet, coloured = part.facets[embossing.facet].name, embossing.face is not None
@@ -126,15 +99,10 @@ def test_names_and_colours_in_step(part: Part, tmp_path: Path) -> None:
             if len(rings[0]) > 1:
                 expected[f"{facet}/{name}/inside", False] += len(rings[0]) - 1
     found: Counter[tuple[str, bool]] = Counter()
-    children = TDF_ChildIterator(free.Value(1))
-    while children.More():
-        colour = Quantity_Color()
-        coloured = colours.GetColor_s(children.Value(), XCAFDoc_ColorType.XCAFDoc_ColorSurf, colour)
-        found[name_of(children.Value()), coloured] += 1
-        if coloured:
-            rgb = colour.Values(Quantity_TypeOfColor.Quantity_TOC_sRGB)
+    for name, _, rgb in faces:
+        found[name, rgb is not None] += 1
+        if rgb is not None:
             assert rgb == pytest.approx([value / 255 for value in SYMBOL_RGB], abs=1e-3)
-        children.Next()
     assert found == expected
 
 
@@ -200,13 +168,16 @@ def test_3mf_passes_the_strict_reader(panel: Part, grouping: str, tmp_path: Path
     assert boxes[0][0][1] + 5 <= boxes[1][0][0] + 1e-4
 
 
+def node_names(glb: bytes) -> list[str]:
+    length = struct.unpack_from("<I", glb, 12)[0]
+    return [node["name"] for node in json.loads(glb[20 : 20 + length])["nodes"]]
+
+
 def test_glb_has_a_node_for_each_face(slanted: Part, panel: Part) -> None:
     import trimesh
 
     content = glb_bytes("Octahedron", [slanted], [triangles(slanted)])
-    length = struct.unpack_from("<I", content, 12)[0]
-    nodes = json.loads(content[20 : 20 + length])["nodes"]
-    assert [node["name"] for node in nodes] == ["Octahedron", *(f.name for f in slanted.facets)]
+    assert node_names(content) == ["Octahedron", *(f.name for f in slanted.facets)]
     scene = trimesh.load(io.BytesIO(content), file_type="glb")
     merged = scene.to_geometry()
     assert merged.volume == pytest.approx(volume(slanted) * 1e-9, rel=1e-5)
@@ -217,5 +188,4 @@ def test_glb_has_a_node_for_each_face(slanted: Part, panel: Part) -> None:
     expected = [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]]
     np.testing.assert_allclose(scene.bounds, expected, atol=1e-7)
     pair = glb_bytes("Cube", [panel, panel], [triangles(panel)] * 2)
-    length = struct.unpack_from("<I", pair, 12)[0]
-    assert [n["name"] for n in json.loads(pair[20 : 20 + length])["nodes"]] == ["Cube", "F1", "F1"]
+    assert node_names(pair) == ["Cube", "F1", "F1"]

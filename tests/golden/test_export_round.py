@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from reference.kernel import solid_of
 from reference.laid_symbols import layout_on_round_face
 
 from generator.alphabet.known import alphabet_named
@@ -65,16 +66,12 @@ def read_faces(path):
 
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.STEPControl import STEPControl_Reader
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
     from OCP.TopExp import TopExp
     from OCP.TopoDS import TopoDS
     from OCP.TopTools import TopTools_IndexedMapOfShape
 
-    reader = STEPControl_Reader()
-    reader.ReadFile(str(path))
-    reader.TransferRoots()
-    shape = reader.OneShape()
+    shape = solid_of(path)
 
     def parts(kind):
         found = TopTools_IndexedMapOfShape()

@@ -278,7 +278,7 @@ def step_of(solid):
         return path.read_bytes()
 
 
-@settings(max_examples=4, deadline=None)  # the kernel starts in a process of its own
+@settings(max_examples=3, deadline=None)  # the kernel starts in a process of its own
 @given(SOLIDS)
 def test_step_gives_the_faces_back(solid):
     assert_same(solid, read(".step", step_of(solid)), rel=1e-9)

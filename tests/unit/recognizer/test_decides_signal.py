@@ -112,6 +112,13 @@ def test_nothing_is_felt_where_every_tactel_is_bad():
     assert (found.contact, found.newtons) == (False, True)
 
 
+def test_where_a_type_has_no_tactel_nothing_is_trusted():
+    sensor = SensorType(rows=6, columns=6, missing=((5, 5),))
+    trust = np.ones((6, 6))
+    trust[5, 5] = 0.0
+    np.testing.assert_array_equal(signal_of(six(50.0), floor=0.0, sensor=sensor).trust, trust)
+
+
 def test_a_single_good_tactel_is_read():
     trust = np.zeros((3, 3))
     trust[1, 1] = 1.0
@@ -170,6 +177,8 @@ def test_noise_is_that_of_tactels_that_nothing_presses():
     assert noise_of(np.full(9, 3.5)) == 0.0
     assert noise_of(np.full(9, 3.0)) == pytest.approx(np.sqrt(1 / 12))  # counts are rounded
     assert noise_of(np.array([0.0] * 9 + [180.0] * 7)) == pytest.approx(np.sqrt(1 / 12))
+    mostly_pressed = np.r_[np.arange(5) / 10, 10.0 + np.arange(15)]  # a quarter is free
+    assert noise_of(mostly_pressed) < 0.5
     by_hand = np.array([0.0] * 3 + [1.0] * 13)  # mode 1, three one below it
     assert noise_of(by_hand) == pytest.approx(np.sqrt(3 / (3 + 13 / 2) + 1 / 12))
     assert Signal(by_hand, by_hand, contact=True, newtons=False).noise == 0.0  # nobody says it
@@ -195,6 +204,7 @@ def test_a_contact_rises_by_seven_deviations_of_readings_on_a_scale(sigmas, cont
     level, noise = float(np.quantile(image, 0.05)), noise_of(image.ravel())
     assert noise == pytest.approx(0.01, rel=0.2)
     image.ravel()[:6] = level + sigmas * noise
+    image.ravel()[100] = 0.0  # that one reading is whole makes them no counts
     assert noise_of(image.ravel()) == pytest.approx(noise, rel=0.01)
     assert signal_of(image).contact is contact
     monkeypatch.setattr(signal, "SCALE_SIGMAS", 1e9)

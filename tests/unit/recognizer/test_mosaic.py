@@ -515,28 +515,9 @@ def test_a_few_decoded_touches_place_all_on_the_face():
     assert (chi2 < 16.3).mean() > 0.9
 
 
-def test_where_all_are_decoded_they_stay():
-    assert np.sqrt(np.mean(errors(mosaic_of(touches(decoded=range(16)))) ** 2)) < 0.04
-
-
 def test_a_wrongly_decoded_touch_is_overruled():
     mosaic = mosaic_of(touches(decoded=(0, 3, 6, 9, 10, 13), wrong=(0,)))
     assert errors(mosaic).max() < 0.3
-
-
-def test_steps_do_not_drift():
-    true, signals = scanned()
-    rng = np.random.default_rng(3)
-    spread = np.array([0.5 * P, 0.5 * P, 0.5 * DEG])
-    some = [PlacedTouch(signals[0], planar_belief(true[0], DECODED))]
-    counted = [true[0]]
-    for k in range(1, 16):
-        step = relative_pose(true[k - 1], true[k]) + rng.normal(0, spread)
-        counted.append(compose_poses(counted[-1], step))
-        some.append(PlacedTouch(signals[k], stepped=planar_belief(step, spread), seq=k))
-    mosaic = mosaic_of(some)
-    assert errors(mosaic).max() < 0.4
-    assert errors(mosaic).max() < np.hypot(*(np.array(counted) - true)[:, :2].T).max() / P / 3
 
 
 def test_blank_touches_stay_where_they_are_believed():

@@ -16,7 +16,7 @@ from recognizer.errors import TouchError
 from recognizer.touch.lab import open_lab
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import read_touch, recognise
+from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     BY_CHANCE,
@@ -29,8 +29,6 @@ from recognizer.touch.recognition import (
 )
 from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.template import psi, template_of
-from recognizer.touch.verdict import is_encoded
-from recognizer.touch.verify import TouchImages, verify_hypotheses
 
 
 @pytest.fixture(scope="module")
@@ -64,20 +62,6 @@ def test_a_clean_touch_is_placed(url, reader, name, face):
         assert found.margin > 20
         scene = registered_surface(url, name, face)
         assert found.T_object_probe == pytest.approx(scene.T_object_surface @ T)
-
-
-def test_the_reading_behind_an_answer(url, reader):
-    signal = signal_of(felt(url, "Cube", "F3", Touch(28.0, 33.0, 2.0, 70.0)), newtons=True)
-    reading = read_touch(reader, signal)
-    answer, hypothesis = reading.answer, reading.best
-    assert hypothesis.embossed.face(hypothesis.hypothesis.face).face == answer.face == "F3"
-    speaks = hypothesis.evidence
-    assert is_encoded(speaks)
-    assert speaks.explained > 0.85
-    assert speaks.inliers >= 9
-    assert speaks.contradictions == speaks.strong_contradictions == 0
-    scores = [r.score for r in verify_hypotheses(TouchImages(reader, signal), reader.options.first)]
-    assert scores == sorted(scores, reverse=True)
 
 
 def test_the_index_of_windows_lists_every_window(reader):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm import SensorPose
 from probe.contact.contract import Touch
 from probe.scan.places import surface_to_sensor
 from probe.simulate.registered import registered_surface
@@ -148,45 +147,6 @@ def true_pose(x, y, theta, base=(300.0, 20.0, 0.4)):
 def felt(lab):
     surface = registered_surface(lab.url, "Cube", "F3").surface
     return scanned(surface, PLACES, 0.8, TYPICAL, 5)
-
-
-@pytest.fixture(scope="module")
-def felt_near(lab):
-    """As close to each other as the steps of a hand."""
-    surface = registered_surface(lab.url, "Cube", "F3").surface
-    places = [(x, y) for n, y in enumerate((30, 37, 44)) for x in range(20, 56, 7)[:: (-1) ** n]]
-    return scanned(surface, places[:8], 0.8, TYPICAL, 2)
-
-
-def check_session(session, touches, true, pose_of):
-    """Every touch is answered or refused under its number; the last answer is right."""
-    assert not session.answer
-    for touch, at in zip(touches, true, strict=True):
-        pose = pose_of(at)
-        found = session.add(touch.signal, pose, seq=touch.seq)
-        assert found.seq == touch.seq
-        if found:
-            assert session.answer is found
-    assert session.touches == len(touches)
-    assert (session.answer.object, session.answer.face) == ("Cube", "F3")
-    x, y, _ = true[session.answer.seq]
-    T = session.answer.T_face_probe
-    assert math.hypot(T[0, 3] - x, T[1, 3] - y) < 0.3
-
-
-@pytest.mark.parametrize("sure", [False, True])
-def test_a_session_answers_with_the_motion(lab, reader, felt, sure):
-    spread = np.diag([0.2, 0.2, 0.2, 0.01, 0.01, 0.003]) ** 2
-
-    def pose_of(at):
-        return SensorPose(true_pose(*at), spread) if sure else true_pose(*at)
-
-    check_session(Scan(reader) if sure else Scan(lab), *felt, pose_of)
-
-
-def test_a_session_answers_without_the_motion(reader, felt_near):
-    touches, true = felt_near
-    check_session(Scan(reader), touches, true, lambda at: None)
 
 
 def test_places_follow_from_poses_steps_or_a_hand(felt):

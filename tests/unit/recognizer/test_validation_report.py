@@ -10,15 +10,11 @@ from matplotlib.figure import Figure
 
 from probe.contact.engines import ENGINES, engine_table
 from recognizer.validation.command import run
-from recognizer.validation.compare import join_finished
 from recognizer.validation.flat_faces import FlatFace, draw_flat
 from recognizer.validation.pictures import (
     boxes_overlap,
-    draw_answers,
-    draw_errors,
     label_points,
 )
-from recognizer.validation.report import environment
 from recognizer.validation.results import FORMAT, surface_name
 from recognizer.validation.statistics import share_of
 from recognizer.validation.studies import contact_study, engine_lines
@@ -113,26 +109,6 @@ def finished(command, *worlds):
     results = {"format": FORMAT, "worlds": list(worlds), "totals": totals, "provenance": provenance}
     spent = [{"drawing": 4.0 + k, "reading": 20.0 + k} for k in range(len(worlds))]
     return results, {"worlds": spent}
-
-
-def test_worlds_of_several_runs_keep_their_order_commands_and_times():
-    runs = [
-        finished("validate-set a.yaml", world("low", 90, 0), world("half dead", 0, 0)),
-        finished("validate-set a.yaml --engine mujoco", world("low", 80, 2)),
-    ]
-    found = join_finished(runs)
-    assert [(line["run"], line["sensor"], line["right"]) for line in found["worlds"]] == [
-        ("A", "low", 90), ("A", "half dead", 0), ("B", "low", 80),
-    ]  # fmt: skip
-    assert [line["drawing_ms"] for line in found["worlds"]] == [4.0, 5.0, 4.0]
-    commands = [results["provenance"]["command"] for results, _ in runs]
-    assert [line["command"] for line in found["runs"]] == commands
-    drawn = draw_answers(found["worlds"]), draw_errors(found["worlds"])
-    assert "2 wrong" in drawn[0]
-    page = environment().get_template("worlds.html.j2").render(**found, pictures=drawn)
-    assert page.count("half dead") == 2  # in the table, and in the picture of answers alone
-    assert "2 wrong (low 2)." in page
-    assert draw_errors([found["worlds"][1]]) == ""
 
 
 def test_worlds_reads_folders_and_writes_a_page_with_json_beside_it(tmp_path, capsys):

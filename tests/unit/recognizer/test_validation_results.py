@@ -28,7 +28,7 @@ from recognizer.validation.files import (
     write_shard,
 )
 from recognizer.validation.pipeline import ValidationResult, bound_from, result_from, validate
-from recognizer.validation.results import line_of, results_of, world_times
+from recognizer.validation.results import line_of, results_of
 
 NAN = float("nan")
 UNTOLD = "too few touches to tell"
@@ -137,41 +137,6 @@ def test_a_bound_is_told_by_enough_touches_alone(columns):
     # the exact interval of n of n begins at .025 ** (1 / n): .995 takes 736 touches
     states = [results_of(columns(rows))["verdict"][1]["state"] for rows in (few, many, below)]
     assert states == [UNTOLD, "holds", "fails"]
-
-
-def test_worlds_are_touches_of_faces_by_sensor_and_what_nobody_knows_by_kind(columns):
-    rows = [
-        row(0, level="low"),
-        row(1, "rejected", level="low"),
-        row(2, level="mismatch", kind="edge", chi2=1.0),
-        row(3, level="mismatch", kind="corner", chi2=9.0),
-        row(4, level="half dead", kind="two parts"),  # a level and a kind of tomorrow
-        foreign(5, level="low"),
-        foreign(6, "wrong", kind="same_profile"),
-    ]
-    held = columns(rows)
-    found = results_of(held)
-    named = [
-        tuple(
-            line[key] for key in ("engine", "surface", "sensor", "registered", "touches", "right")
-        )
-        for line in found["worlds"]
-    ]
-    assert named == [
-        ("own", "written files", "low", True, 2, 1),
-        ("own", "written files", "mismatch", True, 2, 2),
-        ("own", "written files", "half dead", True, 1, 1),
-        ("own", "blank", "all of them", False, 1, 0),
-        ("own", "same_profile", "all of them", False, 1, 0),
-    ]
-    assert found["worlds"][1]["inside_95"]["count"] == 1  # 3 degrees of freedom: 7.81
-    assert found["worlds"][4]["states"]["expected"] == "fails"
-    assert [line["kind"] for line in found["kinds"]] == [
-        "face", "edge", "corner", "blank", "same_profile", "two parts",
-    ]  # fmt: skip
-    times = {"drawing": np.arange(7) / 1000, "reading": np.full(7, 0.01)}
-    drawing = [line["drawing"] for line in world_times(held, times, Campaign().as_json())]
-    assert drawing == [0.5, 2.5, 4.0, 5.0, 6.0]
 
 
 @pytest.mark.parametrize(("missed", "state"), [(0, UNTOLD), (1, UNTOLD), (3, "fails")])
