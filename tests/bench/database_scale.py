@@ -4,26 +4,20 @@
                                          [--objects 2 10 167 1000 10000 16667] [--array 4095]
     python tests/bench/database_scale.py --full [--array 1023] [--size 1.0]
 
-The array is 4095 x 4097 (GF(4), one of `large` "and up"), the next object a 60 mm cube of 384
-symbols. `blocks` fills the array with such cubes, 8 x 8 cells per face in growing squares: nothing
-is left between them, so the search for a free place must look at all of it. `placed` has every
-object of a mixture (cubes, boxes, prisms, tetrahedra) found its place by the layout, beside all
-before it. The same objects are registered on each engine, 100 in a transaction.
-
-At each number of objects it prints medians: one more cube placed and registered by
-`retry_on_conflict` (open, taken cells, layout, rows, commit), wall time and CPU time of this
-process (a server's is its own), reading the taken cells alone, and the object and face of a 3 x 4
-window of cells, on an
-open connection and with opening it. `opened` is used cells by those of the corner that placing
-has opened (`generator.layout.torus.board_size`: it grows when nothing fits into it any more),
-`array` by those of the array.
-
-`--full` places the mixture, edges `--size` times as long, until none of its shapes fits anywhere,
-without a database.
+The array is of `large` "and up", the next object a 60 mm cube of 384 symbols. `blocks` fills it
+with such cubes, 8 x 8 cells per face in growing squares, so that the search for a free place must
+look at all of it; `placed` has every object of a mixture find its place by the layout. The same
+objects are registered on each engine, 100 in a transaction. Medians at each number of objects:
+one more cube placed and registered (open, taken cells, layout, rows, commit), wall and CPU time
+of this process; the taken cells alone; object and face of a 3 x 4 window, on an open connection
+and with opening it. `opened`: used cells by those of the corner that placing has opened
+(`torus.board_size`), `array`: by those of the array. `--full` places the mixture, edges `--size`
+times as long, until none of its shapes fits anywhere, without a database.
 """
 
 from __future__ import annotations
 
+import itertools
 import sys
 import time
 from pathlib import Path
@@ -56,15 +50,6 @@ STYLE = SymbolStyle()
 SIDE = 8  # symbols along an edge of the cube
 
 
-def mixture(size=1.0):
-    return (
-        shapes.cube(60.0 * size),
-        shapes.box([60.0 * size, 40.0 * size, 30.0 * size]),
-        shapes.triangular_prism(60.0 * size, 45.0 * size),
-        shapes.tetrahedron(75.0 * size),
-    )
-
-
 def array_of(rows):
     """Return the array of `large` and its next sizes with at least `rows` rows."""
     known = profile("large")
@@ -86,11 +71,9 @@ def registration(name, solid, layout, array):
 
 def spots():
     """Yield block positions (row, column) in growing squares: every cell of a square is used."""
-    side = 0
-    while True:
+    for side in itertools.count():
         yield from ((k, side) for k in range(side))
         yield from ((side, k) for k in range(side + 1))
-        side += 1
 
 
 def block_layout(array, where):
@@ -113,10 +96,15 @@ def blocks(array):
         yield CUBE, block_layout(array, where)
 
 
-def mixed(array, size=1.0, taken=None):
+def mixed(array, size=1.0):
     """Yield solids with the layouts that are found for them, until no shape fits."""
-    taken = taken or Occupancy.from_cells([], [], array)
-    shapes_left = list(mixture(size))
+    taken = Occupancy.from_cells([], [], array)
+    shapes_left = [
+        shapes.cube(60.0 * size),
+        shapes.box([60.0 * size, 40.0 * size, 30.0 * size]),
+        shapes.triangular_prism(60.0 * size, 45.0 * size),
+        shapes.tetrahedron(75.0 * size),
+    ]
     number = 0
     while shapes_left:
         solid = shapes_left[number % len(shapes_left)]

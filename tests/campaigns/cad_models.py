@@ -143,16 +143,11 @@ def limited(model: Path, seconds: float) -> dict[str, object]:
     return row
 
 
-def line(package: str, model: Path, row: dict[str, object]) -> str:
-    """Return one row of the table."""
-    shown = " ".join(str(row.get("reason", "")).split())
+def said_of(row: runner.Row) -> str:
+    """Return what became of a model."""
     if row["result"] == "encoded":
-        shown = f"{row['parts']}, {row['symbols']} symbols, {row['places']} places, verified"
-    name = f"{model.parent.name}/{model.name}" if model.parent.name.startswith("s1") else model.name
-    return (
-        f"{name[:44]:44} {package[:16]:16} {row.get('faces', ''):>10} {row.get('scale', 1):>6g} "
-        f"{row['result']:8} {row.get('seconds', math.nan):5.1f}  {shown[:200]}"
-    )
+        return f"{row['parts']}, {row['symbols']} symbols, {row['places']} places, verified"
+    return " ".join(str(row.get("reason", "")).split())[:200]
 
 
 @dataclass(frozen=True)
@@ -304,14 +299,14 @@ def main() -> int:
     folder = Path(chosen.fetch)
     fetched(folder)
     found = [(p, m) for p, m in models(folder) if re.search(chosen.only, str(m))]
-    print(f"{'model':44} {'package':16} planar/round/other  scale, result, s of processor")
-    results: Counter[str] = Counter()
-    reasons: Counter[str] = Counter()
-    symbols = 0
+    runner.table(("model", "package", "planar/round/other", "scale", "result", "CPU s", "what"))
+    results, reasons, symbols = Counter[str](), Counter[str](), 0
     with ThreadPoolExecutor(chosen.jobs) as pool:
         rows = pool.map(lambda each: limited(each[1], chosen.seconds), found)
         for (package, model), row in zip(found, rows, strict=True):
-            print(line(package, model, row), flush=True)
+            runner.row(model.relative_to(folder), package, row.get("faces", ""),
+                       row.get("scale", 1.0), row["result"], row.get("seconds", math.nan),
+                       said_of(row))  # fmt: skip
             results[str(row["result"])] += 1
             symbols += int(str(row.get("symbols", 0)))
             if row["result"] == "refused":

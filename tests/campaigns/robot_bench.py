@@ -132,7 +132,6 @@ def work_on_trial(asked: Any, model: Any, lab: Any, trial: int) -> dict[str, Any
         long = trial % LONG == 0
         shift = MOVES[(trial // LONG * 3 + len(made)) % len(MOVES)] if long else None
         made.append(work_on(bench, sector, asked.more if long else 0, shift))
-    print(f"trial {trial}: {[len(line['touches']) for line in made]}", file=sys.stderr)
     return {"trial": trial, "objects": made}
 
 

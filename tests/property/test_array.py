@@ -100,11 +100,8 @@ def test_arithmetic_modulo_h_over_gf_q_and_over_its_prime_field_agree(q, data):
     field = field_of_order(q)
     n = data.draw(st.integers(1, 5))
     label = st.integers(0, q - 1)
-    h = (
-        data.draw(st.integers(1, q - 1)),
-        *data.draw(st.lists(label, min_size=n - 1, max_size=n - 1)),
-        1,
-    )
+    middle = data.draw(st.lists(label, min_size=n - 1, max_size=n - 1))
+    h = (data.draw(st.integers(1, q - 1)), *middle, 1)
     conjugates = norm(field, h)
     assert len(conjugates) == n * field.degree + 1
     prime_field = field_of_order(field.characteristic)
@@ -118,21 +115,12 @@ def test_arithmetic_modulo_h_over_gf_q_and_over_its_prime_field_agree(q, data):
 @given(folding, st.data())
 def test_definition_round_trip(entry, data):
     fold = data.draw(st.sampled_from(folds(entry.order, entry.degree)))
-    initial = data.draw(
-        st.lists(st.integers(0, entry.order - 1), min_size=entry.degree, max_size=entry.degree)
-    )
+    n, label = entry.degree, st.integers(0, entry.order - 1)
+    initial = data.draw(st.lists(label, min_size=n, max_size=n))
     if not any(initial):
         initial[0] = 1
-    array = array_from(
-        {
-            "family": "prmva",
-            "order": entry.order,
-            "polynomial": list(entry.labels),
-            "initial": initial,
-            "rows": fold[0],
-            "columns": fold[1],
-        }
-    )
+    given = {"order": entry.order, "polynomial": list(entry.labels), "initial": initial}
+    array = array_from({"family": "prmva", "rows": fold[0], "columns": fold[1]} | given)
     again = array_from(json.loads(json.dumps(array.definition())))
     assert again.definition() == array.definition()
     cells = np.arange(12)[:, None], np.arange(12)

@@ -8,7 +8,7 @@ import pytest
 import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from scipy.spatial import ConvexHull
+from random_shapes import convex_hull, extruded
 
 from generator.array.profiles import profile
 from generator.errors import LayoutError
@@ -20,7 +20,6 @@ from generator.layout.places import array_cells, count_places, count_windows
 from generator.layout.torus import place_pieces
 from generator.layout.unfold import split, unfold
 from generator.polyhedron.frame import face_polygon
-from generator.polyhedron.winged import polyhedron
 
 PITCH, HALF = 7.0, 2.7
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
@@ -109,21 +108,14 @@ def hull(seed, points, stretch):
     vertices = random.normal(size=(points, 3))
     vertices *= 60.0 / np.linalg.norm(vertices, axis=1)[:, None]
     vertices[:, 2] *= stretch
-    found = ConvexHull(vertices)
-    loops = []
-    for (a, b, c), plane in zip(found.simplices.tolist(), found.equations, strict=True):
-        normal = np.cross(vertices[b] - vertices[a], vertices[c] - vertices[a])
-        loops.append((a, b, c) if normal @ plane[:3] > 0 else (a, c, b))
-    return polyhedron("polyhedron", vertices, loops)
+    return convex_hull(vertices)
 
 
 def ell_prism(random):
     """Prism over a random L: non-convex faces and reflex edges."""
     a, b, c, d, h = random.uniform(25.0, 60.0, 5)
     base = [(0, 0), (a + b, 0), (a + b, c), (a, c), (a, c + d), (0, c + d)]
-    vertices = [(x, y, z) for z in (0.0, h) for x, y in base]
-    sides = [(k, (k + 1) % 6, 6 + (k + 1) % 6, 6 + k) for k in range(6)]
-    return polyhedron("polyhedron", vertices, [(5, 4, 3, 2, 1, 0), (6, 7, 8, 9, 10, 11), *sides])
+    return extruded([np.array(base)], h)
 
 
 solids = st.one_of(

@@ -127,12 +127,20 @@ def test_a_surface_without_code_is_told_apart():
     assert reasons.count("not an encoded surface") > 1900
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e30])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1.01e6])
 def test_scores_that_are_not_finite_are_refused(bad):
     scores = np.zeros((6, 6, 2))
+    scores[1, 1, 1] = 1e6
+    decode_likelihood(ROBUST, scores)
     scores[1, 1, 1] = bad
     with pytest.raises(WindowError, match="finite"):
         decode_likelihood(ROBUST, scores)
+
+
+def test_what_is_no_label_is_refused():
+    for label in (-2, 2):
+        with pytest.raises(WindowError):
+            decode_likelihood(ROBUST, np.full((6, 6), label))
 
 
 @pytest.mark.parametrize(
