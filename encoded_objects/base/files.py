@@ -44,12 +44,16 @@ def file_exists_error(out: Path) -> EncodedObjectsError:
 def staged_file(out: Path, *, replace: bool = True) -> Iterator[Path]:
     """Yield a name beside `out` to write to; it becomes `out` when all went well.
 
-    Without `replace`, raises `FileExistsError` if `out` has come up meanwhile.
+    Raises `OSError`, of `out`; without `replace`, `FileExistsError` if `out` has come up meanwhile.
     """
     draft = out.with_name(f".{out.stem}.{os.getpid()}-{threading.get_ident()}{out.suffix}")
     try:
         yield draft
         (os.replace if replace else os.link)(draft, out)
+    except OSError as error:
+        if str(error.filename) == str(draft):  # a message names the file that was asked for
+            error.filename = str(out)
+        raise
     finally:
         draft.unlink(missing_ok=True)
 
