@@ -36,7 +36,14 @@ NAME = "bytes"
 LAB_KEY = "F1XT-VRES-0000-000Q"
 ALL = "step,stpz,stl,3mf,glb,mjcf,urdf,sdf,usd"
 SPECS = ("cube.yaml", *sorted(f"specs/{path.name}" for path in (FIXTURES / "specs").iterdir()))
-SENSOR_TYPES = ("flexitac-12x32", "fsr-16", "fsr-8x8", "gel-24x32")  # mats only have more tabs
+SENSOR_TYPES = (
+    "flexitac-12x32",
+    "flexitac-16x32",
+    "fsr-16",
+    "fsr-8x8",
+    "gel-24x32",
+    "mat-32x32",
+)
 MOST = ALL.replace("stpz,", "")  # gzipped STEP costs more than all else together
 PARTS = ("specs", "shapes", "options", "kit")
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from reference.cells import PLACES, listed
 from sqlalchemy import func, insert, select, text
 
 from generator.database import tables
@@ -111,18 +112,6 @@ def test_the_same_schema_has_the_same_order_on_every_run(tmp_path):
 
 
 # Taken cells: the same ones come back, wherever on the array
-
-PLACES = {
-    "corner": (np.array([0, 0, 63, 64, 127]), np.array([0, 64, 63, 64, 0])),
-    "far": (np.array([0, 2**62, 2**63 - 2]), np.array([2**63 - 2, 5, 2**63 - 2])),
-    "none": (np.empty(0, np.int64), np.empty(0, np.int64)),
-    "many": tuple(np.unravel_index(np.random.default_rng(2).permutation(200 * 300)[:9000],
-                                   (200, 300))),
-}  # fmt: skip
-
-
-def listed(cells):
-    return list(zip(*(part.tolist() for part in cells), strict=True))
 
 
 @pytest.mark.parametrize("place", PLACES)

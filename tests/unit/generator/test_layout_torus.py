@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from reference.cells import PLACES, listed
 
 from generator.layout.occupancy import TILE, Occupancy, cells_of_tiles, tiles_of
 from generator.layout.torus import CORNER, TorusPosition, board_size, place_pieces
@@ -103,21 +104,8 @@ def test_mixed_faces_fill_the_array(seed):
     assert occupancy.density >= 0.88
 
 
-PLACES = {
-    "corner": (np.array([0, 0, 63, 64, 127]), np.array([0, 64, 63, 64, 0])),
-    "far": (np.array([0, 2**62, 2**63 - 2]), np.array([2**63 - 2, 5, 2**63 - 2])),
-    "none": (np.empty(0, np.int64), np.empty(0, np.int64)),
-    "many": tuple(np.unravel_index(np.random.default_rng(2).permutation(200 * 300)[:9000],
-                                   (200, 300))),
-}  # fmt: skip
-
-
 def cells(row, column, height, width):
     return tuple(i.ravel() for i in np.mgrid[row : row + height, column : column + width])
-
-
-def listed(cells):
-    return list(zip(*(part.tolist() for part in cells), strict=True))
 
 
 @pytest.mark.parametrize("place", PLACES)
