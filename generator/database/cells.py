@@ -121,17 +121,8 @@ def taken_tiles(connection: Connection, array_id: int | None) -> Tiles:
     }
 
 
-def take_cells(connection: Connection, array_id: int, cells: Cells) -> None:
-    """Note that cells (n,) of an array are taken from now on."""
-    _write(connection, array_id, cells, taken=True)
-
-
-def free_cells(connection: Connection, array_id: int, cells: Cells) -> None:
-    """Note that cells (n,) of an array are free again."""
-    _write(connection, array_id, cells, taken=False)
-
-
-def _write(connection: Connection, array_id: int, cells: Cells, *, taken: bool) -> None:
+def mark_cells(connection: Connection, array_id: int, cells: Cells, *, taken: bool) -> None:
+    """Note that cells (n,) of an array are taken from now on, or free again."""
     changed = tiles_of(*cells)
     known = _read_tiles(connection, array_id, changed)
     old, new = [], []

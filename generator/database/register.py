@@ -26,7 +26,7 @@ from generator.alphabet.known import Alphabet
 from generator.alphabet.outline import SymbolStyle
 from generator.array.contract import SymbolArray
 from generator.database import tables
-from generator.database.cells import array_key, cells_of, free_cells, take_cells
+from generator.database.cells import array_key, cells_of, mark_cells
 from generator.database.read import find_object, object_entry, read_layout
 from generator.database.registered import ObjectEntry, RegisteredPart, canonical, digest
 from generator.database.rows import definition_number, insert_rows, layout_rows, polyhedron_rows
@@ -90,7 +90,7 @@ def register(connection: Connection, registration: ObjectRecord, *, replace: boo
         insert_rows(connection, table, rows)
     for table, rows in layout_rows(object_id, array_id, registration.layout):
         insert_rows(connection, table, rows)
-    take_cells(connection, array_id, _all_cells(registration.layout))
+    mark_cells(connection, array_id, _all_cells(registration.layout), taken=True)
     record_parts(connection, object_id, registration.parts)
     spec = canonical(registration.spec)
     provenance = {
@@ -168,7 +168,7 @@ def remove_object(connection: Connection, object_id: int) -> None:
         select(tables.objects.c.array_id).where(tables.objects.c.object_id == object_id)
     ).scalar_one_or_none()
     if array_id is not None:
-        free_cells(connection, array_id, cells_of(connection, object_id, array_id))
+        mark_cells(connection, array_id, cells_of(connection, object_id, array_id), taken=False)
     # Children first: a parent's cascade would search every table once per row.
     for table in reversed(tables.metadata.sorted_tables):
         if "object_id" in table.c:

@@ -20,7 +20,7 @@ from sqlalchemy import URL, Connection, Table, insert, select
 from generator.array import array_from
 from generator.array.contract import SymbolArray
 from generator.database import tables
-from generator.database.cells import array_key, faces_at, find_array, occupied_cells, take_cells
+from generator.database.cells import array_key, faces_at, find_array, mark_cells, occupied_cells
 from generator.database.open import part_file, part_path
 from generator.database.read import find_object, list_objects, object_entry, read_array
 from generator.database.registered import ObjectEntry, digest
@@ -293,7 +293,7 @@ def _copy_object(
         insert_rows(target, table, [row | changed for row in old])
     cells = rows[tables.cells]
     at = tuple(np.array([cell[key] for cell in cells], np.int64) for key in ("row", "column"))
-    take_cells(target, array_id, (at[0], at[1]))
+    mark_cells(target, array_id, (at[0], at[1]), taken=True)
     parts = rows_of(source, tables.parts, entry.object_id)
     for part in parts:
         part["file"] = part_file(homes[1], str(part_path(homes[0], part["file"])))

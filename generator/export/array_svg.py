@@ -53,6 +53,7 @@ class _View:
     top: int
     columns: int
     rows: int
+    period: tuple[int, int]  #: rows and columns of the array
 
 
 def array_svg(
@@ -78,7 +79,7 @@ def array_svg(
         f'{frame} fill="url(#grid)"/>',
         '<g clip-path="url(#view)">',
         *(
-            _face(view, rows, columns, face, shape, _FACE_COLOURS[i % len(_FACE_COLOURS)])
+            _face(view, face, shape, _FACE_COLOURS[i % len(_FACE_COLOURS)])
             for i, (face, (shape, _)) in enumerate(zip(faces, placed, strict=True))
         ),
         "</g>",
@@ -92,8 +93,7 @@ def array_svg(
         f'<text x="{left}" y="30" font-size="19" font-weight="bold" fill="#0F172A">'
         f"{escape(title)}</text>"
     )
-    rulers = _rulers(view, rows, columns, cell, left)
-    legend = _legend(view, rows, columns, cell, left, faces)
+    rulers, legend = _rulers(view, cell, left), _legend(view, cell, left, faces)
     return "\n".join([head, rulers, f'<g transform="{scale}">', *body, "</g>", legend, "</svg>\n"])
 
 
@@ -122,10 +122,10 @@ def _unwrap(face: FaceOnArray, pitch_mm: float) -> tuple[list[NDArray[np.float64
 
 def _view(rows: int, columns: int, boxes: list[Box]) -> _View:
     if not boxes or max(rows, columns) <= _FULL:
-        return _View(0, 0, columns, rows)
+        return _View(0, 0, columns, rows, (rows, columns))
     left, width = _shortest_arc(columns, [(box[0], box[2]) for box in boxes])
     top, height = _shortest_arc(rows, [(box[1], box[3]) for box in boxes])
-    return _View(left, top, width, height)
+    return _View(left, top, width, height, (rows, columns))
 
 
 def _shortest_arc(period: int, intervals: list[tuple[int, int]]) -> tuple[int, int]:
@@ -157,16 +157,9 @@ def _definitions(view: _View, outlines: Sequence[Tiers], pitch_mm: float) -> str
     )
 
 
-def _face(
-    view: _View,
-    rows: int,
-    columns: int,
-    face: FaceOnArray,
-    shape: list[NDArray[np.float64]],
-    colour: str,
-) -> str:
+def _face(view: _View, face: FaceOnArray, shape: list[NDArray[np.float64]], colour: str) -> str:
     """Return outline, name and symbols of a face, at every place of the view it reaches."""
-    placement = face.layout.placement
+    placement, (rows, columns) = face.layout.placement, view.period
     low, high = shape[0].min(axis=0), shape[0].max(axis=0)
     places = [
         np.array([x, y], np.float64)
@@ -238,8 +231,9 @@ def _path(loop: NDArray[np.float64]) -> str:
     return f"M{points}z"
 
 
-def _rulers(view: _View, rows: int, columns: int, cell: float, left: int) -> str:
+def _rulers(view: _View, cell: float, left: int) -> str:
     """Return the numbers of columns and rows along two sides."""
+    rows, columns = view.period
     step = 5 if cell >= 9 else 10
     texts = []
     for column in range(view.left + -view.left % step, view.left + view.columns, step):
@@ -251,28 +245,19 @@ def _rulers(view: _View, rows: int, columns: int, cell: float, left: int) -> str
     return f'<g font-size="11" fill="#64748B">{"".join(texts)}</g>'
 
 
-def _legend(
-    view: _View,
-    rows: int,
-    columns: int,
-    cell: float,
-    left: int,
-    faces: Sequence[FaceOnArray],
-) -> str:
+def _legend(view: _View, cell: float, left: int, faces: Sequence[FaceOnArray]) -> str:
     """Return the line under the picture that says what is what."""
+    rows, columns = view.period
     y = 70 + view.rows * cell + 30
     used = sum(len(face.layout.labels) for face in faces)
     cropped = (view.columns, view.rows) != (columns, rows)
-    items = [
-        (
-            'fill="#0B6FB8" fill-opacity="0.2" stroke="#0B6FB8"',
-            f"{len(faces)} faces, {used} symbols",
-        ),
-        ('fill="#F8FAFC" stroke="#CBD5E1"', "cells for other objects"),
-    ]
+    items = {
+        f"{len(faces)} faces, {used} symbols": 'fill="#0B6FB8" fill-opacity="0.2" stroke="#0B6FB8"',
+        "cells for other objects": 'fill="#F8FAFC" stroke="#CBD5E1"',
+    }
     texts = []
     x = float(left)
-    for style, text in items:
+    for text, style in items.items():
         texts.append(f'<rect x="{x:g}" y="{y - 11:g}" width="14" height="14" {style}/>')
         texts.append(f'<text x="{x + 20:g}" y="{y:g}">{text}</text>')
         x += 48 + 7.2 * len(text)

@@ -39,7 +39,7 @@ class DepthBuffer:
         """Write the colour of the triangle seen into each pixel of `picture`, (height, width)."""
         for row in range(0, len(picture), _ROWS):
             keys = self.keys[row : row + _ROWS]
-            chosen = colours[keys & ((1 << _NUMBER_BITS) - 1) & -(keys >= 0).astype(np.int64)]
+            chosen = colours[_triangle_numbers(keys)]
             np.copyto(picture[row : row + _ROWS], chosen, where=keys >= 0)
 
     def coarse(self, values: Index, step: int) -> Index:
@@ -48,21 +48,25 @@ class DepthBuffer:
         -1 where nothing is seen; `values` holds one for each triangle.
         """
         keys = self.keys[step // 2 :: step, step // 2 :: step]
-        chosen: Index = values[keys & ((1 << _NUMBER_BITS) - 1) & -(keys >= 0).astype(np.int64)]
-        return np.where(keys >= 0, chosen, -1)
+        return np.where(keys >= 0, values[_triangle_numbers(keys)], -1)
 
     def triangles_seen(self, count: int) -> Index:
         """Return the triangles seen anywhere, of `count`, in rising order."""
         seen = np.zeros(count, np.bool_)
         for row in range(0, len(self.keys), _ROWS):
             keys = self.keys[row : row + _ROWS]
-            seen[keys[keys >= 0] & ((1 << _NUMBER_BITS) - 1)] = True
+            seen[_triangle_numbers(keys[keys >= 0])] = True
         return np.flatnonzero(seen)
 
     def depths(self, rows: Index, columns: Index) -> Floats:
         """Return the depths at some pixels, one step under the lowest where nothing is seen."""
         steps = (self.keys[rows, columns] >> _NUMBER_BITS).astype(np.float64)
         return steps * self.step + self.nearest
+
+
+def _triangle_numbers(keys: Index) -> Index:
+    """Return the triangles seen at pixels, 0 where nothing is seen."""
+    return keys & ((1 << _NUMBER_BITS) - 1) & -(keys >= 0).astype(np.int64)
 
 
 def rasterise(points: Floats, triangles: Index, screen: Index) -> DepthBuffer:

@@ -25,7 +25,7 @@ from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
 from generator.pipeline.made import Encoded, MadeObject, describe_object
 from generator.pipeline.make import MakeJob, make_under_lock
-from generator.pipeline.place import PlacedObject, occupancy_of, occupancy_with, place_object
+from generator.pipeline.place import PlacedObject, place_in_turn, place_object
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.polyhedron import Polyhedron
@@ -160,9 +160,8 @@ def _dry_build(choice: ArrayChoice) -> PlacedObject | None:
             kinds[kind] = sum(len(face.labels) for face in layout.faces)
         needed += kinds[kind]
     if 2 * needed > plans[0].array.rows * plans[0].array.columns:
-        taken = occupancy_of(None, plans[0])
-        for plan in plans:
-            taken = occupancy_with(taken, place_object(None, plan, False, taken).layout)
+        for _ in place_in_turn(None, plans):
+            pass
     if len(plans) > 1:
         return None
     return PlacedObject(layout, taken=0, reused=False, replaces=False, built=built)
@@ -173,12 +172,12 @@ def _dry_run(
 ) -> tuple[list[MadeObject], int]:
     """Return what `encode` would make, each object after the ones before it, and cells used."""
     made: list[MadeObject] = []
-    taken = occupancy_of(connection, plans[0])
     used = 0
+    places = place_in_turn(connection, plans, replace=replace)
     for number, plan in enumerate(plans):
         step = part_of_progress(progress, number / len(plans), (number + 1) / len(plans))
         step(f"placing {plan.spec.name}", 0.0)
-        placed = place_object(connection, plan, replace, taken)
+        placed = next(places)
         step(f"building {plan.spec.name}", 0.5)
         parts, warnings = parts_of(plan, placed.layout)
         faces = face_reports(plan, placed.layout, smallest=True)
@@ -187,8 +186,6 @@ def _dry_run(
                 plan, placed.layout, len(parts), warnings, (), faces, reused=placed.reused
             )
         )
-        if not placed.reused:
-            taken = occupancy_with(taken, placed.layout)
         used = placed.taken + made[-1].symbols
     return made, used
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,6 +76,18 @@ def occupancy_of(connection: Connection | None, plan: ObjectPlan) -> Occupancy:
     if connection is None:
         return Occupancy.from_cells(*NO_CELLS, plan.array)
     return occupancy(connection, plan.array)
+
+
+def place_in_turn(
+    connection: Connection | None, plans: Sequence[ObjectPlan], *, replace: bool = False
+) -> Iterator[PlacedObject]:
+    """Yield the place of each object, on cells that those before it leave free."""
+    taken = occupancy_of(connection, plans[0]) if plans else None
+    for plan in plans:
+        placed = place_object(connection, plan, replace, taken)
+        if taken is not None and not placed.reused:
+            taken = occupancy_with(taken, placed.layout)
+        yield placed
 
 
 def occupancy_with(taken: Occupancy, layout: Layout) -> Occupancy:

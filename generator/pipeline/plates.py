@@ -12,6 +12,7 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
@@ -176,18 +177,13 @@ def _plate_task(
 ) -> tuple[str, list[tuple[ObjectPlan, Layout, list[str]]], Plate, SlicerSettings | None]:
     """Return the arguments of `_plate_files`: objects on a plate, and the plate of them alone."""
     places = plate.plate.places
-    numbers = dict.fromkeys(plate.parts[place.part].number for place in places)
-    wanted: list[tuple[ObjectPlan, Layout, list[str]]] = []
-    position: dict[str, int] = {}
-    for number in numbers:
-        names = [p.name for p in (plate.parts[q.part] for q in places) if p.number == number]
-        position |= {name: len(position) + k for k, name in enumerate(names)}
-        job, layout = objects[number]
-        wanted.append((job.plan, layout, names))
-    moved = tuple(
-        dataclasses.replace(place, part=position[plate.parts[place.part].name]) for place in places
-    )
-    return title, wanted, Plate(moved, plate.plate.overhang_mm), plate.settings
+    held = [plate.parts[place.part] for place in places]  # those of an object together
+    wanted = [
+        (objects[number][0].plan, objects[number][1], [part.name for part in own])
+        for number, own in groupby(held, key=lambda part: part.number)
+    ]
+    alone = tuple(dataclasses.replace(place, part=k) for k, place in enumerate(places))
+    return title, wanted, Plate(alone, plate.plate.overhang_mm), plate.settings
 
 
 def _plate_files(

@@ -15,7 +15,7 @@ from generator.database.open import open_if_there
 from generator.database.transaction import read_transaction
 from generator.pipeline.choose import choose_array, lab_of
 from generator.pipeline.files import parts_of
-from generator.pipeline.place import occupancy_of, occupancy_with, place_object
+from generator.pipeline.place import place_in_turn
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.printed.check import PrintedCheck, check_parts, check_png
@@ -93,13 +93,9 @@ def _build(
     engine = open_if_there(url, writable=False)
     built = []
     with read_transaction(engine) if engine else nullcontext() as connection:
-        taken = None
         choice = choose_array(specs, lab_of(specs, connection), connection)
+        places = place_in_turn(connection, choice.plans)
         for number, plan in enumerate(choice.plans):
             progress(f"building {plan.spec.name}", number / len(specs))
-            taken = occupancy_of(connection, plan) if taken is None else taken
-            place = place_object(connection, plan, False, taken)
-            if not place.reused:
-                taken = occupancy_with(taken, place.layout)
-            built.append((plan, parts_of(plan, place.layout)[0]))
+            built.append((plan, parts_of(plan, next(places).layout)[0]))
     return built

@@ -25,7 +25,7 @@ from generator.export.set_files import can_draw
 from generator.pipeline.made import MadeObject, describe_object
 from generator.pipeline.make import MakeJob, make_at
 from generator.pipeline.parallel import ENGINES, Task, Workers, engine_of
-from generator.pipeline.place import PlacedObject, occupancy_of, occupancy_with, place_object
+from generator.pipeline.place import PlacedObject, place_in_turn
 from generator.pipeline.plates import build_sheet_path, write_set
 from generator.pipeline.progress import Progress, part_of_progress
 
@@ -53,18 +53,17 @@ def make_set(
     made: dict[int, MadeObject] = {}
     tasks: dict[int, Task[MadeObject]] = {}
     with read_transaction(engine) as connection:
-        taken = occupancy_of(connection, to_make[0].plan)
         for number, job in enumerate(to_make):
-            name = job.plan.spec.name
             if (skipped := _intact_object(connection, job)) is not None:
                 made[number] = skipped
-                progress(f"{name} is there, with all its files: skipped", 0.0)
-                continue
+                progress(f"{skipped.name} is there, with all its files: skipped", 0.0)
+        left = {number: job for number, job in enumerate(to_make) if number not in made}
+        plans = [job.plan for job in left.values()]
+        places = place_in_turn(connection, plans, replace=to_make[0].replace)
+        for number, job in left.items():
+            name = job.plan.spec.name
             progress(f"placing {name}", 0.1 * number / len(to_make))
-            placed = place_object(connection, job.plan, job.replace, taken)
-            if not placed.reused:
-                taken = occupancy_with(taken, placed.layout)
-            tasks[number] = Task(f"making {name}", _make, (url, job, placed))
+            tasks[number] = Task(f"making {name}", _make, (url, job, next(places)))
     ENGINES[url] = engine
     with Workers(processes) as workers:
         found = workers.done(list(tasks.values()), part_of_progress(progress, 0.1, 0.8))

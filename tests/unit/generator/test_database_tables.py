@@ -11,7 +11,7 @@ from sqlalchemy import func, insert, select, text
 
 from generator.database import tables
 from generator.database.as_built import AsBuilt, read_as_built, write_as_built
-from generator.database.cells import free_cells, occupied_cells, take_cells
+from generator.database.cells import mark_cells, occupied_cells
 from generator.database.open import open_database
 from generator.database.register import remove_object
 from generator.database.transaction import read_transaction, write_transaction
@@ -117,7 +117,7 @@ def test_the_same_schema_has_the_same_order_on_every_run(tmp_path):
 @pytest.mark.parametrize("place", PLACES)
 def test_cells_come_back_sorted(engine, place):
     with write_transaction(engine) as connection:
-        take_cells(connection, 1, PLACES[place])
+        mark_cells(connection, 1, PLACES[place], taken=True)
         assert listed(occupied_cells(connection, 1)) == sorted(listed(PLACES[place]))
         assert listed(occupied_cells(connection, 2)) == []
 
@@ -128,19 +128,16 @@ def test_cells_are_added_and_freed_one_by_one(engine):
     for _ in range(12):
         some = tuple(chance.integers(0, 150, (2, 40)))
         with write_transaction(engine) as connection:
-            if chance.random() < 0.6:
-                take_cells(connection, 1, some)
-                held |= set(listed(some))
-            else:
-                free_cells(connection, 1, some)
-                held -= set(listed(some))
+            taken = chance.random() < 0.6
+            mark_cells(connection, 1, some, taken=taken)
+            held = held | set(listed(some)) if taken else held - set(listed(some))
             assert listed(occupied_cells(connection, 1)) == sorted(held)
 
 
 def test_a_block_of_cells_is_few_rows(engine):
     block = tuple(index.ravel() for index in np.mgrid[10 : 10 + 4 * TILE, 0 : 4 * TILE])
     with write_transaction(engine) as connection:
-        take_cells(connection, 1, block)
+        mark_cells(connection, 1, block, taken=True)
         count = connection.execute(select(func.count()).select_from(tables.occupancy)).scalar_one()
         assert count == 20
         assert len(occupied_cells(connection, 1)[0]) == 16 * TILE**2
