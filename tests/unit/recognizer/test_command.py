@@ -28,7 +28,6 @@ from recognizer.touch.robot import Seating
 from recognizer.touch.source import TouchImage
 
 SPEC = "name: Cube\nshape: {cube: 40 mm}\n"
-KEYS = {"seq", "object", "face", "index", "T_face_probe", "T_object_probe", "margin", "reason"}
 AT = Touch(20.0, 19.0, math.radians(25), 80.0)
 BESIDE = Touch(17.0, 22.0, math.radians(-60), 60.0)
 DEAD = (slice(3, 4), slice(2, 9))  # tactels of the calibrated sensor
@@ -125,24 +124,6 @@ def test_reading_loads_no_library_that_it_does_not_need(lab, images):
             [sys.executable, "-c", script], capture_output=True, text=True, check=True
         )
     assert done.stdout.splitlines()[-1] == "[] 0"
-
-
-def test_answers_as_json(asked, lab, images):
-    path = recorded(lab / "two.h5", [images[0]] * 8 + [images[1]] * 8, sensor="simulated/tab")
-    code, out, err = asked(path, "--json")
-    assert (code, err) == (0, "")
-    entries = json.loads(out)
-    assert set(entries[0]) >= KEYS
-    assert [(entry["seq"], entry["frames"]) for entry in entries] == [(0, 8), (8, 8)]
-    assert_at(entries[0], AT)
-    assert_at(entries[1], BESIDE)
-    pose = np.array(entries[0]["T_face_probe"])
-    assert pose[:2, 3] == pytest.approx((entries[0]["x_mm"], entries[0]["y_mm"]))
-    scene = registered_surface(str(lab / "lab.db"), "Cube", "F1")
-    assert np.array(entries[0]["T_object_probe"]) == pytest.approx(scene.T_object_surface @ pose)
-    assert entries[0]["T_robot_object"] is None
-    assert len(json.loads(asked(path, "--touches", 1, "--json")[1])) == 1
-    assert len(json.loads(asked(path, "--every", "--touches", 3, "--json")[1])) == 3
 
 
 @pytest.fixture(scope="module")

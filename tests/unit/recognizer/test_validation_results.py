@@ -343,7 +343,9 @@ def test_the_form_is_lerobots(made):
     order = table.column("touch").to_numpy()
     tactile = np.array(table.column("observation.tactile").to_pylist()).reshape(-1, 16, 16)
     assert np.array_equal(tactile, data["counts"][order])
-    assert np.allclose(stats["observation.tactile"]["max"], tactile.reshape(TOUCHES, -1).max(axis=0))
+    assert np.allclose(
+        stats["observation.tactile"]["max"], tactile.reshape(TOUCHES, -1).max(axis=0)
+    )
 
 
 def test_the_same_run_gives_the_same_bytes(made):
