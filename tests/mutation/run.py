@@ -43,7 +43,7 @@ os.environ.update(make.ENVIRONMENT)  # before numpy loads
 
 LOADED = (  # third parties' modules that tests and code load
     "numpy", "scipy.ndimage", "scipy.optimize", "scipy.spatial", "scipy.stats", "pytest",
-    "sqlalchemy", "pydantic", "yaml", "h5py", "_pytest.assertion.rewrite",
+    "sqlalchemy", "pydantic", "yaml", "h5py", "_pytest.assertion.rewrite", "xdist.plugin",
 )  # fmt: skip
 OURS = ("encoded_objects", "generator", "decoder", "probe", "recognizer")
 LONGEST_S = 20.0  #: CPU seconds that no unit test needs; a mutant that takes longer is caught
@@ -186,7 +186,16 @@ def _tested(watched: Watched, source: str) -> int:
     changed.install(watched.module, source)
     os.chdir(ROOT)
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
-    options = ["-x", "-q", "--no-header", "--tb=short", "-p", "no:cacheprovider"]
+    options = [
+        "-x",
+        "-q",
+        "--no-header",
+        "--tb=short",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "xdist.plugin",
+    ]
     failed = int(pytest.main([*options, *watched.tests]))
     if failed or not watched.corpora:
         return failed

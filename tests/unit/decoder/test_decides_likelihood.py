@@ -10,10 +10,15 @@ import pytest
 import decoder.likelihood
 import decoder.ranking
 from decoder import Likelihood, WindowError, decode_likelihood
-from decoder.window import checked_labels, checked_scores, parse_window
 from decoder.errors import MethodError
 from decoder.ranking import Joint, Places, Ranked, best_of, best_of_all, ranking_of
-from decoder.window import hard_scores, unrelated_score
+from decoder.window import (
+    checked_labels,
+    checked_scores,
+    hard_scores,
+    parse_window,
+    unrelated_score,
+)
 from generator.array import array_from
 
 BINARY = array_from({"family": "prba", "order": 2, "degree": 8})  # 15 x 17
@@ -546,7 +551,7 @@ def test_labels_are_symbols_of_the_array_or_unseen(labels, said):
 )
 def test_scores_are_numbers_for_each_symbol_of_each_cell(shape, kind, whole):
     if whole is None:
-        with pytest.raises(WindowError, match="scores are|at least one cell"):
+        with pytest.raises(WindowError, match=r"scores are|at least one cell"):
             checked_scores(np.zeros(shape, kind), 4)
     else:
         assert checked_scores(np.zeros(shape, kind), 4).shape == whole
