@@ -21,7 +21,7 @@ from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import open_lab
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, refusal
+from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, TOO_FEW, refusal
 from recognizer.touch.signal import signal_of
 from recognizer.validation.draw import FOREIGN
 
@@ -111,6 +111,7 @@ def test_a_surface_that_is_not_registered_is_no_object(reader):
     surface = FOREIGN["random symbols"](reader.lab.arrays[0], np.random.default_rng(8))
     touches, _ = scanned(surface, PLACES[:8], 0.5, TYPICAL, 3)
     scan = begin_scan(reader)
+    assert scan.recognition.reason == TOO_FEW
     for touch in touches:
         scan = extend_scan(scan, touch)
         assert not scan.recognition
