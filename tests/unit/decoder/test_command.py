@@ -34,7 +34,7 @@ def test_picture(capsys, tmp_path):
     assert code == 1
     assert path.stat().st_size > 100
     code, _, err = outcome(capsys, WINDOW, "--profile", "thesis", "--plot", str(tmp_path / "a/b"))
-    assert code == 1
+    assert code == 2
     assert "cannot write" in err
 
 
