@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import socket
-import subprocess
-import sys
 
 import pytest
 
@@ -144,17 +142,6 @@ def ended(capsys, *words):
     with pytest.raises(SystemExit) as leaving:
         main([str(word) for word in words])
     return leaving.value.code, capsys.readouterr().err
-
-
-def test_help_loads_no_server_no_array_and_no_database():
-    code = (
-        "import sys\nfrom recognizer.bench.command import main\n"
-        "try:\n    main(['--help'])\nexcept SystemExit as end:\n    assert end.code == 0\n"
-        "print([m for m in ('numpy', 'fastapi', 'sqlalchemy', 'h5py') if m in sys.modules])"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout.splitlines()[-1] == "[]"
-    assert "--web-port" in run.stdout
 
 
 @pytest.mark.parametrize(
