@@ -115,7 +115,7 @@ def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) 
         problem = EncodedObjectsError(
             f"{what}: {error.strerror or error}", fix="check folder, space and rights"
         )
-        code = FAILED
+        code = problem.exit_code
     except Exception as error:
         typer = sys.modules.get("typer")
         if typer is not None and isinstance(error, typer.Exit):

@@ -18,8 +18,6 @@ import ast
 import contextlib
 import hashlib
 import importlib
-import importlib.abc
-import importlib.machinery
 import json
 import os
 import re
@@ -32,20 +30,20 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import CodeType
-
-for _library in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
-    os.environ[f"{_library}_NUM_THREADS"] = "1"
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-sys.path[:0] = [str(HERE), str(ROOT)]
+sys.path[:0] = [str(HERE), str(ROOT), str(HERE.parent)]
 
+import changed  # noqa: E402
+from corpora import make  # noqa: E402
 from mutants import Mutant, mutants_of  # noqa: E402
+
+os.environ.update(make.ENVIRONMENT)  # before numpy loads
 
 LOADED = (  # third parties' modules that tests and code load
     "numpy", "scipy.ndimage", "scipy.optimize", "scipy.spatial", "scipy.stats", "pytest",
-    "sqlalchemy", "pydantic", "yaml", "h5py", "_pytest.assertion.rewrite",
+    "sqlalchemy", "pydantic", "yaml", "h5py", "_pytest.assertion.rewrite", "xdist.plugin",
 )  # fmt: skip
 OURS = ("encoded_objects", "generator", "decoder", "probe", "recognizer")
 LONGEST_S = 20.0  #: CPU seconds that no unit test needs; a mutant that takes longer is caught
@@ -59,6 +57,7 @@ class Watched:
     module: str
     tests: tuple[str, ...]
     within: tuple[str, ...] = ()  #: names (constants too) of what decides; all by default
+    corpora: tuple[str, ...] = ()  #: CORPUS/PART made after the tests, as stored or not
 
     def mutants(self) -> list[Mutant]:
         """Return every change of it."""
@@ -73,6 +72,8 @@ class Watched:
     def state(self) -> str:
         """Return a digest of the tests: with other ones a survivor is tried again."""
         files = [ROOT / test.split("::")[0] for test in self.tests]
+        files += [file for part in self.corpora for file in make.files_of(part.split("/")[0])]
+        files = [file for file in files if file.exists()]
         return _digest(b"".join(file.read_bytes() for file in files))
 
 
@@ -106,25 +107,6 @@ class Results:
             file.write(json.dumps(entry) + "\n")
 
 
-class _Changed(importlib.abc.MetaPathFinder):
-    """Imports one module from a changed text."""
-
-    def __init__(self, module: str, source: str) -> None:
-        self._name = _dotted(module)
-        self._path, self._source = str(ROOT / module), source
-
-    def find_spec(self, name, path=None, target=None):
-        if name != self._name:
-            return None
-        source, file = self._source, self._path
-
-        class Loader(importlib.machinery.SourceFileLoader):
-            def get_code(self, fullname: str) -> CodeType:
-                return compile(source, file, "exec", dont_inherit=True)
-
-        return importlib.machinery.ModuleSpec(name, Loader(name, file), origin=file)
-
-
 def load_others(watched: Watched) -> None:
     """Import what the tests need of ours and does not itself import the watched module."""
     for test in watched.tests:
@@ -136,7 +118,7 @@ def load_others(watched: Watched) -> None:
         for name, module in list(sys.modules.items())
         if name.split(".")[0] in OURS and getattr(module, "__file__", None)
     }
-    dependent, size = {_dotted(watched.module)}, 0
+    dependent, size = {changed.dotted(watched.module)}, 0
     while len(dependent) > size:
         size = len(dependent)
         dependent |= {name for name, needed in ours.items() if needed & dependent}
@@ -159,11 +141,7 @@ def _imports(file: Path, name: str) -> set[str]:
     return {one for one in found if one.split(".")[0] in OURS} - {name}
 
 
-def _dotted(module: str) -> str:
-    return module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-
-
-def passes(module: str, source: str, tests: tuple[str, ...], *, loud: bool = False) -> bool:
+def passes(watched: Watched, source: str, *, loud: bool = False) -> bool:
     """Return whether the tests pass with a module's changed source, in a process of their own."""
     child = os.fork()
     if child == 0:
@@ -176,7 +154,7 @@ def passes(module: str, source: str, tests: tuple[str, ...], *, loud: bool = Fal
                 os.dup2(nothing, stream)
         code = 3
         try:
-            code = _tested(module, source, tests)
+            code = _tested(watched, source)
         except BaseException:  # noqa: BLE001  (the child ends here, whatever it was)
             traceback.print_exc()
         finally:
@@ -189,7 +167,7 @@ def passes(module: str, source: str, tests: tuple[str, ...], *, loud: bool = Fal
             if done:
                 code = os.waitstatus_to_exitcode(status)
                 if code in (4, 5):  # pytest: wrong usage, no tests
-                    raise SystemExit(f"{module}: {tests} cannot be run")
+                    raise SystemExit(f"{watched.module}: {watched.tests} cannot be run")
                 return code == 0
             if time.monotonic() > end:
                 raise TimeoutError
@@ -202,14 +180,27 @@ def passes(module: str, source: str, tests: tuple[str, ...], *, loud: bool = Fal
         return False
 
 
-def _tested(module: str, source: str, tests: tuple[str, ...]) -> int:
+def _tested(watched: Watched, source: str) -> int:
     import pytest
 
-    sys.meta_path.insert(0, _Changed(module, source))
+    changed.install(watched.module, source)
     os.chdir(ROOT)
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
-    options = ["-x", "-q", "--no-header", "--tb=short", "-p", "no:cacheprovider"]
-    return int(pytest.main([*options, *tests]))
+    options = [
+        "-x",
+        "-q",
+        "--no-header",
+        "--tb=short",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "xdist.plugin",
+    ]
+    failed = int(pytest.main([*options, *watched.tests]))
+    if failed or not watched.corpora:
+        return failed
+    with changed.installed_in_programs(watched.module, source):
+        return int(not all(make.make(part, check=True) for part in watched.corpora))
 
 
 def justified(path: Path) -> dict[str, set[str]]:
@@ -232,11 +223,11 @@ def run_module(watched: Watched, results: Results) -> None:
         return
     load_others(watched)
     source = (ROOT / watched.module).read_text()
-    if not passes(watched.module, source, watched.tests, loud=True):
+    if not passes(watched, source, loud=True):
         raise SystemExit(f"{watched.module}: its tests fail without any change")
     began = time.monotonic()
     for mutant in unknown:
-        alive = passes(watched.module, mutant.source, watched.tests)
+        alive = passes(watched, mutant.source)
         results.add(watched, mutant, state, "survived" if alive else "killed")
         if alive:
             print(f"  line {mutant.line}: {mutant.name}", flush=True)
@@ -268,9 +259,7 @@ def run_sabotages(watched: Watched, plan: list[dict[str, str]]) -> None:
     source, passed = (ROOT / watched.module).read_text(), 0
     for one in plan:
         there = source.count(one["old"]) == 1
-        alive = there and passes(
-            watched.module, source.replace(one["old"], one["new"]), watched.tests
-        )
+        alive = there and passes(watched, source.replace(one["old"], one["new"]))
         said = "SURVIVES" if alive else "caught" if there else "its text is not there once"
         print(f"{one['name']}: {said}", flush=True)
         passed += alive or not there
@@ -314,7 +303,7 @@ def main() -> int:
     os.nice(10)
     plan = tomllib.loads((HERE / "plan.toml").read_text())
     watched = [
-        Watched(entry["module"], tuple(entry["tests"]), tuple(entry.get("within", ())))
+        Watched(**{key: value if key == "module" else tuple(value) for key, value in entry.items()})
         for entry in plan["watch"]
     ]
     watched = [one for one in watched if not asked.modules or one.module in asked.modules]

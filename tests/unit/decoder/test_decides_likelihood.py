@@ -12,7 +12,13 @@ import decoder.ranking
 from decoder import Likelihood, WindowError, decode_likelihood
 from decoder.errors import MethodError
 from decoder.ranking import Joint, Places, Ranked, best_of, best_of_all, ranking_of
-from decoder.window import hard_scores, unrelated_score
+from decoder.window import (
+    checked_labels,
+    checked_scores,
+    hard_scores,
+    parse_window,
+    unrelated_score,
+)
 from generator.array import array_from
 
 BINARY = array_from({"family": "prba", "order": 2, "degree": 8})  # 15 x 17
@@ -480,3 +486,72 @@ def test_every_window_of_a_product_array_is_found_row_by_row(monkeypatch, shape,
     wrong = (labels[:, None] != labels).sum(axis=2)
     listed = np.sort(wrong, axis=1)[:, :number]
     np.testing.assert_allclose(found.values, -listed * math.log(0.9 * 3 / 0.1), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind", "whole"),
+    [
+        ((2, 3), int, (1, 2, 3)),
+        ((1, 1), bool, (1, 1, 1)),
+        ((4, 2, 3), np.uint8, (4, 2, 3)),
+        ((0, 2, 3), int, (0, 2, 3)),
+        ((0, 3), int, None),
+        ((3, 0), int, None),
+        ((3, 0, 2), int, None),
+        ((3, 2, 0), int, None),
+        ((2,), int, None),
+        ((1, 1, 1, 1), int, None),
+        ((2, 3), float, None),
+        ((2,), float, None),
+    ],
+)
+def test_windows_are_whole_numbers_of_two_dimensions_or_a_batch(shape, kind, whole):
+    if whole is None:
+        with pytest.raises(WindowError, match="a window is"):
+            checked_labels(np.zeros(shape, kind), 4)
+    else:
+        assert checked_labels(np.zeros(shape, kind), 4).shape == whole
+
+
+@pytest.mark.parametrize(
+    ("labels", "said"),
+    [([-1, 3], None), ([-2, 3], "from -2 to 3"), ([-1, 4], "from -1 to 4"), ([4, 4], "from 4")],
+)
+def test_labels_are_symbols_of_the_array_or_unseen(labels, said):
+    if said is None:
+        assert checked_labels([labels], 4).tolist() == [[labels]]
+    else:
+        with pytest.raises(WindowError, match=said):
+            checked_labels([labels], 4)
+    for text, cells in (("0? 31", [[0, -1], [3, 1]]), ("3,?", [[3, -1]]), ("4", None), ("x", None)):
+        if cells:
+            assert parse_window(text, 4).tolist() == cells
+        else:
+            with pytest.raises(WindowError, match=f"row 1 '{text}'"):
+                parse_window(text, 4)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind", "whole"),
+    [
+        ((2, 3, 4), float, (1, 2, 3, 4)),
+        ((5, 2, 3, 4), np.float32, (5, 2, 3, 4)),
+        ((0, 2, 3, 4), float, (0, 2, 3, 4)),
+        ((1, 1, 4), float, (1, 1, 1, 4)),
+        ((0, 2, 4), float, None),
+        ((2, 0, 4), float, None),
+        ((3, 0, 2, 4), float, None),
+        ((3, 2, 0, 4), float, None),
+        ((2, 3, 5), float, None),
+        ((2, 4), float, None),
+        ((1, 1, 1, 1, 4), float, None),
+        ((2, 3, 4), int, None),
+        ((2, 4), int, None),
+    ],
+)
+def test_scores_are_numbers_for_each_symbol_of_each_cell(shape, kind, whole):
+    if whole is None:
+        with pytest.raises(WindowError, match=r"scores are|at least one cell"):
+            checked_scores(np.zeros(shape, kind), 4)
+    else:
+        assert checked_scores(np.zeros(shape, kind), 4).shape == whole

@@ -1,5 +1,6 @@
 """Places of the database: against a walk over every place, and costs worked by hand."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ import pytest
 from recognizer.touch import hypothesis
 from recognizer.touch.hypothesis import (
     Hypothesis,
+    PlaceHypothesis,
     coincide,
     find_hypotheses,
     find_rivals,
@@ -113,6 +115,28 @@ def test_the_place_of_a_clear_touch_is_found_with_its_likelihood(small, cells, p
             assert one.score == pytest.approx(score)
             assert log_likelihood(lab.embossed, fit, one) == pytest.approx(score)
         assert [one.score for one in found] == sorted((one.score for one in found), reverse=True)
+
+
+@pytest.mark.parametrize("cells", [SQUARE, APART])
+@pytest.mark.parametrize("size", [(2**32 - 5, 2**30), (2**29 + 5, 2**31), (2**31, 2**29 + 5)])
+def test_places_of_arrays_too_large_to_name_them_by_one_number(small, cells, size):
+    rows, columns = size
+    held = {
+        ((r + 2) % rows, (c + 3) % columns): own
+        for r, c in itertools.product(range(-5, 4), range(-6, 3))
+        for own in [(int(r > 0), (r * r + 3 * c + r * c) % 4)]
+    }
+    lab = small.Lab(held, rows, columns)
+    for place in ((1, columns - 2, 0), (rows - 2, 1, 0), (5, 0, 1)):
+        fit = soft(lab, place, cells, small, seed=3, spread=0.5)
+        found = find_hypotheses(lab.embossed, (fit,), ALL)
+        places = where(found)
+        assert len(places) == len(found)
+        assert places <= lab.places(cells)
+        assert place in places
+        for one in found:
+            own = by_hand(lab, fit, (one.row, one.column, one.face))
+            assert one.score == pytest.approx(own)
 
 
 def anchored(lab, fit, scores, symbol, anchors):
@@ -438,3 +462,8 @@ def test_one_place_is_within_half_a_pitch_and_an_eighth_turn_round_the_array(sma
     ):  # fmt: skip
         assert coincide(embossed, fit(), at(9, 12, 1), other, at(row, column, 1)) is same
     assert not coincide(embossed, fit(), at(9, 12, 1), fit(), at(9, 12, 0))
+    places = [
+        PlaceHypothesis(embossed=lab, hypothesis=at(9, column, 1), fit=fit(), score=0.0)
+        for lab, column in ((embossed, 12), (embossed, 12), (embossed, 11), (None, 12))
+    ]
+    assert [places[0].coincides(other) for other in places] == [True, True, False, False]

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
+from recognizer.touch.pose import face_covariance, face_pose, felt_scale, inside_mm, pose_on_object
 
 PITCH, HEIGHT = 7.0, 1.2
 ROWS, COLUMNS = 8, 10  # a small torus, so that a wrong way round it shows
@@ -66,6 +66,30 @@ def test_on_a_face_longer_than_half_of_the_array_the_nearest_symbol_tells_the_pl
         pose = face_pose(*touch(w * cmath.exp(-1j * rotation), 0.0, rotation, 0j, (4, 5), (0, 0)))
         at = w * cmath.exp(-1j * rotation)
         assert pose[:2, 3] == pytest.approx([at.real, at.imag])
+
+
+def test_the_symbol_that_is_nearest_both_ways_tells_the_place():
+    embossed, face, place, fit = touch(0j, 0.0, 0.0, 0j, (2, 3), (0, 0))
+    # in turn: 2 right and 3 up, 3 right and 2 up, 2 left and 2 down, 3 right and 3 down
+    cells = [(5, -1), (6, 0), (1, 4), (6, 5)]
+    face.rows, face.columns = np.array([2 - 3, 2 - 2, 2 + 2, 2 + 3]), np.array([5, 6, 1, 6])
+    assert len(cells) == len(face.rows)
+    marks = np.array([[100.0, 0.0], [200.0, 0.0], [300.0, 0.0], [400.0, 0.0]])
+    face.centres_mm = marks
+    pose = face_pose(embossed, face, place, fit)
+    assert abs(pose[0, 3] - 300.0) < 50.0
+
+
+@pytest.mark.parametrize("rotation", [0.5, -1.3, math.pi / 2])
+def test_errors_of_the_scale_are_turned_as_those_of_the_place_are(rotation):
+    face, z = SimpleNamespace(rotation_rad=rotation), 0.3 - 0.2j
+    on_face = z * cmath.exp(-1j * rotation)
+    fit = SimpleNamespace(nuisance=np.array([1.0, 2.0, 3.0, 0.05, 5.0]), with_scale=None)
+    assert felt_scale(face, fit, 0.02) is None
+    fit.with_scale = np.array([z.real, z.imag, 0.7, 0.9])
+    found = felt_scale(face, fit, 0.02)
+    assert (found.excess, found.expected) == (0.05, 0.02)
+    np.testing.assert_allclose(found.covariance, [on_face.real, on_face.imag, 0.7, 0.9])
 
 
 def test_on_a_flat_face_the_pose_goes_through_the_face_on_a_round_one_through_its_tangent():

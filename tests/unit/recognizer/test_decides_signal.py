@@ -274,6 +274,9 @@ def test_the_law_of_a_type_is_taken_off_counts_alone():
     np.testing.assert_allclose(found.forces, image**2)
     assert (signal_of(image, floor=0.0, sensor=rooted, newtons=True).forces == image).all()
     assert (signal_of(image, floor=0.0, sensor=SensorType()).forces == image).all()
+    for law in (rooted, replace(SensorType(), exponent=2.0)):
+        seen = [signal_of(six(counts), floor=0.0, sensor=law).contact for counts in (7.0, 9.0)]
+        assert seen == [False, True]  # eight counts of any law
 
 
 def test_how_hard_is_pressed_is_the_mean_of_the_twelve_strongest():
