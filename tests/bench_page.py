@@ -24,6 +24,16 @@ FLAGS = (
 PATIENCE_S = 60.0  #: for anything, on a busy machine
 PATIENCE_MS = 1e3 * PATIENCE_S
 RESTED: WeakKeyDictionary[Page, int] = WeakKeyDictionary()  #: the touch that a page rested from
+SETTLED = """() => new Promise((done) => {
+    const places = () => JSON.stringify(['part', 'answer'].map(
+      (id) => document.getElementById(id).getBoundingClientRect()));
+    const first = places(); let frames = 0;
+    const look = () => {
+      if (places() !== first) done(false);
+      else if (++frames === 5) done(true);
+      else requestAnimationFrame(look);
+    };
+    requestAnimationFrame(look); })"""
 expect.set_options(timeout=PATIENCE_MS)
 
 
@@ -65,6 +75,18 @@ def until(page, wanted):
     while not page.evaluate(wanted):
         assert time.monotonic() < end_s, wanted
         time.sleep(0.05)
+
+
+def until_redrawn(picture, before):
+    """Wait until a picture looks other than its screenshot `before`."""
+    end_s = time.monotonic() + PATIENCE_S
+    while picture.screenshot() == before:
+        assert time.monotonic() < end_s, "the picture stays as it was"
+
+
+def settle(page):
+    """Wait until part and answer keep their places for some frames: pictures follow the window."""
+    until(page, SETTLED)
 
 
 def rest(page):

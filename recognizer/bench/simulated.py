@@ -19,10 +19,10 @@ import pty
 import tempfile
 import threading
 import tty
-from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from itertools import count
 from pathlib import Path
 from urllib.parse import parse_qsl
@@ -153,7 +153,7 @@ class TouchProbe:
     def __init__(self, url: str, database: str, sensor: SensorType) -> None:
         self.database = database
         self._presses = PressSequence(sensor, parse_simulation(url))
-        self._scenes: OrderedDict[tuple[str, str], Scene] = OrderedDict()
+        self._scene = lru_cache(SCENES)(partial(registered_surface, database))
         self._last: tuple[str, str, float, float, float, float] | None = None
         self._turn = threading.Lock()
         self._closed = threading.Event()
@@ -213,21 +213,12 @@ class TouchProbe:
     def forget(self) -> None:
         """Read the surfaces from the database again."""
         with self._turn:
-            self._scenes.clear()
+            self._scene.cache_clear()
 
     def close(self) -> None:
         """End the simulation; the port is gone."""
         self._closed.set()
         self._line.close()
-
-    def _scene(self, object_name: str, face: str) -> Scene:
-        key = (object_name, face)
-        if key not in self._scenes:
-            self._scenes[key] = registered_surface(self.database, object_name, face)
-        self._scenes.move_to_end(key)
-        while len(self._scenes) > SCENES:
-            self._scenes.popitem(last=False)
-        return self._scenes[key]
 
 
 def is_simulation(url: str) -> bool:

@@ -34,7 +34,6 @@ from recognizer.command.options import RecognizeOptions
 from recognizer.command.port import listen, source_at
 from recognizer.command.scanning import (
     belief_for,
-    edges_of,
     pose_during,
     read_joints,
     refuse_single,
@@ -198,7 +197,9 @@ def _answers(
         in_base, trouble = _object_in_base(touch, found, joints, options.joint_error)
         answer = Answer(touch, found, in_base, None if belief is None else belief.touches)
         if method == "thesis":
-            answer = replace(answer, edges=edges_of(reader, signal))
+            from recognizer.thesis.edge_fit import touch_edges
+
+            answer = replace(answer, edges=touch_edges(reader.sensor, signal))
         if trouble and trouble != warned:
             warning(f"touch {touch.seq}: the place in the robot's base is not known: {trouble}")
             warned = trouble

@@ -20,11 +20,8 @@ if TYPE_CHECKING:
 
     from probe.arm import SensorPose
     from recognizer.scan.session import Scan
-    from recognizer.thesis.edges import Edge
     from recognizer.thesis.scan import ThesisScan
-    from recognizer.touch.lab import EmbossedArray
     from recognizer.touch.reader import Reader
-    from recognizer.touch.signal import Signal
     from recognizer.touch.source import TouchImage
 
 Joints = tuple[tuple[float, ...], ...]
@@ -43,13 +40,6 @@ def belief_for(reader: Reader, method: str) -> Scan | ThesisScan:
     from recognizer.scan.session import Scan
 
     return Scan(reader)
-
-
-def edges_of(reader: Reader, signal: Signal) -> tuple[Edge, ...]:
-    """Return the edges that a touch feels, in the sensor frame."""
-    from recognizer.thesis.edge_fit import touch_edges
-
-    return touch_edges(reader.sensor, signal)
 
 
 def refuse_single(touches: Iterable[TouchImage], place: str, needed: int) -> Iterator[TouchImage]:
@@ -154,12 +144,11 @@ def touches_for(reader: Reader) -> int:
     """Return about how many touches an answer takes, of the lab's array that takes most."""
     from generator.array.contract import touches_needed
 
-    width = 2 * min(reader.sensor.half_mm)
-
-    def needed(each: EmbossedArray) -> int:
-        return touches_needed(
+    width_mm = 2 * min(reader.sensor.half_mm)
+    return max(
+        touches_needed(
             each.array.order, each.array.rows * each.array.columns, each.style.pitch_mm,
-            sensor_mm=width,
-        )  # fmt: skip
-
-    return max(needed(each) for each in reader.lab.arrays)
+            sensor_mm=width_mm,
+        )
+        for each in reader.lab.arrays
+    )  # fmt: skip

@@ -59,7 +59,6 @@ def merge_touches(
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
     placing: Placing = "product",
-    window_tactels: float = WINDOW_TACTELS,
     *,
     trust: ArrayLike | None = None,
 ) -> MergedImage:
@@ -71,8 +70,8 @@ def merge_touches(
         (rows, columns) of each touch, over its bias.
     poses
         As believed; see `relative_poses`.
-    placing, window_tactels
-        Where a correction is searched for, and how far.
+    placing
+        Where a correction is searched for.
     trust
         (rows, columns) 0 for bad tactels, which are left out.
 
@@ -94,7 +93,7 @@ def merge_touches(
         before = k - 1 if near is None else near
         step = relative_pose(origin[before], believed[k])
         if near is not None:
-            step = _corrected_step(sensor, images[near], images[k], step, window_tactels)
+            step = _corrected_step(sensor, images[near], images[k], step)
         placed[k] = compose_poses(placed[before], step)
     return MergedImage(average_touches(sensor, images, placed), placed)
 
@@ -158,15 +157,15 @@ def average_touches(
     )
 
 
-def product_shift(a: Array, b: Array, believed: tuple[float, float], window: float) -> Array:
+def product_shift(a: Array, b: Array, believed: tuple[float, float]) -> Array:
     """Return the shift (2,) along x and y of image b from a, in steps of a quarter tactel.
 
     Parameters
     ----------
     a, b
         (rows, columns) readings of two touches.
-    believed, window
-        Shift of b from a along x and y, and half width of the search, tactels.
+    believed
+        Shift of b from a along x and y, tactels; `WINDOW_TACTELS` around it is searched.
     """
     first, second = magnify_samples(a), magnify_samples(b)
     rows, columns = first.shape
@@ -174,7 +173,7 @@ def product_shift(a: Array, b: Array, believed: tuple[float, float], window: flo
     i0, i1 = max(0, down), min(rows, rows + down)
     j0, j1 = max(0, right), min(columns, columns + right)
     zone = first[i0:i1, j0:j1]
-    reach = math.floor(window * MAGNIFIED + 1e-9)
+    reach = math.floor(WINDOW_TACTELS * MAGNIFIED + 1e-9)
     margin = max(rows, columns) + reach
     wide = np.pad(second, margin)  # no reading beyond the matrix
     best, shift = -math.inf, (right, down)
@@ -206,9 +205,7 @@ def _nearest_touch(sensor: SensorType, believed: Array, k: int) -> int | None:
     return int(np.flatnonzero(common >= common.max() - ROUNDING)[-1])
 
 
-def _corrected_step(
-    sensor: SensorType, a: TactileImage, b: TactileImage, step: Array, window_tactels: float
-) -> Array:
+def _corrected_step(sensor: SensorType, a: TactileImage, b: TactileImage, step: Array) -> Array:
     """Return the step (3,) from a to b, corrected by products if the common part shows anything."""
     faint = FAINT * max(a.values.max(), b.values.max())
     for image, way in ((a, step), (b, inverse(step))):
@@ -217,7 +214,7 @@ def _corrected_step(
         if not (image.values[common] > faint).any():
             return step
     believed = (float(step[0]) / sensor.pitch_mm, float(step[1]) / sensor.pitch_mm)
-    shift = product_shift(a.values, b.values, believed, window_tactels)
+    shift = product_shift(a.values, b.values, believed)
     return np.append(shift * sensor.pitch_mm, step[2])
 
 

@@ -18,7 +18,7 @@ from encoded_objects.base.sensor_type import SensorType
 from probe.arm import SensorPose
 from recognizer.scan.mosaic.mosaic import add_touch, no_touches
 from recognizer.scan.session import TouchPlaces
-from recognizer.thesis.merge import WINDOW_TACTELS, Placing, merge_touches
+from recognizer.thesis.merge import Placing, merge_touches
 from recognizer.thesis.read import ClassicalReading, read_classically
 from recognizer.touch.lab import Lab
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW, Recognition, refusal
@@ -35,7 +35,6 @@ def read_scan(
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
     placing: Placing = "product",
-    window_tactels: float = WINDOW_TACTELS,
     *,
     trust: ArrayLike | None = None,
     seq: int = 0,
@@ -49,7 +48,7 @@ def read_scan(
     ImageError
         If readings and poses do not belong together.
     """
-    merged = merge_touches(sensor, readings, poses, placing, window_tactels, trust=trust)
+    merged = merge_touches(sensor, readings, poses, placing, trust=trust)
     T_image_probe = spatial_pose(merged.poses[-1])
     return read_classically(lab, merged.image, T_image_probe=T_image_probe, seq=seq)
 

@@ -23,10 +23,8 @@ from recognizer.validation.results import FORMAT
 PAIR, WORLDS = "compare.html.j2", "worlds.html.j2"  #: templates
 SAME, BETTER, WORSE = "same within chance", "better", "worse"
 
-FinishedRun = tuple[dict[str, Any], dict[str, Any]]  #: results and times of a run that is done
 
-
-def read_finished(folder: Path) -> FinishedRun:
+def read_finished(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return results and times of a folder's run.
 
     Raises
@@ -149,6 +147,11 @@ def _text(value: Any) -> str:
 def join_runs(folders: Sequence[Path], page: Path | None) -> dict[str, Any]:
     """Return the worlds of several runs; `page` (HTML) and its JSON are written if it is given.
 
+    Returns
+    -------
+    `runs`: name (a letter), command, versions; `worlds`: a line of `results.worlds_of` each, with
+    the run's name and the CPU times of a touch (`drawing_ms`, `reading_ms`).
+
     Raises
     ------
     ValidationError
@@ -160,34 +163,27 @@ def join_runs(folders: Sequence[Path], page: Path | None) -> dict[str, Any]:
     for place in places:
         if places.count(place) > 1:
             raise ValidationError("stands twice", fix="name every run once", place=place.name)
-    found = join_finished([read_finished(folder) for folder in folders])
-    if page is not None:
-        require_report("validate-set worlds")
-        pictures = draw_answers(found["worlds"]), draw_errors(found["worlds"])
-        text = environment().get_template(WORLDS).render(**found, pictures=pictures)
-        write_text(page, text)
-        write_json(page.with_suffix(".json"), found)
-    return found
-
-
-def join_finished(runs: Sequence[FinishedRun]) -> dict[str, Any]:
-    """Return the worlds of runs, in their order.
-
-    Returns
-    -------
-    `runs`: name (a letter), command, versions; `worlds`: a line of `results.worlds_of` each, with
-    the run's name and the CPU times of a touch (`drawing_ms`, `reading_ms`).
-    """
     listed, worlds = [], []
-    for number, (results, times) in enumerate(runs):
-        name, provenance = run_name(number), results["provenance"]
+    for number, folder in enumerate(folders):
+        (results, times), name = read_finished(folder), run_name(number)
+        provenance = results["provenance"]
         listed.append({"run": name, "command": provenance["command"],
                        "touches": results["totals"]["touches"],
                        "versions": provenance["versions"], "set": provenance["set"]})  # fmt: skip
         for line, spent in zip(results["worlds"], times["worlds"], strict=True):
             ms = {f"{part}_ms": value for part, value in spent.items()}
             worlds.append({"run": name, **line, **ms})
-    return {"runs": listed, "worlds": worlds}
+    found = {"runs": listed, "worlds": worlds}
+    if page is not None:
+        require_report("validate-set worlds")
+        text = (
+            environment()
+            .get_template(WORLDS)
+            .render(**found, pictures=(draw_answers(worlds), draw_errors(worlds)))
+        )
+        write_text(page, text)
+        write_json(page.with_suffix(".json"), found)
+    return found
 
 
 def run_name(number: int) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import product
@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from recognizer.validation.results import INSIDE, RMS_DEG, RMS_MM
 from recognizer.validation.statistics import FAILS, HOLDS, chi2_quantile
@@ -24,9 +23,9 @@ from recognizer.validation.trial import REJECTED, RIGHT, WRONG
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.backend_bases import FigureCanvasBase
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
+    from matplotlib.transforms import BboxBase
 
 GREEN, RED, GREY = "#2a7f62", "#c0392b", "#8a8f98"
 COLOURS = {RIGHT: GREEN, WRONG: RED, REJECTED: GREY}
@@ -64,12 +63,9 @@ class SvgFigure:
 @contextmanager
 def svg_figure(rows: int, columns: int, size: tuple[float, float]) -> Iterator[SvgFigure]:
     """Yield a figure of some inches; its SVG is there at the end."""
-    import matplotlib
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-    with matplotlib.rc_context(_SETTINGS):
-        figure, axes = _figure(FigureCanvasSVG, rows, columns, size)
-        drawn, text = SvgFigure(axes), io.StringIO()
+    drawn, text = SvgFigure([]), io.StringIO()
+    with _figure(rows, columns, size) as figure:
+        drawn.axes = figure.axes
         yield drawn
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
@@ -81,25 +77,27 @@ def figure_on(
     path: Path, rows: int, columns: int, size: tuple[float, float]
 ) -> Iterator[list[Axes]]:
     """Yield axes, without a grid, of a picture that is written at the end: .png, .svg, .pdf."""
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    with matplotlib.rc_context(_SETTINGS | {"axes.grid": False}):
-        figure, axes = _figure(FigureCanvasAgg, rows, columns, size)
-        yield axes
-        undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-        metadata: dict[str, None] = undated.get(path.suffix.lower(), {})
+    undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    metadata: dict[str, None] = undated.get(path.suffix.lower(), {})
+    with _figure(rows, columns, size, {"axes.grid": False}) as figure:
+        yield figure.axes
         figure.savefig(path, dpi=110, metadata=metadata)
 
 
+@contextmanager
 def _figure(
-    canvas: type[FigureCanvasBase], rows: int, columns: int, size: tuple[float, float]
-) -> tuple[Figure, list[Axes]]:
+    rows: int, columns: int, size: tuple[float, float], settings: dict[str, Any] | None = None
+) -> Iterator[Figure]:
+    """Yield a figure with its axes; letters are as large as in SVG until it is saved."""
+    import matplotlib
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=size, layout="constrained")
-    canvas(figure)
-    return figure, list(figure.subplots(rows, columns, squeeze=False).flat)
+    with matplotlib.rc_context(_SETTINGS | (settings or {})):
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasSVG(figure)
+        figure.subplots(rows, columns)
+        yield figure
 
 
 def confusion(objects: dict[str, Any]) -> str:
@@ -317,8 +315,6 @@ def _interval(axis: Axes, y: float, value: float, ends: tuple[float, float], sta
 
 
 Point = tuple[float, float, str]
-Box = tuple[float, float, float, float]  # left, bottom, right, top; pixels
-
 
 # Labels, sizes in points.
 LETTERS = 7.5
@@ -336,6 +332,8 @@ def label_points(axes: Axes, points: Sequence[Point]) -> list[Annotation]:
     Every name tries places around its point, from near to far, and takes the first that is free; a
     far one gets a thin line to its point. A point that is no finite number gets no name.
     """
+    from matplotlib.transforms import Bbox
+
     figure = axes.get_figure(root=True)
     if figure is None:
         return []
@@ -343,52 +341,33 @@ def label_points(axes: Axes, points: Sequence[Point]) -> list[Annotation]:
     pixel = figure.dpi / 72
     shown = sorted(point for point in points if np.isfinite(point[:2]).all())
     spots = [axes.transData.transform(point[:2]) for point in shown]
-    half = MARKER * pixel
-    taken = [(x - half, y - half, x + half, y + half) for x, y in spots]
+    taken: list[BboxBase] = [Bbox([spot - MARKER * pixel, spot + MARKER * pixel]) for spot in spots]
     legend = axes.get_legend()
     if legend is not None:
-        taken.append(legend.get_window_extent().extents)
-    frame: Box = tuple(axes.get_window_extent().extents)  # type: ignore[assignment]
-    found = []
+        taken.append(legend.get_window_extent())
+    frame, found = axes.get_window_extent(), []
     for (x, y, name), spot in zip(shown, spots, strict=True):
         text = axes.annotate(name, (x, y), (0, 0), textcoords="offset points",
                              fontsize=LETTERS, ha="center", va="center")  # fmt: skip
         text.set_in_layout(False)
-        extent = text.get_window_extent()
-        size = extent.width / pixel, extent.height / pixel
-        offset, box = _free_place(spot, size, pixel, taken, frame)
-        text.set_position(offset)
-        if math.hypot(*offset) - size[0] / 2 >= LINE_FROM:
-            axes.annotate("", (x, y), offset, textcoords="offset points", annotation_clip=False,
+        half = np.array(text.get_window_extent().size) / pixel / 2
+        for away, turn in product(AWAY, TURNS):  # the last one if none is free
+            towards = np.array([math.cos(math.radians(turn)), math.sin(math.radians(turn))])
+            offset = away * towards + (half + CLEAR) * np.sign(towards.round(6))
+            low, high = (spot + (offset + k * (half + CLEAR)) * pixel for k in (-1, 1))
+            box = Bbox([low, high])
+            inside = (low >= frame.min).all() and (high <= frame.max).all()
+            if inside and not box.count_overlaps(taken):
+                break
+        text.set_position(tuple(offset))
+        if math.hypot(*offset) - half[0] >= LINE_FROM:
+            axes.annotate("", (x, y), tuple(offset), textcoords="offset points",
+                          annotation_clip=False,
                           arrowprops={"arrowstyle": "-", "lw": 0.5, "color": GREY,
                                       "shrinkA": 4, "shrinkB": 3}).set_in_layout(False)  # fmt: skip
         taken.append(box)
         found.append(text)
     return found
-
-
-def _free_place(
-    spot: NDArray[np.float64], size: tuple[float, float], pixel: float, taken: Sequence[Box],
-    frame: Box,
-) -> tuple[tuple[float, float], Box]:  # fmt: skip
-    """Return the offset of a name's middle in points, and its box; the last one if none is free."""
-    wide, high = (side / 2 + CLEAR for side in size)
-    offset, box = (0.0, 0.0), frame
-    for away, turn in product(AWAY, TURNS):
-        c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
-        offset = (away * c + wide * np.sign(round(c, 6)), away * s + high * np.sign(round(s, 6)))
-        x, y = (spot[k] + offset[k] * pixel for k in (0, 1))
-        box = (x - wide * pixel, y - high * pixel, x + wide * pixel, y + high * pixel)
-        inside = box[0] >= frame[0] and box[1] >= frame[1]
-        inside = inside and box[2] <= frame[2] and box[3] <= frame[3]
-        if inside and not any(boxes_overlap(box, other) for other in taken):
-            break
-    return (float(offset[0]), float(offset[1])), box
-
-
-def boxes_overlap(one: Box, other: Box) -> bool:
-    """Whether two boxes share an area."""
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def work_precision(study: dict[str, Any], times: dict[str, Any], used: str = "") -> str:
@@ -397,15 +376,6 @@ def work_precision(study: dict[str, Any], times: dict[str, Any], used: str = "")
     `study` and `times` are those of `results.json` and `times.json`; `used` is the level of the
     contact model of this run, which is ringed.
     """
-    with svg_figure(2, 2, (11.5, 8.0)) as picture:
-        draw_work_precision(picture.axes, study, times, used)
-    return picture.svg
-
-
-def draw_work_precision(
-    axes: list[Axes], study: Mapping[str, Any], times: Mapping[str, Any], used: str
-) -> list[Annotation]:
-    """Draw four pictures; return the names of their points."""
     contact, decoders, readers = (
         list(zip(times[name], study[name], strict=True))
         for name in ("contact", "decoders", "readers")
@@ -423,19 +393,21 @@ def draw_work_precision(
         ("readers", "place, rms, mm", "ms",
          [(ms, mm, line["reader"]) for (ms, line), mm in zip(readers, places, strict=True)]),
     ]  # fmt: skip
-    _draw_contact(axes[0], [line["series"] for _, line in contact], panels[0][3], used)
-    for axis, (title, label, unit, points) in zip(axes, panels, strict=True):
-        if axis is not axes[0]:
+    with svg_figure(2, 2, (11.5, 8.0)) as picture:
+        _draw_contact(picture.axes[0], [line["series"] for _, line in contact], panels[0][3], used)
+        for axis, (_, _, _, points) in zip(picture.axes[1:], panels[1:], strict=True):
             _scatter(axis, points)
-        axis.set_title(title)
-        axis.set_ylabel(label)
-        axis.set_xlabel(f"CPU time of one, {unit}")
-        axis.margins(x=0.3, y=0.2)
-    for axis in axes[1:]:
-        top = max(axis.get_ylim()[1], 1e-3)
-        axis.set_ylim(-0.12 * top, 1.15 * top)
-    named = (label_points(axis, panel[3]) for axis, panel in zip(axes, panels, strict=True))
-    return [text for texts in named for text in texts]
+        for axis, (title, label, unit, _) in zip(picture.axes, panels, strict=True):
+            axis.set_title(title)
+            axis.set_ylabel(label)
+            axis.set_xlabel(f"CPU time of one, {unit}")
+            axis.margins(x=0.3, y=0.2)
+        for axis in picture.axes[1:]:
+            top = max(axis.get_ylim()[1], 1e-3)
+            axis.set_ylim(-0.12 * top, 1.15 * top)
+        for axis, panel in zip(picture.axes, panels, strict=True):
+            label_points(axis, panel[3])
+    return picture.svg
 
 
 def _draw_contact(axis: Axes, series: list[str], points: list[Point], used: str) -> None:

@@ -48,7 +48,7 @@ def make(folder: Path, text: str, formats=ROBOT, **options):
 def part(request, tmp_path_factory):
     """An object with its files and what is registered of it."""
     folder = tmp_path_factory.mktemp(request.param)
-    _, url = make(folder, TEXTS[request.param], (*ROBOT, "step"))
+    _, url = make(folder, TEXTS[request.param], (*ROBOT, "step"), verify=True)
     with read_transaction(open_database(url, writable=False)) as connection:
         known = read_object(connection, "Part")
     faces = {face.name: face.T_object_face for face in known.faces if "." not in face.name}
@@ -220,23 +220,3 @@ def test_another_file_than_was_meant_is_refused(tmp_path, monkeypatch):
 def test_symbols_on_a_round_face_cannot_collide(tmp_path):
     with pytest.raises(SpecError, match=r"spec.yaml:5:20: error: .* round face cannot collide"):
         make(tmp_path, TEXTS["round"] + "robot: {collision: symbols}\n")
-
-
-@pytest.mark.parametrize(
-    "path",
-    [FIXTURES / "cube.yaml", FIXTURES / "specs" / "thesis-tetrahedron.yaml"],
-    ids=lambda p: p.stem,
-)
-def test_fixtures_load(path, tmp_path):
-    url = f"sqlite:///{tmp_path / 'lab.db'}"
-    made = encode(
-        read_specs([path]),
-        folder=tmp_path / "out",
-        database=url,
-        formats=ROBOT,
-        verify=True,
-        jobs=1,
-    )
-    for file in (file for file in made.files if file.suffix == ".sdf"):
-        assert faults(file.read_bytes()) == []
-    assert len([file for file in made.files if file.suffix == ".usda"]) == len(made.objects)

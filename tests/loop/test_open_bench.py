@@ -8,7 +8,7 @@ import httpx
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from bench_page import PATIENCE_MS, opened, rest, shown, touched, until
+from bench_page import PATIENCE_MS, opened, rest, settle, shown, touched, until
 from playwright.sync_api import expect
 
 from probe.recording.read import Recording
@@ -84,9 +84,10 @@ def test_touches_are_kept_to_go_back_to(page):
     kept = buttons.count()
     other = touched(page, 0.46, 0.5).splitlines()[0]
     rest(page)
-    assert buttons.count() == kept + 1
+    expect(buttons).to_have_count(kept + 1)
     buttons.nth(kept - 1).click()
-    assert page.get_by_test_id("answer").inner_text().startswith(said)
+    answer = page.get_by_test_id("answer")
+    expect(answer).to_have_text(re.compile(f"^{re.escape(said)}"), use_inner_text=True)
     expect(page.get_by_test_id("answer-of")).to_contain_text("seen again")
     page.get_by_test_id("touch-name").fill("the first one")
     page.get_by_test_id("touch-name").press("Enter")
@@ -103,7 +104,7 @@ def test_touches_are_kept_to_go_back_to(page):
     buttons.nth(kept - 1).click()
     page.get_by_test_id("touch-delete").click()
     expect(buttons).to_have_count(kept)
-    assert page.get_by_test_id("answer").inner_text().startswith(other)
+    expect(answer).to_have_text(re.compile(f"^{re.escape(other)}"), use_inner_text=True)
 
 
 def test_keys_turn_the_part_and_touch_it(page):
@@ -240,11 +241,14 @@ def test_the_answer_is_on_the_first_screen(page):
     touched(page)
     for width, height in ((390, 844), (1024, 768), (3840, 2160), (1440, 900)):
         page.set_viewport_size({"width": width, "height": height})
-        # pictures follow the window a frame later
-        until(page, f"document.documentElement.scrollWidth <= {width}")
+        settle(page)
         page.evaluate("scrollTo(0, 0)")
-        box = page.get_by_test_id("answer").bounding_box()
-        assert box["y"] + box["height"] <= height
+        box = "document.getElementById('answer').getBoundingClientRect()"
+        until(
+            page,
+            f"document.documentElement.scrollWidth <= {width} && {box}.height > 0"
+            f" && {box}.bottom <= {height}",
+        )
 
 
 def test_an_empty_lab_offers_an_example(served, browser, tmp_path):

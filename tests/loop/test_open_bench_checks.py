@@ -7,7 +7,16 @@ import re
 
 import httpx
 import pytest
-from bench_page import PATIENCE_MS, opened, press_known_loads, rest, shown, touched, until
+from bench_page import (
+    PATIENCE_MS,
+    opened,
+    press_known_loads,
+    rest,
+    shown,
+    touched,
+    until,
+    until_redrawn,
+)
 from playwright.sync_api import expect
 
 from generator.database.as_built import read_as_built
@@ -66,7 +75,7 @@ def test_what_was_felt_and_its_mosaic_are_on_the_part(page, bench):
     page.get_by_test_id("tint").select_option("mosaic")
     expect(faces).to_contain_text("F2: mosaic of 1 touch")
     expect(faces).to_contain_text("F1: not touched yet")
-    assert part.screenshot() != felt
+    until_redrawn(part, felt)
     page.get_by_test_id("touch-list").locator("button").last.click()
     page.get_by_test_id("touch-delete").click()
     page.get_by_test_id("tint").select_option("coverage")
@@ -89,7 +98,7 @@ def test_what_is_promised_colours_the_faces_and_is_said(page, bench):
     told = httpx.get(f"{bench}api/promise/Cube").json()["faces"]
     assert len(told) == 6
     expect(faces).to_contain_text(f"F1: {100 * told['F1']['at_once']:.0f} %")
-    assert page.get_by_test_id("part").screenshot() != plain
+    until_redrawn(page.get_by_test_id("part"), plain)
     shown(page, "Cylinder")
     expect(faces).to_contain_text("F2: nothing is promised of single touches", timeout=PATIENCE_MS)
     page.get_by_test_id("tint").select_option("plain")

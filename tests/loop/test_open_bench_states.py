@@ -9,7 +9,7 @@ from contextlib import closing
 
 import httpx
 import pytest
-from bench_page import PATIENCE_MS, opened, rest, running, shown, touched, until
+from bench_page import PATIENCE_MS, opened, rest, running, settle, shown, touched, until
 from playwright.sync_api import expect
 
 GROWTH = """() => new Promise((done) => { const heights = []; const look = () => {
@@ -50,7 +50,7 @@ def test_a_silent_and_a_killed_server_are_said_and_one_that_comes_back_is_found(
         first.send_signal(signal.SIGKILL)
         expect(state).to_contain_text("open-bench does not answer", timeout=PATIENCE_MS)
         expect(state).to_contain_text("looked for")
-        assert page.evaluate("document.getElementById('touch').inert")  # nothing to be clicked
+        until(page, "document.getElementById('touch').inert")  # nothing to be clicked
         page.get_by_test_id("filter").select_option("median")  # what is on the page goes on
         assert page.get_by_test_id("answer").inner_text().startswith("Cube")
         page.get_by_test_id("touch-list").locator("button").first.click()
@@ -60,7 +60,7 @@ def test_a_silent_and_a_killed_server_are_said_and_one_that_comes_back_is_found(
     with process_of(lab, int(address.split(":")[-1].strip("/"))):
         expect(state).to_contain_text("probe is there", timeout=PATIENCE_MS)
         until(page, "bench.shown !== '' && bench.frames > 0")
-        assert page.evaluate("bench.touch") == 0  # nothing is left of the other server's touches
+        until(page, "bench.touch === 0")  # nothing is left of the other server's touches
         shown(page, "Cube")
         assert touched(page).startswith("Cube")
         assert page.evaluate("bench.touch") == 1
@@ -137,7 +137,7 @@ def test_a_phone_touches_by_a_tap(browser, bench):
         page.touchscreen.tap(box["x"] + 0.46 * box["width"], box["y"] + 0.55 * box["height"])
         until(page, f"bench.answers > {answers}")
         assert page.get_by_test_id("answer").inner_text().startswith("Cube")
-        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        until(page, "document.documentElement.scrollWidth <= 390")
         small = page.evaluate(
             """() => [...document.querySelectorAll('button, select, .button')]
             .filter((one) => one.checkVisibility() && one.getBoundingClientRect().height < 24)
@@ -158,6 +158,7 @@ def test_4k_uses_the_screen_and_text_grows(browser, bench):
     with opened(browser, bench, viewport={"width": 3840, "height": 2160}) as page:
         size = page.evaluate("parseFloat(getComputedStyle(document.body).fontSize)")
         assert size >= 19
+        settle(page)
         used = page.evaluate(
             """() => [...document.querySelectorAll('main > .panel')]
             .filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect())
@@ -168,9 +169,11 @@ def test_4k_uses_the_screen_and_text_grows(browser, bench):
         assert max(heights) == min(heights)  # a canvas whose pixels size its panel grows for ever
         page.set_viewport_size({"width": 1440, "height": 900})
         part = page.get_by_test_id("part")
+        settle(page)
         before = part.bounding_box()
         page.set_viewport_size({"width": 3840, "height": 2160})
         page.set_viewport_size({"width": 1440, "height": 900})
+        settle(page)
         assert part.bounding_box() == before
         page.set_viewport_size({"width": 3840, "height": 2160})
         rest(page)

@@ -9,19 +9,14 @@ import numpy as np
 from PIL import Image
 
 from decoder.command import run
+from generator.array import profile
 
 WINDOW = "01 11 01 01 00 01"
 
 
-def outcome(capsys, *arguments):
-    code = run(list(arguments))
-    output = capsys.readouterr()
-    return code, output.out, output.err
-
-
-def test_picture(capsys, tmp_path):
+def test_picture(ask, tmp_path):
     path = tmp_path / "window.png"
-    code, *_ = outcome(capsys, WINDOW, "--profile", "thesis", "--plot", str(path))
+    code, *_ = ask(run, WINDOW, "--profile", "thesis", "--plot", path)
     assert code == 0
     with Image.open(path) as picture:
         assert picture.size == (65 * 16, 63 * 16)
@@ -30,21 +25,19 @@ def test_picture(capsys, tmp_path):
     large = '{"family": "prba", "order": 2, "degree": 64}'
     window = "0" * 15 + "1"
     rows = [window[i : i + 4] for i in range(0, 16, 4)] * 16
-    code, *_ = outcome(capsys, *rows[:1], "--array", large, "--plot", str(path))
+    code, *_ = ask(run, *rows[:1], "--array", large, "--plot", path)
     assert code == 1
     assert path.stat().st_size > 100
-    code, _, err = outcome(capsys, WINDOW, "--profile", "thesis", "--plot", str(tmp_path / "a/b"))
+    code, _, err = ask(run, WINDOW, "--profile", "thesis", "--plot", tmp_path / "a/b")
     assert code == 2
     assert "cannot write" in err
 
 
-def test_a_wrapping_window_is_outlined_on_both_sides(capsys, tmp_path):
-    from generator.array import profile
-
+def test_a_wrapping_window_is_outlined_on_both_sides(ask, tmp_path):
     array = profile("thesis").array()
     rows = ["".join(str(array.symbols(60 + r, 64 + c)) for c in range(2)) for r in range(6)]
     path = tmp_path / "wrap.png"
-    code, *_ = outcome(capsys, *rows, "--profile", "thesis", "--plot", str(path))
+    code, *_ = ask(run, *rows, "--profile", "thesis", "--plot", path)
     assert code == 0
     with Image.open(path) as picture:
         assert picture.getpixel((64 * 16, 61 * 16)) == (196, 60, 20)

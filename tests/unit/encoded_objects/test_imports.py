@@ -34,6 +34,11 @@ PROGRAMS = {
         "numpy scipy sqlalchemy typer rich pydantic yaml h5py generator decoder probe recognizer",
     ),
     "generator": ("import generator", "OCP numpy"),
+    "array": (
+        "import generator.array",
+        """scipy shapely trimesh pydantic sqlalchemy yaml typer rich manifold3d PIL matplotlib OCP
+        importlib.resources""",
+    ),
     "help": ("from generator.command import run; assert run(['--help']) == 0", HELP),
     "help of init": ("from generator.command import run; assert run(['init', '-h']) == 0", HELP),
     "help of list": ("from generator.command import run; assert run(['list', '-h']) == 0", HELP),

@@ -5,8 +5,6 @@ import re
 import shutil
 import signal
 import sqlite3
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -186,23 +184,24 @@ def test_an_older_database_that_may_not_be_written_says_what_to_do(unprivileged)
     assert path.read_bytes() == (EARLIER / "v1.db").read_bytes()
 
 
+def forked(action):
+    """Run an action in a process of its own, forked from this one; return its number."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            action()
+            code = 0
+        finally:
+            os._exit(code)
+    return child
+
+
 def test_many_may_make_a_database_at_once(tmp_path):
-    script = (
-        "import sys; from generator.database.open import open_database;"
-        "sys.stdin.readline(); open_database(sys.argv[1])"
-    )
-    path = tmp_path / "lab.db"
-    makers = [
-        subprocess.Popen([sys.executable, "-c", script, str(path)], stdin=subprocess.PIPE)
-        for _ in range(3)
-    ]
-    for maker in makers:
-        maker.stdin.write(b"go\n")
-        maker.stdin.flush()
-    for maker in makers:
-        maker.stdin.close()
-        assert maker.wait(timeout=60) == 0
-    with read_transaction(open_database(str(path), writable=False)) as connection:
+    path = str(tmp_path / "lab.db")
+    makers = [forked(lambda: open_database(path)) for _ in range(3)]
+    assert [os.waitpid(maker, 0)[1] for maker in makers] == [0, 0, 0]
+    with read_transaction(open_database(path, writable=False)) as connection:
         assert len(connection.execute(select(meta)).all()) == 3
 
 
@@ -346,19 +345,6 @@ def test_no_copy_no_migration(first_file, monkeypatch):
         open_database(str(first_file))
     assert first_file.read_bytes() == before
     assert os.listdir(first_file.parent) == ["lab.db"]
-
-
-def forked(action):
-    """Run an action in a process of its own, forked from this one; return its number."""
-    child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            action()
-            code = 0
-        finally:
-            os._exit(code)
-    return child
 
 
 def test_a_migration_killed_before_its_commit_leaves_the_old_version(first_version, monkeypatch):

@@ -79,25 +79,6 @@ def engine(lab_url):
     return open_database(lab_url)
 
 
-def test_faces_have_frames_that_put_their_outlines_back_on_the_vertices(engine):
-    given = cube_on(0)
-    register_one(engine, given)
-    with read_transaction(engine) as connection:
-        known = read_object(connection, "Cube")
-    for face, shape, placed in zip(
-        known.faces, given.polyhedron.faces, given.layout.faces, strict=True
-    ):
-        (polygon,) = face.polygon_mm
-        plane = np.column_stack([polygon, np.zeros(4), np.ones(4)])
-        corners = (face.T_object_face @ plane.T).T[:, :3]
-        np.testing.assert_allclose(
-            corners, given.polyhedron.vertices[list(shape.loops[0])], atol=1e-12
-        )
-        assert face.area_mm2 == pytest.approx(3600.0, rel=1e-14)
-        assert face.face_type == "square"
-        assert face.placement == placed.placement
-
-
 def test_an_object_with_holes_and_a_layout_in_its_own_order(engine):
     """A square frame: faces with holes, genus 1; faces of the layout last to first."""
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]

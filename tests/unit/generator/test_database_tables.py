@@ -122,18 +122,6 @@ def test_cells_come_back_sorted(engine, place):
         assert listed(occupied_cells(connection, 2)) == []
 
 
-def test_cells_are_added_and_freed_one_by_one(engine):
-    chance = np.random.default_rng(7)
-    held = set()
-    for _ in range(12):
-        some = tuple(chance.integers(0, 150, (2, 40)))
-        with write_transaction(engine) as connection:
-            taken = chance.random() < 0.6
-            mark_cells(connection, 1, some, taken=taken)
-            held = held | set(listed(some)) if taken else held - set(listed(some))
-            assert listed(occupied_cells(connection, 1)) == sorted(held)
-
-
 def test_a_block_of_cells_is_few_rows(engine):
     block = tuple(index.ravel() for index in np.mgrid[10 : 10 + 4 * TILE, 0 : 4 * TILE])
     with write_transaction(engine) as connection:

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from reference.cells import PLACES, listed
+from reference.cells import listed
 
-from generator.layout.occupancy import TILE, Occupancy, cells_of_tiles, tiles_of
+from generator.layout.occupancy import TILE, Occupancy
 from generator.layout.torus import CORNER, TorusPosition, board_size, place_pieces
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
@@ -106,11 +106,6 @@ def test_mixed_faces_fill_the_array(seed):
 
 def cells(row, column, height, width):
     return tuple(i.ravel() for i in np.mgrid[row : row + height, column : column + width])
-
-
-@pytest.mark.parametrize("place", PLACES)
-def test_cells_come_back_sorted(place):
-    assert listed(cells_of_tiles(tiles_of(*PLACES[place]))) == sorted(listed(PLACES[place]))
 
 
 def test_cells_are_taken_and_freed_one_by_one():

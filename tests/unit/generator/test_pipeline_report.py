@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from generator.command import run
-from generator.command.made_report import next_step, print_made, rate_lines
+from generator.command.made_report import next_step, rate_lines
 from generator.errors import PrintError
-from generator.layout.placement import Layout
-from generator.layout.recognition_rate import LOW, RecognitionRate
-from generator.pipeline import Encoded, MadeObject, encode
-from generator.pipeline.faces import FaceReport, face_reports
+from generator.layout.recognition_rate import LOW
+from generator.pipeline import encode
+from generator.pipeline.faces import face_reports
 from generator.pipeline.files import outer_size_mm, parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
@@ -139,31 +138,6 @@ def test_another_sensor_has_the_rates_it_would_have_had_when_made(made, tmp_path
     assert usual.isdisjoint(one["at_once"] for one in found.values())
     # it sees too few symbols at once
     assert shown(folder, "Bar", capsys, "--sensor-type", "gel-24x32") == {}
-
-
-def test_what_is_alike_shares_a_line_and_what_differs_does_not(capsys):
-    def face(number, width):
-        size, promise = (width, 50.0), RecognitionRate(0.7, 0.99)
-        return FaceReport(
-            f"F{number}", "", "plane", size, width * 50.0, 63, 40, promise, (16.0, 20.0)
-        )
-
-    faces = tuple(face(k, 40.0 if k in (1, 4) else 60.0) for k in range(1, 13))
-    layout = Layout("faces", 7.0, ())
-    made = [
-        MadeObject(name, 12, symbols, 200, 12, (), (), False, layout, face_reports=faces)
-        for name, symbols in (("Block-1", 384), ("Block-2", 380))
-    ]
-    encoded = Encoded(tuple(made), "sqlite:///lab.db", 51, 1285, 5000, 1.0)
-    print_made(encoded, dry_run=False, as_json=False)
-    text = capsys.readouterr().out
-    assert "Block-1: made; 12 faces, 384 symbols" in text
-    assert "Block-2: made; 12 faces, 380 symbols" in text
-    assert (
-        "  F1, F4:           40 x 50 mm, 63 symbols, 70% answered at once, 99% within three, "
-        "it could be as small as 16 x 20 mm" in text
-    )
-    assert "  F2 and 9 like it: 60 x 50 mm" in text
 
 
 @pytest.mark.parametrize("kind", ["cube", "dodecahedron", "tetrahedron"])

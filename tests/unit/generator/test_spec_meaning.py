@@ -11,7 +11,6 @@ from pydantic_core import PydanticCustomError
 from encoded_objects.base.settings import length_mm
 from encoded_objects.base.yaml_tree import read_tree
 from generator.alphabet.known import ALPHABETS
-from generator.alphabet.outline import SymbolStyle
 from generator.alphabet.printable import check_printable
 from generator.array.profiles import PROFILES
 from generator.errors import DatabaseError, LayoutError, ShapeError
@@ -81,17 +80,6 @@ def test_marks_of_keys_and_values():
     assert str(tree.key_mark(("b", 0, "c"))) == "c.yaml:3:6"
     assert str(tree.value_mark(("b", 0, "nothing"))) == "c.yaml:3:5"
     assert tree.value_mark(("a",)).source.lines == ("a: 1", "b:", "  - {c: 2}", "")
-
-
-def test_smallest_spec():
-    (cube,) = read_specs([FIXTURES / "cube.yaml"])
-    assert (cube.name, cube.shape.kind, cube.shape.parameters) == ("Cube", "cube", {"side": 60.0})
-    assert (cube.profile, cube.alphabet, cube.printer.name) == ("auto", "dense-4", "fdm-0.4")
-    assert cube.style == SymbolStyle(5.0, 1.0, 1.0, pytest.approx(math.radians(7.5)), 0.0)
-    assert (cube.layout, cube.parts, cube.wall_mm) == ("auto", "panels", 3.0)
-    assert cube.formats == ("step", "stl", "3mf")
-    assert (cube.folder, cube.database) == (Path("out/cube"), "sqlite:///lab.db")
-    assert (cube.encoding["rows"], cube.encoding["columns"]) == (51, 1285)
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -347,10 +335,8 @@ def test_starter_shows_the_values_that_hold_without_it():
 def test_words_of_people():
     assert starter_named("Parallelepiped")[0] == "box"
     assert starter_named("triangular-prism")[0] == "triangular_prism"
-    assert "encode-object mine.yaml" in starter_named("cube", "mine.yaml")[1]
     assert format_option("STEP, .stl,step") == ("step", "stl")
     with pytest.raises(SpecError, match="no format is named"):
         format_option(" , ")
-    assert database_option("lab.db") == "sqlite:///lab.db"
     with pytest.raises(SpecError, match="--database: error: 'postgresql:/name' is half an address"):
         database_option("postgresql:/name")

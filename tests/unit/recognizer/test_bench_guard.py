@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import socket
-import subprocess
-import sys
 
 import pytest
 
@@ -87,15 +85,6 @@ def test_other_pages_change_nothing(origin, let_in):
     assert (asked(LOCAL, kind="websocket", origin=origin)[0]["type"] != "websocket.close") == let_in
 
 
-def test_the_live_line_needs_an_origin_and_cross_site_requests_are_refused():
-    assert asked(LOCAL, kind="websocket")[0] == {
-        "type": "websocket.close", "code": 1008, "reason": "a request from another page",
-    }  # fmt: skip
-    assert status(LOCAL, "POST", sec_fetch_site="cross-site") == 403
-    assert status(LOCAL, "POST", sec_fetch_site="same-origin") == 200
-    assert status(LOCAL, "POST") == 200  # no browser
-
-
 def test_a_token_is_known_by_header_by_cookie_and_by_the_printed_address():
     assert status(OPEN) == 401
     assert status(OPEN, authorization="Bearer a-long-token") == 200
@@ -144,17 +133,6 @@ def ended(capsys, *words):
     with pytest.raises(SystemExit) as leaving:
         main([str(word) for word in words])
     return leaving.value.code, capsys.readouterr().err
-
-
-def test_help_loads_no_server_no_array_and_no_database():
-    code = (
-        "import sys\nfrom recognizer.bench.command import main\n"
-        "try:\n    main(['--help'])\nexcept SystemExit as end:\n    assert end.code == 0\n"
-        "print([m for m in ('numpy', 'fastapi', 'sqlalchemy', 'h5py') if m in sys.modules])"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout.splitlines()[-1] == "[]"
-    assert "--web-port" in run.stdout
 
 
 @pytest.mark.parametrize(

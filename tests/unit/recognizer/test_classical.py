@@ -1,14 +1,11 @@
 """The thesis's way of reading, whole: scans of faces of the thesis's profile, by touch alone."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
-from generator.pipeline import encode
-from generator.spec import read_specs
 from probe.arm import Arm
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
@@ -21,15 +18,11 @@ from recognizer.thesis.merge import merge_touches, relative_poses
 from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_scan
 from recognizer.touch.lab import open_lab
-from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW
+from recognizer.touch.recognition import NO_CONTACT
 from recognizer.touch.tactile_image import ImageError, tactile_image
 
 SENSOR = SensorType()
-SET = """
-objects:
-- {name: Cube, shape: {cube: 80 mm}, profile: thesis}
-- {name: Prism, shape: {triangular_prism: {side: 90 mm, height: 80 mm}}, profile: thesis}
-"""
+CUBE = "{name: Cube, shape: {cube: 80 mm}, profile: thesis}"
 OTHER = """
 name: Stranger
 shape: {cube: 80 mm}
@@ -38,39 +31,27 @@ symbols: {alphabet: thesis-2, pitch: 12 mm}
 """
 
 
-def made(folder: Path, text: str) -> str:
-    (folder / "spec.yaml").write_text(text)
-    url = f"sqlite:///{folder / 'lab.db'}"
-    encode(read_specs([folder / "spec.yaml"]), folder=folder / "out", database=url, formats=())
-    return url
-
-
 @pytest.fixture(scope="module")
-def url(tmp_path_factory):
-    return made(tmp_path_factory.mktemp("lab"), SET)
-
-
-@pytest.fixture(scope="module")
-def lab(url):
-    return open_lab(url)
+def lab(make_lab):
+    return open_lab(make_lab(CUBE) / "lab.db")
 
 
 class Scan:
     """Touches of a face by an arm with backlash and noise, felt with defects."""
 
-    def __init__(self, url, name, face, seed, theta=0.0, force_n=80.0):
+    def __init__(self, url, name, face, seed):
         scene = registered_surface(url, name, face)
         rng = np.random.default_rng(seed)
-        plan = raster([scene.region.starts], SENSOR, theta_rad=theta, least_cover=0.4)
+        plan = raster([scene.region.starts], SENSOR, theta_rad=0.0, least_cover=0.4)
         middle = scene.centre_mm()
         T_base_face = surface_to_sensor(300, 0, 0.2, 100) @ surface_to_sensor(*-middle, 0)
-        wanted = [T_base_face @ surface_to_sensor(x, y, theta) for x, y in plan.places_mm]
+        wanted = [T_base_face @ surface_to_sensor(x, y, 0.0) for x, y in plan.places_mm]
         arm = follow_poses(Arm(), wanted, JointErrors(), rng)
         tips = Tips(lengths_mm=rng.normal(0, 0.03, (16, 16)))
         gains = np.exp(rng.normal(0, 0.1, (16, 16)))
         self.believed, self.readings, self.true = arm.believed, [], []
         for T_base_sensor in arm.true:
-            touch = touch_at(np.linalg.inv(T_base_face) @ T_base_sensor, force_n)
+            touch = touch_at(np.linalg.inv(T_base_face) @ T_base_sensor, 80.0)
             felt = gains * tabs(scene.surface, SENSOR, touch, tips).forces_n
             self.readings.append(np.maximum(felt + rng.normal(0, 0.02, (16, 16)), 0))
             self.true.append([touch.x_mm, touch.y_mm, touch.theta_rad])
@@ -78,8 +59,8 @@ class Scan:
 
 
 @pytest.fixture(scope="module")
-def scan(url):
-    return Scan(url, "Cube", "F2", seed=3)
+def scan(lab):
+    return Scan(lab.url, "Cube", "F2", seed=3)
 
 
 def off_mm(poses, true):
@@ -196,20 +177,9 @@ def test_a_scan_names_object_face_and_place(lab, scan, placing):
     assert right >= 28
 
 
-def test_a_turned_scan_of_a_triangle(url, lab):
-    scan = Scan(url, "Prism", "F1", seed=4, theta=0.35)
-    found = read_scan(lab, SENSOR, scan.readings, scan.believed, "bounded")
-    if found.recognition:
-        assert (found.recognition.object, found.recognition.face) == ("Prism", "F1")
-        assert math.dist(found.recognition.T_face_probe[:2, 3], scan.true[-1, :2]) < 3
-    else:
-        assert found.recognition.reason in (TOO_FEW, AMBIGUOUS, NOT_ENCODED)
-    assert len(found.grid.members) >= 12
-
-
 def test_an_answer_comes_before_the_scan_is_over_and_never_a_wrong_one(lab, scan):
     first = None
-    for number in [*range(15, len(scan.readings), 15), len(scan.readings)]:
+    for number in [1, *range(15, len(scan.readings), 15), len(scan.readings)]:
         some = scan.readings[:number], scan.believed[:number]
         found = read_scan(lab, SENSOR, *some, "bounded").recognition
         if found:
@@ -217,12 +187,6 @@ def test_an_answer_comes_before_the_scan_is_over_and_never_a_wrong_one(lab, scan
             first = first or number
     assert first is not None
     assert 30 <= first <= len(scan.readings)
-
-
-def test_one_touch_of_this_profile_is_too_few(lab, scan):
-    found = read_scan(lab, SENSOR, scan.readings[44:45], scan.believed[44:45])
-    assert found.recognition.reason in (TOO_FEW, AMBIGUOUS)
-    assert not found.recognition
 
 
 def test_no_contact_and_blank_surfaces_are_told(lab):
@@ -235,8 +199,8 @@ def test_no_contact_and_blank_surfaces_are_told(lab):
     assert not read_classically(lab, plane).recognition
 
 
-def test_an_object_of_another_lab_is_not_taken_for_one_of_ours(lab, tmp_path):
-    scan = Scan(made(tmp_path, OTHER), "Stranger", "F1", seed=5)
+def test_an_object_of_another_lab_is_not_taken_for_one_of_ours(lab, make_lab):
+    scan = Scan(f"{make_lab(OTHER)}/lab.db", "Stranger", "F1", seed=5)
     found = read_scan(lab, SENSOR, scan.readings, scan.believed, "believed")
     assert len(found.grid.members) > 24  # its symbols are read, and are none of ours
     assert not found.recognition

@@ -175,14 +175,14 @@ def test_correlation_in_parts_is_that_of_every_overlap():
 
 
 def test_where_nothing_varies_there_is_no_correlation():
-    known = np.ones((12, 12), bool)
+    values, known = np.full((12, 12), 3.0), np.ones((12, 12), bool)
     varied = KnownRaster(np.random.default_rng(1).normal(size=(8, 8)), known[:8, :8], 0, 0, 1)
-    rho, _ = cross_correlate(KnownRaster(np.full((12, 12), 3.0), known, 0, 0, 1), varied)
-    assert np.isnan(rho).all()
-    rho, overlap = cross_correlate(KnownRaster(np.zeros((12, 12)), ~known, 0, 0, 1), varied)
-    assert np.isnan(rho).all()
+    for seen in (known, ~known):
+        rho, overlap = cross_correlate(KnownRaster(values, seen, 0, 0, 1), varied)
+        assert np.isnan(rho).all()
+        assert (overlap > 0).all() == seen.all()
+        assert peaks(rho, 4) == []
     assert (overlap == 0).all()
-    assert peaks(rho, 4) == []
 
 
 def test_peaks_lie_between_cells():
@@ -418,8 +418,8 @@ def test_a_constraint_along_a_ridge_leaves_the_rest_to_belief():
 
 def test_the_image_is_the_weighted_mean():
     canvas = empty_canvas(P)
+    how = CanvasEntry(np.zeros(3), SURE, 1.0)
     for k, level in enumerate((1.0, 1.0, 1.3)):
-        how = CanvasEntry(np.zeros(3), SURE, 1.0)
         canvas = add_to_canvas(canvas, patch(np.full((16, 16), level)), how)
         image = image_of(canvas)
         assert image.values.shape == (64, 64)
@@ -547,14 +547,13 @@ def test_a_surface_that_repeats_is_ambiguous():
 def test_touches_that_cannot_be_placed():
     nothing = no_touches(SENSOR)
     assert nothing.image.values.shape == (0, 0)
-    with pytest.raises(MosaicError, match="8 x 8"):
-        add_touch(
-            nothing, PlacedTouch(signal_of(np.ones((8, 8))), planar_belief(np.zeros(3), SPREAD))
-        )
+    small = PlacedTouch(signal_of(np.ones((8, 8))), planar_belief(np.zeros(3), SPREAD))
     first, second = touches(decoded=(1,))[:2]
     decoded_only = PlacedTouch(second.signal, decoded=second.decoded)
-    on_face, by_arm = add_touch(nothing, decoded_only), add_touch(nothing, first)
-    with pytest.raises(MosaicError, match="without a frame"):
-        add_touch(on_face, first)
-    with pytest.raises(MosaicError, match="no pose by the arm"):
-        add_touch(by_arm, decoded_only)
+    for mosaic, touch, words in (
+        (nothing, small, "8 x 8"),
+        (add_touch(nothing, decoded_only), first, "without a frame"),
+        (add_touch(nothing, first), decoded_only, "no pose by the arm"),
+    ):
+        with pytest.raises(MosaicError, match=words):
+            add_touch(mosaic, touch)

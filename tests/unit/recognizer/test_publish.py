@@ -29,21 +29,17 @@ def turned(angle, at):
     return T
 
 
-@pytest.fixture
-def found():
+def found(seq):
     T = turned(0.5, [20, 30, 0])
     covariance = np.diag([0.04, 0.05, 0.003]) ** 2
-    return Recognition(7, "Cube", "F1", (3, 4), T, T, covariance, 40.0, None, "", doubt=1e-6)
+    return Recognition(seq, "Cube", "F1", (3, 4), T, T, covariance, 40.0, None, "", doubt=1e-6)
 
 
-def test_without_a_base_the_object_is_told_in_the_sensors_frame(found):
-    message = object_message(found, None, 2_000_000_001)
-    assert message["header"] == {
-        "stamp": {"sec": 2, "nanosec": 1},
-        "frame_id": "sensor",
-    }
+def test_without_a_base_the_object_is_told_in_the_sensors_frame():
+    message = object_message(found(7), None, 2_000_000_001)
+    assert message["header"] == {"stamp": {"sec": 2, "nanosec": 1}, "frame_id": "sensor"}
     expected = -turned(0.5, [0, 0, 0])[:3, :3].T @ [0.02, 0.03, 0]
-    expected[2] = Seating().depth_mm(found.inside_mm) / 1000
+    expected[2] = Seating().depth_mm(None) / 1000
     at = message["pose"]["pose"]["position"]
     assert np.allclose([at["x"], at["y"], at["z"]], expected)
     turn = message["pose"]["pose"]["orientation"]
@@ -58,14 +54,14 @@ def test_without_a_base_the_object_is_told_in_the_sensors_frame(found):
     )
 
 
-def test_with_a_base_it_is_told_there(found):
+def test_with_a_base_it_is_told_there():
     placed = ObjectPose(turned(1.0, [300, 0, 50]), np.eye(6))
-    message = object_message(found, placed, 0)
+    message = object_message(found(7), placed, 0)
     assert message["header"]["frame_id"] == "base"
     assert message["pose"]["pose"]["position"] == {"x": 0.3, "y": 0.0, "z": 0.05}
 
 
-def test_a_refusal_names_no_object_and_says_why(found):
+def test_a_refusal_names_no_object_and_says_why():
     none = refusal(9, AMBIGUOUS, doubt=0.5)
     assert object_message(none, None, 0) is None
     touch = SimpleNamespace(t_ns=5, seq=9, frames=1)
@@ -76,8 +72,7 @@ def test_a_refusal_names_no_object_and_says_why(found):
     assert json.loads(message["json"])["object"] is None
 
 
-RNG = np.random.default_rng(4)
-COUNTS = RNG.integers(0, 1024, (16, 16))
+COUNTS = np.random.default_rng(4).integers(0, 1024, (16, 16))
 
 #: A client in a process of its own: takes `answers` answers, each held `hold` s, then tells.
 CLIENT = """
@@ -115,11 +110,7 @@ def free_port():
 
 
 def answer_of(seq):
-    T = np.eye(4)
-    found = Recognition(
-        seq, "Cube", "F1", (3, 4), T, T, np.diag([0.04, 0.05, 0.003]) ** 2, 40.0, None, ""
-    )
-    return Answer(SimpleNamespace(t_ns=5 * seq, seq=seq, frames=1), found, None)
+    return Answer(SimpleNamespace(t_ns=5 * seq, seq=seq, frames=1), found(seq), None)
 
 
 class Client:

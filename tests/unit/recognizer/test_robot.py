@@ -48,6 +48,12 @@ def moved(T, error):
     return pose_of(turn.as_rotvec(), T[:3, 3] + error[:3])
 
 
+def error_between(T, true):
+    """Return the error of a pose's origin and the small turn about it: the inverse of `moved`."""
+    turn = Rotation.from_matrix(true[:3, :3] @ T[:3, :3].T)
+    return np.concatenate([true[:3, 3] - T[:3, 3], turn.as_rotvec()])
+
+
 def test_the_object_is_found_where_it_stands():
     T_base_object = pose_of([0.1, 0.2, 1.3], [350.0, 80.0, 20.0])
     T_base_sensor = T_base_object @ T_OBJECT_FACE @ T_FACE_PROBE
@@ -87,9 +93,7 @@ def test_the_covariance_is_that_of_drawn_errors():
         true = moved(sensor.T_base_sensor, errors[k]) @ np.linalg.inv(
             T_OBJECT_FACE @ moved(T_FACE_PROBE @ sunk, touch)
         )
-        drawn[k, :3] = true[:3, 3] - placed.T_robot_object[:3, 3]
-        turn = true[:3, :3] @ placed.T_robot_object[:3, :3].T
-        drawn[k, 3:] = Rotation.from_matrix(turn).as_rotvec()
+        drawn[k] = error_between(placed.T_robot_object, true)
     whitened = np.linalg.solve(np.linalg.cholesky(placed.covariance), drawn.T)
     assert np.cov(whitened) == pytest.approx(np.eye(6), abs=6 / math.sqrt(number))
 
@@ -132,7 +136,6 @@ def drawn(rng, number, shift=None, after=0):
 def test_several_touches_tighten_and_hold():
     """Errors drawn anew shrink by the root of the number; what is shared stays, and is honest."""
     rng = np.random.default_rng(6)
-    base = BASE
     roots = [rng.normal(0, 1, (6, 6)) * np.repeat([0.2, 0.002], 3)[:, None] for _ in range(9)]
     own = [root @ root.T for root in roots]
     shared = np.diag([0.0, 0.0, 0.16, 1e-4, 1e-4, 0.0])
@@ -142,17 +145,10 @@ def test_several_touches_tighten_and_hold():
         poses = []
         for covariance in own:
             off = rng.multivariate_normal(np.zeros(6), covariance) + common
-            poses.append(ObjectPose(moved(base, -off), covariance + shared, shared))
+            poses.append(ObjectPose(moved(BASE, -off), covariance + shared, shared))
         fused = fuse_poses(poses)
         moved_ones += fused.moved
-        left = np.concatenate(
-            [
-                base[:3, 3] - fused.pose.T_robot_object[:3, 3],
-                Rotation.from_matrix(
-                    base[:3, :3] @ fused.pose.T_robot_object[:3, :3].T
-                ).as_rotvec(),
-            ]
-        )
+        left = error_between(fused.pose.T_robot_object, BASE)
         inside += left @ np.linalg.solve(fused.pose.covariance, left) < 12.592
     assert 0.92 < inside / number < 0.98
     assert moved_ones <= 3

@@ -40,6 +40,15 @@ def label(cells):
     return (3 * cells[:, 0] + 5 * cells[:, 1] + cells[:, 0] * cells[:, 1]) % 7 % 2
 
 
+def fit_of(pose, cells, scores, value, covariance):
+    x, y, theta = map(float, pose)
+    return Fit(
+        x_mm=x, y_mm=y, theta_rad=theta, nuisance=np.zeros(4), gain=np.zeros(4), cells=cells,
+        scores=scores, seen=np.full(len(cells), 25.0), noise=0.1, value=value,
+        covariance=covariance,
+    )  # fmt: skip
+
+
 def fit_at(pose, origin, value=-100.0, sure=5.0, flipped=()):
     """A fit of the nine cells about a pose in the lattice, counted from another origin."""
     about = np.floor(pose[:2] / PITCH).astype(int)
@@ -49,19 +58,8 @@ def fit_at(pose, origin, value=-100.0, sure=5.0, flipped=()):
     scores = np.full((9, 3), -sure)
     scores[np.arange(9), shown] = 0.0
     x, y, theta = pose - np.append(PITCH * np.asarray(origin), 0.0)
-    return Fit(
-        x_mm=float(x),
-        y_mm=float(y),
-        theta_rad=float(theta),
-        nuisance=np.zeros(4),
-        gain=np.zeros(4),
-        cells=cells - origin,
-        scores=scores,
-        seen=np.full(9, 20.0),
-        noise=0.1,
-        value=value,
-        covariance=np.diag([0.05, 0.05, 0.003]) ** 2,
-    )
+    spread = np.diag([0.05, 0.05, 0.003]) ** 2
+    return fit_of((x, y, theta), cells - origin, scores, value, spread)
 
 
 def a_scan(number=6, sigma_mm=0.3, seed=1):
@@ -82,13 +80,24 @@ def views_from(fits):
     return stack_views([tuple(LatticeView(f, predicted=False) for f in each) for each in fits])
 
 
+def agreed(views, touch_poses, first=0):
+    return refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, first), PITCH)
+
+
+def at_rest(number, sigma_mm=0.3):
+    """Return true poses of touches of one place, and where the arm believes them."""
+    true, touch_poses, _fits = a_scan(number, sigma_mm)
+    still = true[:1].repeat(number, axis=0)
+    plane = compose_poses(T_PLANE_LATTICE, still)
+    return still, TouchPoses(plane, touch_poses.covariances, None)
+
+
 def test_touches_on_one_lattice_agree_and_their_cells_meet():
     true, touch_poses, fits = a_scan()
     views = views_from([(f,) for f in fits])
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
+    found = agreed(views, touch_poses)
     assert (found.chosen == np.arange(6)).all()
     both = accumulate(views, touch_poses, found, PITCH)
-    assert both is not None
     # counted from the origin of the first touch, every cell has its own symbol, once
     origin = np.round((true[0, :2] - [fits[0].x_mm, fits[0].y_mm]) / PITCH).astype(int)
     cells = both.fit.cells + origin
@@ -109,9 +118,9 @@ def test_a_wrong_lattice_of_one_touch_is_passed_over(worse):
     each = [(f,) for f in fits]
     each[2] = (wrong, replace(fits[2], value=fits[2].value - worse))
     views = views_from(each)
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
+    found = agreed(views, touch_poses)
     assert found.chosen.tolist() == [0, 1, 3, 4, 5, 6]
-    other = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 2), PITCH)
+    other = agreed(views, touch_poses, 2)
     assert (other.chosen >= 0).sum() == 1
     assert other.score < found.score - 40
     assert not same_lattice(found.lattice, other.lattice, touch_poses.poses[2], PITCH)
@@ -124,38 +133,30 @@ def test_a_touch_with_ambiguous_whole_pitches_is_left_out():
     views = views_from([(f,) for f in fits])
     wide = touch_poses.covariances.copy()
     wide[4] = np.diag([PITCH / 2, PITCH / 2, 0.01]) ** 2
-    found = refine_agreement(
-        views, TouchPoses(touch_poses.poses, wide, None), seed_lattice(views, touch_poses, 0), PITCH
-    )
+    seed = seed_lattice(views, touch_poses, 0)
+    found = refine_agreement(views, TouchPoses(touch_poses.poses, wide, None), seed, PITCH)
     assert found.chosen.tolist() == [0, 1, 2, 3, -1, 5]
     both = accumulate(views, touch_poses, found, PITCH)
-    assert both is not None
     assert (both.fit.scores.max(axis=1) == 0).all()
 
 
 def test_touches_of_one_cell_share_errors():
-    true, touch_poses, _fits = a_scan(number=30, sigma_mm=0.1)
-    still = true[:1].repeat(30, axis=0)
-    touch_poses = TouchPoses(compose_poses(T_PLANE_LATTICE, still), touch_poses.covariances, None)
+    still, touch_poses = at_rest(30, sigma_mm=0.1)
     views = views_from([(fit_at(pose, (0, 0), sure=2.0),) for pose in still])
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
+    found = agreed(views, touch_poses)
     both = accumulate(views, touch_poses, found, PITCH)
-    assert both is not None
     assert -both.fit.scores.min() == pytest.approx(2.0 * 30 / (1 + 29 * CORRELATION))
     assert -both.fit.scores.min() < 2.0 / CORRELATION
 
 
 def test_a_touch_that_contradicts_all_others_is_left_out():
-    true, touch_poses, _fits = a_scan(number=8)
-    still = true[:1].repeat(8, axis=0)
-    touch_poses = TouchPoses(compose_poses(T_PLANE_LATTICE, still), touch_poses.covariances, None)
+    still, touch_poses = at_rest(8)
     each = [(fit_at(pose, (0, 0), flipped=range(9) if k == 7 else ()),)
             for k, pose in enumerate(still)]  # fmt: skip
     views = views_from(each)
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
+    found = agreed(views, touch_poses)
     assert found.chosen[7] == 7  # by its pose it agrees
     both = accumulate(views, touch_poses, found, PITCH)
-    assert both is not None
     assert both.agreement.chosen.tolist() == [0, 1, 2, 3, 4, 5, 6, -1]
     assert both.agreement.score == pytest.approx(both.agreement.scores.sum())
     assert (both.fit.scores.argmax(axis=1) == label(both.fit.cells)).all()
@@ -172,7 +173,7 @@ def test_fits_with_an_indefinite_pose_are_no_views():
     views = views_from([(fits[0],), (lost, vague, none)])
     assert views.touch.tolist() == [0]
     assert np.isfinite(views.values).all()
-    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH)
+    found = agreed(views, touch_poses)
     assert found.chosen.tolist() == [0, -1]
 
 
@@ -192,11 +193,8 @@ def view(labels, origin=(0, 0), at=(0.0, 0.0), order=2, value=0.0):
     cells = np.array([(i, j) for j in range(rows) for i in range(columns)]) + origin
     scores = np.full((cells.shape[0], order + 1), -SURE)
     scores[np.arange(len(cells)), [order if each < 0 else each for each in np.ravel(labels)]] = 0.0
-    fit = Fit(
-        x_mm=12.0 * origin[0] + at[0], y_mm=12.0 * origin[1] + at[1], theta_rad=0.3,
-        nuisance=np.zeros(4), gain=np.zeros(4), cells=cells, scores=scores,
-        seen=np.full(len(cells), 30.0), noise=0.1, value=value, covariance=1e-4 * np.eye(3),
-    )  # fmt: skip
+    pose = (12.0 * origin[0] + at[0], 12.0 * origin[1] + at[1], 0.3)
+    fit = fit_of(pose, cells, scores, value, 1e-4 * np.eye(3))
     return LatticeView(fit, predicted=False)
 
 

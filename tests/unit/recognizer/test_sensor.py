@@ -152,13 +152,9 @@ def test_files_that_are_none_are_refused(tmp_path):
 def test_a_person_is_told_what_was_learned():
     words = state_words(state_of(floating=True))
     for part in (
-        "left finger, 50 touches",
-        "1 of 256 tactels never answer",
-        "1 of 256 tactels read high",
-        "the network is inverted",
-        "0.08 mm aside",
-        "drifted by -3.5 counts",
-    ):
+        "left finger, 50 touches", "1 of 256 tactels never answer", "1 of 256 tactels read high",
+        "the network is inverted", "0.08 mm aside", "drifted by -3.5 counts",
+    ):  # fmt: skip
         assert part in words
     told = state_entry(state_of())
     assert told["dead"].tolist() == [[1, 2]]
@@ -167,15 +163,15 @@ def test_a_person_is_told_what_was_learned():
 
 
 @pytest.fixture(scope="module")
-def lab(make_lab):
-    return make_lab("{name: Cube, shape: {cube: 60 mm}}")
+def reader(make_lab):
+    return Reader(open_lab(make_lab("{name: Cube, shape: {cube: 60 mm}}") / "lab.db"))
 
 
 @pytest.fixture(scope="module")
-def felt(lab):
+def felt(reader):
     """Counts of 24 places under tips that stand aside, some tactels dead; and the tips."""
     rng = np.random.default_rng(6)
-    surface = registered_surface(f"{lab}/lab.db", "Cube", "F1").surface
+    surface = registered_surface(reader.lab.url, "Cube", "F1").surface
     tips = Tips(shifts_mm=rng.normal(0, 0.1, (16, 16, 2)), lengths_mm=np.zeros((16, 16)))
     gain = np.exp(rng.normal(0, 0.15, (16, 16)))
     images = []
@@ -188,9 +184,8 @@ def felt(lab):
     return images, tips, gain
 
 
-def test_touches_tell_gains_and_where_tips_stand(lab, felt, monkeypatch):
+def test_touches_tell_gains_and_where_tips_stand(reader, felt, monkeypatch):
     images, tips, gain = felt
-    reader = Reader(open_lab(lab / "lab.db"))
     shares = []
     monkeypatch.setattr(learn, "ROUNDS", 1)
     state = learn_sensor(reader, images, name="left", done=shares.append)
@@ -222,8 +217,7 @@ def test_touches_tell_gains_and_where_tips_stand(lab, felt, monkeypatch):
         (lambda image: np.roll(image, 8, axis=0), "row-halves"),
     ],
 )
-def test_a_way_of_wiring_is_said_when_refused_touches_agree(lab, felt, way, flip):
-    reader = Reader(open_lab(lab / "lab.db"))
+def test_a_way_of_wiring_is_said_when_refused_touches_agree(reader, felt, way, flip):
     images = [way(image) for image in felt[0][:2]]
     assert not any(reader.read(image) for image in images)
     hint = wiring_hint(reader, images)
@@ -236,8 +230,7 @@ def test_a_way_of_wiring_is_said_when_refused_touches_agree(lab, felt, way, flip
     assert reader.read(undone).object == "Cube"
 
 
-def test_nothing_is_said_where_no_way_of_wiring_helps(lab):
-    reader = Reader(open_lab(lab / "lab.db"))
+def test_nothing_is_said_where_no_way_of_wiring_helps(reader):
     flat = 8 + 100 * np.exp(np.random.default_rng(3).normal(0, 0.1, (2, 16, 16)))
     assert wiring_hint(reader, list(np.rint(flat))) == ""
 
@@ -267,14 +260,13 @@ def test_flips_are_read_from_an_option():
         (lambda image: np.rot90(image.T, 2), ("transpose", "quarter", "quarter")),
     ],
 )
-def test_a_placed_touch_tells_the_mounting(lab, way, changes):
-    reader = Reader(open_lab(lab / "lab.db"))
-    surface = registered_surface(f"{lab}/lab.db", "Cube", "F1").surface
+def test_a_placed_touch_tells_the_mounting(reader, way, changes):
+    surface = registered_surface(reader.lab.url, "Cube", "F1").surface
     forces = press(surface, SENSOR, Touch(29.0, 31.0, np.radians(-12), 70.0)).forces_n
-    found = find_mounting(reader, way(np.rint(8 + 150 * forces)), ("Cube", "F1"))
+    image = way(np.rint(8 + 150 * forces))
+    found = find_mounting(reader, image, ("Cube", "F1"))
     assert found.wiring.changes == changes
     assert found.turn_deg == pytest.approx(-12, abs=1)
     assert found.answer.x_mm == pytest.approx(29.0, abs=0.3)
     assert ("read with --flip" in str(found)) is bool(changes)
-    other = find_mounting(reader, way(np.rint(8 + 150 * forces)), ("Cube", "F2"))
-    assert isinstance(other, Recognition)
+    assert isinstance(find_mounting(reader, image, ("Cube", "F2")), Recognition)
