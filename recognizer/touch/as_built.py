@@ -75,12 +75,12 @@ class PrintedFace:
     T_part_face: Array
 
     def pose(
-        self, T_face_probe: Array, covariance: Array, felt: TouchScale | None = None
+        self, T_face_probe: Array, covariance: Array, by_touch: TouchScale | None = None
     ) -> tuple[Array, Array]:
         """Return pose (4, 4) and covariance (3, 3) on the printed part, face frame of the design.
 
-        `covariance` (3, 3) is of x, y (mm) and the turn about z (rad); `felt` is the scale by the
-        touch.
+        `covariance` (3, 3) is of x, y (mm) and the turn about z (rad); `by_touch` is the scale
+        that the touch shows.
 
         B, the face's x and y axes in the part frame, is printed as S B = Q U, Q orthonormal and U
         symmetric. The reader fits a turned and scaled lattice to what is turned and stretched,
@@ -89,17 +89,17 @@ class PrintedFace:
         print_ = scales_and_skew(self.as_built)
         spread = self.as_built.covariance[:3, :3]
         slope, alone = np.zeros(3), covariance
-        if felt is not None:
-            slope = felt.covariance[:3] / felt.covariance[3]
-            alone = covariance - np.outer(slope, felt.covariance[:3])
-            print_, spread = self._with_scale(print_, spread, felt)
+        if by_touch is not None:
+            slope = by_touch.covariance[:3] / by_touch.covariance[3]
+            alone = covariance - np.outer(slope, by_touch.covariance[:3])
+            print_, spread = self._with_scale(print_, spread, by_touch)
 
         def posed(print_: Array) -> Array:
             S = print_matrix(print_)
             axes, scale = _polar(S @ self.T_part_face[:3, :2])
             moved = T_face_probe
-            if felt is not None:
-                moved = _moved(T_face_probe, slope * (1.0 / scale - 1.0 - felt.excess))
+            if by_touch is not None:
+                moved = _moved(T_face_probe, slope * (1.0 / scale - 1.0 - by_touch.excess))
             return self._printed(S, axes, moved)
 
         printed = posed(print_)
@@ -110,16 +110,18 @@ class PrintedFace:
         floor = np.diag([ASIDE_SD_MM**2, ASIDE_SD_MM**2, 0.0])
         return printed, along @ alone @ along.T + by_print @ spread @ by_print.T + floor
 
-    def _with_scale(self, print_: Array, spread: Array, felt: TouchScale) -> tuple[Array, Array]:
+    def _with_scale(
+        self, print_: Array, spread: Array, by_touch: TouchScale
+    ) -> tuple[Array, Array]:
         """Return scales and skew updated by the scale of a touch, and their covariance (3, 3)."""
-        variance = felt.covariance[3]
-        precision = 1.0 / variance - 1.0 / felt.expected**2  # by the image alone
+        variance = by_touch.covariance[3]
+        precision = 1.0 / variance - 1.0 / by_touch.expected**2  # by the image alone
         if not precision > 0:
             return print_, spread
         excess = self._excess(print_)
         by = _slopes(self._excess, print_, excess)[0]
         gain = spread @ by / (by @ spread @ by + 1.0 / precision)
-        away = felt.excess / (variance * precision) - float(excess[0])
+        away = by_touch.excess / (variance * precision) - float(excess[0])
         return print_ + gain * away, spread - np.outer(gain, by @ spread)
 
     def _excess(self, print_: Array) -> Array:

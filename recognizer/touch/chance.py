@@ -281,9 +281,9 @@ def _free_tactels(found: VerifiedHypothesis) -> tuple[Flags, Array, Array]:
     at = points_on_lattice(image, fit)
     cells = np.floor(at / template.pitch_mm).astype(np.int64)
     labels = labels_of(found.embossed, found.hypothesis, cells)
-    felt = template.at(at - (cells + 0.5) * template.pitch_mm)[..., 0]
+    expected_psi = template.at(at - (cells + 0.5) * template.pitch_mm)[..., 0]
     held = labels < template.order
-    on_symbol = held & (felt[np.arange(len(at)), labels * held] > BARE)
+    on_symbol = held & (expected_psi[np.arange(len(at)), labels * held] > BARE)
     return ~on_symbol & _plain(image, bare, PRESSED), top, bare
 
 

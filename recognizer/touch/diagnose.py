@@ -213,11 +213,11 @@ def _disagreement(best: VerifiedHypothesis) -> tuple[float, float]:
     """Return the share of pressed tactels that read nothing, and of free ones that read much."""
     image, fit = best.image, best.fit
     under, labels, shows = project_symbols(image, fit.pose[None], fit.gain[None], best.labels_at)
-    value, felt = shows[0, :, 0], under.psi[0]
+    value, measured = shows[0, :, 0], under.psi[0]
     known = image.trust > 0
     pressed = known & (labels[0] >= 0) & (value > PRESSED)
     free = known & (value < SILENT)
     return (
-        float((felt[pressed] < SILENT).sum() / max(pressed.sum(), 1)),
-        float((felt[free] > PRESSED).sum() / max(free.sum(), 1)),
+        float((measured[pressed] < SILENT).sum() / max(pressed.sum(), 1)),
+        float((measured[free] > PRESSED).sum() / max(free.sum(), 1)),
     )

@@ -10,8 +10,7 @@ own engine and MuJoCo, written files and prints, with what is wrong with sensors
 other labs' parts and steps to a next touch. Stopped by Ctrl-C it says so (exit code 130) and goes
 on by the same command; at most a thousand touches are made again. What became of a world stands in
 DIR/million.json once it is finished, every wrong answer in full: with that file alone another
-machine goes on after it. Prints need PrusaSlicer; folders of prints that exist are used (--prints,
---small-prints).
+machine goes on after it. Prints need PrusaSlicer.
 """
 
 from __future__ import annotations
@@ -104,8 +103,7 @@ def touch(name: str, asked: argparse.Namespace) -> None:
         made = "small" if world.spec == "small" else "own"
         options += ["--database", str(asked.output / made / "lab.db")]
     if "printed" in name:
-        shared = asked.small_prints if world.spec == "small" else asked.prints
-        options += ["--prints", str(shared or asked.output / f"prints-{world.spec}")]
+        options += ["--prints", str(asked.output / f"prints-{world.spec}")]
     runner.run("recognizer.validation", *options, "--touches", touches, "--seed", world.seed,
                "--study", 0, "--resume", "-j", asked.jobs, "-o", folder)  # fmt: skip
 
@@ -161,8 +159,7 @@ def run(asked: argparse.Namespace, finished: dict[str, dict[str, Any]]) -> None:
 
 def main() -> int:
     """Run what is left and print the table."""
-    asked = runner.asked(__doc__, output=True, touches=1_000_000, jobs=1, prints=Path,
-                         small_prints=Path, table=False)  # fmt: skip
+    asked = runner.asked(__doc__, output=True, touches=1_000_000, jobs=1, table=False)
     asked.output = asked.output.absolute()
     summary = asked.output / SUMMARY
     finished = json.loads(summary.read_text()) if summary.exists() else {}

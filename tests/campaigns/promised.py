@@ -2,7 +2,6 @@
 
     python tests/campaigns/promised.py -o out/promised --save    # touches, table, check: an hour
     python tests/campaigns/promised.py -o out/promised --rounds 0  # of the touches that are there
-    python tests/campaigns/promised.py -o out/gel --sensor-type gel-24x32 --rounds 9
     python tests/campaigns/promised.py -o out/types --types [--save]  # touches of sensor_types.py
 
 A table that is made from the first of two sets of solids is checked on 60 faces of all sizes of the
@@ -12,10 +11,10 @@ three times; so any number of rounds is a fair sample. A touch is looked at as
 `generator.layout.recognition_rate` sees it. A step over a re-entrant edge may end on another face,
 which counts as not answered. What is there is kept, and an interrupted run goes on.
 
-Of another sensor type every third solid of the second set is touched, at the pitch that the type
-proposes, and held against what `encode-object --sensor-type` promises. That was set by `--types
---save`: each type's share of the usual sensor's answers (`AnsweredShare`) is the likeliest for its
-touches inside faces, at edges and corners (`generator/layout/answers_of_types.json`).
+With `--types` touches of other sensor types are held against what `encode-object --sensor-type`
+promises; `--save` sets that: each type's share of the usual sensor's answers (`AnsweredShare`) is
+the likeliest for its touches inside faces, at edges and corners
+(`generator/layout/answers_of_types.json`).
 """
 
 from __future__ import annotations
@@ -62,7 +61,6 @@ LOADED = (0.25, 0.4, 0.5, 0.6, 0.7, 0.85, 1.0)  #: and columns
 WEIGHT = 8.0  #: touches that the smooth law counts for at every entry
 CLASSES_MM = (0.0, 16.0, 22.0, 30.0, 45.0, 1e3)  #: narrower side of a face
 LAB_KEY = "0123-4567-89AB-CDER"
-RESIN_MM = 4.0  #: pitch below which strokes are too fine for a filament printer
 EVERY = 3  #: rounds, of which one goes on until a touch is answered
 KINDS = ("face", "edge", "corner")
 BINS = (0.0, 0.4, 0.6, 0.8, 0.95, 1.001)  #: of the loaded share, in the table
@@ -154,17 +152,11 @@ class Touched:
 
 
 def main() -> None:
-    asked = runner.asked(__doc__, output=True, seed=25, rounds=100,
-                         sensor_type=USUAL_SENSOR.name, save=False, types=False)  # fmt: skip
+    asked = runner.asked(__doc__, output=True, seed=25, rounds=100, save=False, types=False)
     if asked.types:
         compare_types(asked.output, save=asked.save)
         return
-    sensor = sensor_type_named(asked.sensor_type)
-    touches = list(map(_touched, touch_faces(asked.output, asked.rounds, asked.seed, sensor)))
-    if sensor.name != USUAL_SENSOR.name:
-        print(f"{sensor.name}, {sensor.symbol_pitch_mm:g} mm")
-        compare(touches, measured_answers(), sensor)
-        return
+    touches = list(map(_touched, touch_faces(asked.output, asked.rounds, asked.seed)))
     table = measured_table([one for one in touches if one.group == "learn"])
     for label, one in (("that ships", measured_answers()), ("of the first set", table)):
         print(f"\nthe second set against the table {label}")
@@ -179,26 +171,21 @@ def _touched(values: dict[str, Any]) -> Touched:
     return Touched(**(values | lists))
 
 
-def touch_faces(folder: Path, rounds: int, seed: int, sensor: SensorType) -> list[runner.Row]:
+def touch_faces(folder: Path, rounds: int, seed: int) -> list[runner.Row]:
     """Touch every face once a round, the rounds that are not there yet."""
     folder.mkdir(parents=True, exist_ok=True)
     readers, faces = {}, []
-    usual = sensor.name == USUAL_SENSOR.name
-    reading = sensor_type_named(sensor.name)
-    groups = SETS if usual else {"check": SETS["check"][::3]}
-    for group, solids in groups.items() if rounds else ():
+    for group, solids in SETS.items() if rounds else ():
         lab = folder / f"{group}.db"
         if not lab.exists():
             unfinished = lab.with_suffix(".part")
             unfinished.unlink(missing_ok=True)
             for k, solid in enumerate(solids):  # one by one: each has the pitch that suits it
                 spec = {"name": f"{group} {k + 1}", "output": {"lab_key": LAB_KEY}} | solid
-                spec |= {} if usual else {"sensor_type": sensor.name}
-                spec |= {"print": {"printer": "resin"}} if sensor.symbol_pitch_mm < RESIN_MM else {}
                 encode(spec, database=str(unfinished), formats=())
             unfinished.rename(lab)
-        readers[group] = Reader(open_lab(lab), reading)
-        faces += list(faces_of(lab, group, sensor))
+        readers[group] = Reader(open_lab(lab), USUAL_SENSOR)
+        faces += list(faces_of(lab, group))
 
     def touch(number: int) -> runner.Row:
         face, most = faces[number % len(faces)], 3 if number // len(faces) % EVERY == 0 else 1
@@ -208,7 +195,7 @@ def touch_faces(folder: Path, rounds: int, seed: int, sensor: SensorType) -> lis
     return runner.resume(folder / "touches.jsonl", range(rounds * len(faces)), touch)
 
 
-def faces_of(lab: Path, group: str, sensor: SensorType) -> Iterator[Face]:
+def faces_of(lab: Path, group: str) -> Iterator[Face]:
     """Yield the faces of a set that bear symbols, one of those that are equal."""
     engine = open_if_there(f"sqlite:///{lab}", writable=False)
     assert engine is not None
@@ -218,7 +205,7 @@ def faces_of(lab: Path, group: str, sensor: SensorType) -> Iterator[Face]:
             held = read_object(connection, name)
             pitch = held.style.pitch_mm
             reach = held.alphabet["reach"] * pitch + held.style.stroke_mm / 2
-            view = sensor_view(sensor, reach)
+            view = sensor_view(USUAL_SENSOR, reach)
             layouts = {one.face: one for one in held.layout.faces}
             for face in held.faces:
                 layout = layouts[face.face_id]
@@ -250,7 +237,7 @@ def touch_face(face: Face, lab: str, number: int, most: int, reader: Reader, see
     )  # fmt: skip
 
 
-def compare(touches: list[Touched], table: AnswerTable, sensor: SensorType = USUAL_SENSOR) -> None:
+def compare(touches: list[Touched], table: AnswerTable) -> None:
     """Print promise and reading by size and face, and how far they lie apart."""
     for title, within in (("at once", False), ("within three", True)):
         some = [one for one in touches if one.most > 1] if within else touches
@@ -259,13 +246,11 @@ def compare(touches: list[Touched], table: AnswerTable, sensor: SensorType = USU
         for low, high in itertools.pairwise(CLASSES_MM):
             sized = [one for one in some if low <= min(one.size_mm) < high]
             if sized:
-                p, right, error = _shares(sized, table, within, sensor)
+                p, right, error = _shares(sized, table, within)
                 faces = len({one.face for one in sized})
                 print(f"  {low:g}-{high:g} mm, {faces:2d} faces, {len(sized):5d}  {p:.3f}"
                       f"  {right:.3f}  +- {error:.3f}  apart {p - right:+.3f}")  # fmt: skip
-        each = [
-            _shares([t for t in some if t.face == name], table, within, sensor) for name in names
-        ]
+        each = [_shares([t for t in some if t.face == name], table, within) for name in names]
         apart = np.array([p - right for p, right, _ in each])
         chance = np.array([error for *_, error in each])
         near, by_chance = np.abs(apart) <= 0.05, np.abs(apart) <= 0.05 + 2 * chance
@@ -275,11 +260,11 @@ def compare(touches: list[Touched], table: AnswerTable, sensor: SensorType = USU
 
 
 def _shares(
-    touches: Sequence[Touched], table: AnswerTable, within: bool, sensor: SensorType
+    touches: Sequence[Touched], table: AnswerTable, within: bool
 ) -> tuple[float, float, float]:
     """Return what is promised and answered, and the standard error of the second."""
     p = np.array([
-        answered_at_once(table, t.pitch_mm, np.array([t.seen]), np.array([t.loaded]), sensor)[0]
+        answered_at_once(table, t.pitch_mm, np.array([t.seen]), np.array([t.loaded]))[0]
         for t in touches
     ])  # fmt: skip
     right = [t.right for t in touches]

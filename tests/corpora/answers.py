@@ -14,16 +14,13 @@ import json
 import lzma
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import h5py
 import numpy as np
-from corpora.programs import run
+from corpora.commands import DATA, Commands, started_commands
 
 NAME = "answers"
-DATA = Path(__file__).with_name("data")
 
 
 @dataclass(frozen=True)
@@ -81,12 +78,11 @@ def collect(part: str) -> Iterator[tuple[str, Any]]:
     """Yield what is read of each touch of a part."""
     how = READINGS[part]
     touches = touches_of(how.of or (part,), how.every)
-    with TemporaryDirectory() as folder:
-        place = Path(folder)
+    with started_commands() as commands:
         packed = (DATA / "labs" / f"{how.lab}.db.xz").read_bytes()
-        (place / "lab.db").write_bytes(lzma.decompress(packed))
+        (commands.folder / "lab.db").write_bytes(lzma.decompress(packed))
         for prefix, some in _recordings(touches, scan=how.scan):
-            yield from _read(f"{part}/{prefix}", some, how, place)
+            yield from _read(f"{part}/{prefix}", some, how, commands)
 
 
 def touches_of(names: tuple[str, ...], every: int) -> Touches:
@@ -119,19 +115,17 @@ def _recordings(touches: Touches, *, scan: bool) -> Iterator[tuple[str, Touches]
 
 
 def _read(
-    prefix: str, touches: Touches, how: Reading, place: Path
+    prefix: str, touches: Touches, how: Reading, commands: Commands
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the answers to touches, each under the number and the label of its touch."""
-    with h5py.File(place / "touches.h5", "w") as file:
+    with h5py.File(commands.folder / "touches.h5", "w") as file:
         file["frames"] = touches.counts
         if touches.pose is not None:
             file["pose"] = touches.pose
     learn = ("--learn", "state.json") if how.learns else ()
-    told = run(
-        "recognize-object", "touches.h5", "--every", "--json", *how.options, *learn, folder=place,
-    )  # fmt: skip
+    words = ("recognize-object", "touches.h5", "--every", "--json", *how.options, *learn)
     last = -1
-    for answer in json.loads(told):
+    for answer in json.loads(commands.answer(*words)):
         label = touches.labels[answer["seq"]]
         words = [label[key] for key in ("kind", "level", "face") if label.get(key)]
         whole = " (the whole scan)" if answer["seq"] <= last else ""
@@ -139,4 +133,4 @@ def _read(
         yield f"{prefix}{name}{whole}", answer
         last = answer["seq"]
     if how.learns:
-        yield f"{prefix}state", json.loads((place / "state.json").read_text())
+        yield f"{prefix}state", json.loads((commands.folder / "state.json").read_text())

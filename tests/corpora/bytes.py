@@ -22,30 +22,22 @@ import hashlib
 import io
 import json
 import re
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from corpora.commands import DATA, FIXTURES, Commands, normal_value
+from corpora.commands import DATA, FIXTURES, LAB_KEY, Commands, started_commands
 
 NAME = "bytes"
-LAB_KEY = "F1XT-VRES-0000-000Q"
 ALL = "step,stpz,stl,3mf,glb,mjcf,urdf,sdf,usd"
 SPECS = ("cube.yaml", *sorted(f"specs/{path.name}" for path in (FIXTURES / "specs").iterdir()))
-SENSOR_TYPES = (
-    "flexitac-12x32",
-    "flexitac-16x32",
-    "fsr-16",
-    "fsr-8x8",
-    "gel-24x32",
-    "mat-32x32",
-)
+SENSOR_TYPES = ("flexitac-12x32", "flexitac-16x32", "fsr-16", "fsr-8x8", "gel-24x32", "mat-32x32")
 MOST = ALL.replace("stpz,", "")  # gzipped STEP costs more than all else together
 PARTS = ("specs", "shapes", "options", "kit")
+Cases = tuple[tuple[str, str, str], ...]
 
 _RING = (
     "shape: {polyhedron: {vertices: [[0, 0, 0], [60, 0, 0], [60, 60, 0], [0, 60, 0], "
@@ -56,7 +48,7 @@ _RING = (
     "[8, 12, 13, 9], [9, 13, 14, 10], [10, 14, 15, 11], [11, 15, 12, 8]]}}"
 )
 # Name of the case, what is written of it, and a spec; SHAPES stands for the fixtures' folder.
-SHAPES: tuple[tuple[str, str, str], ...] = (
+SHAPES: Cases = (
     ("step-hole", MOST, "shape: {file: SHAPES/cube_with_hole.step}"),
     ("step-bore", "step,stl,3mf,glb,sdf,usd", "shape: {file: SHAPES/block_with_bore.step}"),
     ("stl", MOST, "shape: {file: SHAPES/l_bracket.stl}"),
@@ -72,11 +64,7 @@ SHAPES: tuple[tuple[str, str, str], ...] = (
     ("cylinder", MOST, "shape: {cylinder: {diameter: 50 mm, height: 40 mm}}"),
     ("cone", ALL, "shape: {cone: {diameter: 60 mm, top_diameter: 30 mm, height: 45 mm}}"),
     ("cone-pointed", "step,stl,usd", "shape: {cone: {diameter: 70 mm, height: 60 mm}}"),
-    (
-        "face-with-hole",
-        "step,stl,3mf,glb",
-        _RING,
-    ),
+    ("face-with-hole", "step,stl,3mf,glb", _RING),
 )
 _ROD = "shape: {cylinder: {diameter: 40 mm, height: 36 mm}}\n"
 _SMALL = "shape: {cube: 36 mm}\n"
@@ -86,7 +74,7 @@ _SHELF = (
     "  - {name: Rod, shape: {cylinder: {diameter: 30 mm, height: 60 mm}}}\n"
     "  - {name: Block, shape: {box: [40, 30, 20]}, print: {parts: whole, printer: resin}}\n"
 )
-OPTIONS: tuple[tuple[str, str, str], ...] = (
+OPTIONS: Cases = (
     ("whole", ALL, _SMALL + "print: {parts: whole}"),
     ("whole-cylinder", "step,3mf", _ROD + "print: {parts: whole}"),
     ("whole-bracket", "step,stl", "shape: {file: SHAPES/l_bracket.stl}\nprint: {parts: whole}"),
@@ -121,49 +109,42 @@ DEFLATE = "a65a"  #: how the zlib of the stored corpus packs `_SAMPLE`
 
 def collect(part: str) -> Iterator[tuple[str, Any]]:
     """Yield the entries of a part."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name).resolve()
-        with Commands(folder) as commands:
-            for entry, value in CASES[part](commands, folder):
-                yield f"{part}/{entry}", value
+    with started_commands() as commands:
+        for entry, value in CASES[part](commands):
+            yield f"{part}/{entry}", value
 
 
-def _specs(commands: Commands, folder: Path) -> Iterator[tuple[str, Any]]:
-    for spec in SPECS:
-        case = Path(spec).stem
-        yield from _encoded(
-            commands, folder, case, FIXTURES / spec, ALL if case == "full" else MOST
-        )
+def _specs(commands: Commands) -> Iterator[tuple[str, Any]]:
+    for name in SPECS:
+        case = Path(name).stem
+        formats = ALL if case == "full" else MOST
+        yield from _encoded(commands, case, FIXTURES / name, formats)
 
 
-def _written(
-    cases: tuple[tuple[str, str, str], ...], commands: Commands, folder: Path
-) -> Iterator[tuple[str, Any]]:
+def _written(cases: Cases, commands: Commands) -> Iterator[tuple[str, Any]]:
     for case, formats, text in cases:
-        spec = folder / f"{case}.yaml"
+        spec = commands.folder / f"{case}.yaml"
         named = "" if text.startswith("name:") else f"name: {case}\n"
         spec.write_text(named + text.replace("SHAPES", str(FIXTURES / "shapes")))
-        yield from _encoded(commands, folder, case, spec, formats)
+        yield from _encoded(commands, case, spec, formats)
 
 
-def _encoded(
-    commands: Commands, folder: Path, case: str, spec: Path, formats: str
-) -> Iterator[tuple[str, Any]]:
-    out = folder / case
-    asked = ("--lab-key", LAB_KEY, "--database", f"{case}.db", "-o", out, "--format", formats)
-    outcome = commands.run("encode-object", spec, *asked, "--json", cwd=folder)
-    report = normal_value(outcome.value(), folder)
-    yield f"report/{case}", {"code": outcome.code, "json": report}
-    yield from _files(case, out)
+def _encoded(commands: Commands, case: str, spec: Path, formats: str) -> Iterator[tuple[str, Any]]:
+    asked = ("--lab-key", LAB_KEY, "--database", f"{case}.db", "--format", formats)
+    yield from _made(commands, case, "encode-object", spec, *asked)
 
 
-def _kits(commands: Commands, folder: Path) -> Iterator[tuple[str, Any]]:
+def _kits(commands: Commands) -> Iterator[tuple[str, Any]]:
     for case in SENSOR_TYPES:
-        out = folder / case
-        outcome = commands.run("probe-kit", case, "-o", out, "--json", cwd=folder)
-        report = normal_value(outcome.value(), folder)
-        yield f"report/{case}", {"code": outcome.code, "json": report}
-        yield from _files(case, out)
+        yield from _made(commands, case, "probe-kit", case)
+
+
+def _made(commands: Commands, case: str, *words: object) -> Iterator[tuple[str, Any]]:
+    """Yield what a command reports and makes in the folder of its case."""
+    out = commands.folder / case
+    said = commands.entry(*words, "-o", out, "--json")
+    yield f"report/{case}", {"code": said["code"], "json": said["stdout"]}
+    yield from _files(case, out)
 
 
 def _files(case: str, folder: Path) -> Iterator[tuple[str, Any]]:
@@ -174,7 +155,7 @@ def _files(case: str, folder: Path) -> Iterator[tuple[str, Any]]:
         name = f"{case}/{path.relative_to(folder).as_posix()}"
         data, ending = path.read_bytes(), path.suffix[1:].lower()
         _check_no_place(data, name, folder)
-        if ending in {"db"}:
+        if ending == "db":
             continue  # the corpus `databases` holds what is registered
         if ending == "pdf":
             yield f"volatile/{name}", _pdf(data)
@@ -243,7 +224,7 @@ def _sha256(data: bytes) -> str:
 
 CASES = {
     "specs": _specs,
-    "shapes": lambda commands, folder: _written(SHAPES, commands, folder),
-    "options": lambda commands, folder: _written(OPTIONS, commands, folder),
+    "shapes": partial(_written, SHAPES),
+    "options": partial(_written, OPTIONS),
     "kit": _kits,
 }

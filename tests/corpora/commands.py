@@ -21,14 +21,16 @@ import sys
 import tempfile
 import tomllib
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parents[2]
 FIXTURES = ROOT / "fixtures"
 DATA = Path(__file__).parent / "data"
+LAB_KEY = "F1XT-VRES-0000-000Q"  #: of all that is made
 
 OURS = ("encoded_objects", "generator", "decoder", "probe", "recognizer")
 LIBRARIES = (
@@ -60,34 +62,60 @@ KEPT = (
 LIMIT_S = 300  #: a command that takes longer hangs
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What a command left behind."""
 
     code: int  #: exit code
     stdout: str
     stderr: str
 
-    def value(self) -> Any:
-        """Return the JSON on stdout."""
-        return json.loads(self.stdout)
 
-
+@dataclass(frozen=True)
 class Commands:
-    """Starts commands; a context manager that owns the process they are forked from.
+    """Starts commands in a folder."""
 
-    Parameters
-    ----------
-    folder
-        For the home and cache folder that commands see.
-    """
+    folder: Path
+    server: subprocess.Popen[str]  #: they are forked from it
 
-    def __init__(self, folder: Path) -> None:
-        self.home = folder / "home"
-        self.home.mkdir(parents=True, exist_ok=True)
+    def run(self, *arguments: object) -> Outcome:
+        """Run `arguments`, of which the first is the command's name."""
+        assert self.server.stdin is not None
+        assert self.server.stdout is not None
+        asked = {"arguments": list(map(str, arguments)), "cwd": str(self.folder)}
+        self.server.stdin.write(json.dumps(asked) + "\n")
+        self.server.stdin.flush()
+        answer = self.server.stdout.readline()
+        if not answer:
+            raise RuntimeError(f"the process that starts commands ended at {arguments}")
+        return Outcome(**json.loads(answer))
+
+    def answer(self, *arguments: object) -> str:
+        """Return the stdout of a command that must work; exit code 1 is an answer, too."""
+        outcome = self.run(*arguments)
+        if outcome.code not in (0, 1):
+            raise RuntimeError(f"{arguments}: exit code {outcome.code}\n{outcome.stderr}")
+        return outcome.stdout
+
+    def entry(self, *arguments: object) -> dict[str, Any]:
+        """Return what a command says as an entry of a corpus: stdout as JSON where it is."""
+        code, stdout, stderr = self.run(*arguments)
+        try:
+            said = normal_value(json.loads(stdout), self.folder)
+        except ValueError:
+            said = normal_text(stdout, self.folder)
+        return {"code": code, "stdout": said, "stderr": normal_text(stderr, self.folder)}
+
+
+@contextmanager
+def started_commands() -> Iterator[Commands]:
+    """Yield what starts commands in an empty folder; home and cache are another one."""
+    with tempfile.TemporaryDirectory() as name:
+        work, home = (Path(name).resolve() / one for one in ("work", "home"))
+        work.mkdir()
+        home.mkdir()
         environment = {
             "COLUMNS": "100",
-            "HOME": str(self.home),
+            "HOME": str(home),
             "LANG": "C.UTF-8",
             "LINES": "40",
             "MPLBACKEND": "agg",
@@ -96,46 +124,11 @@ class Commands:
             "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
             "TERM": "dumb",
             "TZ": "UTC",
-            "XDG_CACHE_HOME": str(self.home / "cache"),
+            "XDG_CACHE_HOME": str(home / "cache"),
         } | {name: os.environ[name] for name in KEPT if name in os.environ}
-        pipe = subprocess.PIPE
-        self._server = subprocess.Popen(
-            [sys.executable, __file__], stdin=pipe, stdout=pipe, text=True, env=environment
-        )
-
-    def __enter__(self) -> Commands:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        assert self._server.stdin is not None
-        assert self._server.stdout is not None
-        self._server.stdin.close()
-        self._server.stdout.close()
-        self._server.wait(timeout=LIMIT_S)
-
-    def run(self, *arguments: object, cwd: Path, stdin: str = "") -> Outcome:
-        """Run `arguments`, of which the first is the command's name, in the folder `cwd`."""
-        assert self._server.stdin is not None
-        assert self._server.stdout is not None
-        asked = {"arguments": list(map(str, arguments)), "cwd": str(cwd), "stdin": stdin}
-        self._server.stdin.write(json.dumps(asked) + "\n")
-        self._server.stdin.flush()
-        answer = self._server.stdout.readline()
-        if not answer:
-            raise RuntimeError(f"the process that starts commands ended at {arguments}")
-        return Outcome(**json.loads(answer))
-
-    def done(self, *arguments: object, cwd: Path) -> Outcome:
-        """Run a command that must succeed."""
-        outcome = self.run(*arguments, cwd=cwd)
-        if outcome.code:
-            raise RuntimeError(f"{arguments}: exit code {outcome.code}\n{outcome.stderr}")
-        return outcome
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        with subprocess.Popen([sys.executable, __file__], env=environment, **pipes) as server:
+            yield Commands(work, server)
 
 
 def normal_text(text: str, folder: Path) -> str:
@@ -150,7 +143,7 @@ def normal_text(text: str, folder: Path) -> str:
     text = text.replace(os.path.relpath(ROOT, folder), "ROOT")
     text = re.sub(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(\.\d+)?(Z|\+00:00)?", "UTC", text)
     text = re.sub(r"(?<=/)(\.[\w-]+\.\w+)\.\d+\b", r"\1.PROCESS", text)  # drafts of files
-    text = LAB_KEY.sub(lambda key: key[0] if key[0] in LAB_KEYS else "LABK-EYDR-AWNX-XXXX", text)
+    text = KEY_FORM.sub(lambda key: key[0] if key[0] in LAB_KEYS else "LABK-EYDR-AWNX-XXXX", text)
     text = re.sub(r"\(\d+(\.\d+)? s\)", "(TIME s)", text)
     text = re.sub(r"(?<=ports that are there: )[^\n]*", "PORTS", text)
     version = re.escape(_version())
@@ -170,7 +163,7 @@ def normal_value(value: Any, folder: Path) -> Any:
     return normal_text(value, folder) if isinstance(value, str) else value
 
 
-LAB_KEY = re.compile(r"\b[0-9A-HJKMNP-TV-Z]{4}(-[0-9A-HJKMNP-TV-Z]{4}){3}\b")
+KEY_FORM = re.compile(r"\b[0-9A-HJKMNP-TV-Z]{4}(-[0-9A-HJKMNP-TV-Z]{4}){3}\b")
 #: Those that are given, and that of the Guest's lab; others are drawn at random.
 LAB_KEYS = {
     "F1XT-VRES-0000-000Q",
@@ -223,10 +216,7 @@ def _become(
     signal.alarm(LIMIT_S)
     code: Any = 1
     try:
-        with tempfile.TemporaryFile() as given:
-            given.write(asked["stdin"].encode())
-            given.seek(0)
-            os.dup2(given.fileno(), 0)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(out, 1)
         os.dup2(error, 2)
         sys.stdin = _text(io.BufferedReader(io.FileIO(0, closefd=False)))

@@ -11,12 +11,11 @@ import hashlib
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
-from corpora.programs import run
+from corpora.commands import Commands, started_commands
 
 from encoded_objects import Recording, encode, simulate, validate
 
@@ -75,7 +74,7 @@ PARTS = ("simulate", "command", "ports", "bench", "validate", "printed")
 
 def collect(part: str) -> Iterator[tuple[str, Any]]:
     """Yield what a way to simulate gives."""
-    ways: dict[str, Callable[[Path], Iterator[tuple[str, Any]]]] = {
+    ways: dict[str, Callable[[Commands], Iterator[tuple[str, Any]]]] = {
         "simulate": _by_function,
         "command": _by_command,
         "ports": _by_port,
@@ -83,14 +82,14 @@ def collect(part: str) -> Iterator[tuple[str, Any]]:
         "validate": _by_validation,
         "printed": _by_prints,
     }
-    with TemporaryDirectory() as folder:
-        place = Path(folder)
+    with started_commands() as commands:
         if part not in ("validate", "printed"):
+            place = commands.folder
             for name, shape in SHAPES.items():
                 spec = {"name": name, "shape": shape, "output": {"lab_key": KEY}}
                 database, parts = str(place / "lab.db"), place / "parts"
                 encode(spec, database=database, folder=parts, formats=("stl",))
-        for entry, value in ways[part](place):
+        for entry, value in ways[part](commands):
             yield f"{part}/{entry}", value
 
 
@@ -105,11 +104,11 @@ def frames_told(counts: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _by_function(place: Path) -> Iterator[tuple[str, Any]]:
+def _by_function(commands: Commands) -> Iterator[tuple[str, Any]]:
     """Yield what `encoded_objects.simulate` gives."""
 
     def told(target: str, **options: Any) -> dict[str, Any]:
-        found = simulate(_inside(place, target), **options)
+        found = simulate(_inside(commands.folder, target), **options)
         frames = list(found.frames())
         truth = found.truth()
         kept = {"level": truth["level"], "overlay": truth["overlay"], "truth": truth["touches"]}
@@ -126,7 +125,7 @@ def _by_function(place: Path) -> Iterator[tuple[str, Any]]:
         yield f"type {name}", told(FACE, sensor_type=name, touches=2, seed=2)
 
 
-def _by_command(place: Path) -> Iterator[tuple[str, Any]]:
+def _by_command(commands: Commands) -> Iterator[tuple[str, Any]]:
     """Yield what `probe-sensor simulate` writes."""
     cases = {
         **{
@@ -139,20 +138,19 @@ def _by_command(place: Path) -> Iterator[tuple[str, Any]]:
     }
     for name, (target, options) in cases.items():
         words = [word for key, value in options.items() for word in (_option(key), value)]
-        out = place / "touches.h5"
-        run("probe-sensor", "simulate", target, *words, "-o", out, "--replace", folder=place)
-        yield name, _recorded(out)
+        commands.answer("probe-sensor", "simulate", target, *words, "-o", "out.h5", "--replace")
+        yield name, _recorded(commands.folder / "out.h5")
 
 
-def _by_port(place: Path) -> Iterator[tuple[str, Any]]:
+def _by_port(commands: Commands) -> Iterator[tuple[str, Any]]:
     """Yield what `probe-sensor record` reads of ports in software."""
     for name, url in PORTS.items():
-        out = place / f"{name}.h5"
-        run("probe-sensor", "record", url, "-o", out, "--frames", FRAMES, folder=place)
+        out = commands.folder / f"{name}.h5"
+        commands.answer("probe-sensor", "record", url, "-o", out, "--frames", FRAMES)
         yield name, _recorded(out)
 
 
-def _by_bench(place: Path) -> Iterator[tuple[str, Any]]:
+def _by_bench(commands: Commands) -> Iterator[tuple[str, Any]]:
     """Yield what the bench's own probe feels of a click.
 
     No public door leads there: the frame at which a click arrives is left to the clock.
@@ -162,7 +160,7 @@ def _by_bench(place: Path) -> Iterator[tuple[str, Any]]:
     from probe.simulate.target import surface_of
     from recognizer.bench.simulated import PressSequence, SimulationSettings
 
-    scene = surface_of(_inside(place, FACE))
+    scene = surface_of(_inside(commands.folder, FACE))
     for noise in ("typical", "quiet"):
         manner = SimulationSettings(rate=100.0, noise=noise, hold_s=0.2, seed=5)
         sequence = PressSequence(SensorType(), manner)
@@ -177,8 +175,9 @@ def _by_bench(place: Path) -> Iterator[tuple[str, Any]]:
         yield f"click {noise}", frames_told(np.array(found))
 
 
-def _by_validation(place: Path) -> Iterator[tuple[str, Any]]:
+def _by_validation(commands: Commands) -> Iterator[tuple[str, Any]]:
     """Yield the touches that `validate-set` draws, and their rows."""
+    place = commands.folder
     spec = place / "block.yaml"
     spec.write_text(
         "objects:\n  - {name: Block, shape: {box: [45 mm, 35 mm, 28 mm]}}\n"
@@ -199,8 +198,9 @@ def _by_validation(place: Path) -> Iterator[tuple[str, Any]]:
         yield from _validated(name, place, (), database=made, seed=32, **options)
 
 
-def _by_prints(place: Path) -> Iterator[tuple[str, Any]]:
+def _by_prints(commands: Commands) -> Iterator[tuple[str, Any]]:
     """Yield touches of what PrusaSlicer's G-code leaves of a part."""
+    place = commands.folder
     spec = place / "tetra.yaml"
     spec.write_text(TETRA)
     prints = place / "prints"

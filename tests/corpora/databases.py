@@ -17,17 +17,23 @@ import json
 import sqlite3
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from corpora.commands import DATA, FIXTURES, ROOT, Commands, normal_text, normal_value
+from corpora.commands import (
+    DATA,
+    FIXTURES,
+    LAB_KEY,
+    ROOT,
+    Commands,
+    normal_text,
+    started_commands,
+)
 
 NAME = "databases"
 PARTS = ("sqlite", "postgresql")
-LAB_KEY = "F1XT-VRES-0000-000Q"
 SHOWN = 24  #: rows of a table that stand in the corpus as they are
 
 MADE = """
@@ -50,21 +56,17 @@ Rows = tuple[list[str], list[tuple[Any, ...]]]
 
 def collect(part: str) -> Iterator[tuple[str, Any]]:
     """Yield the entries of a part."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name).resolve()
-        work = folder / "work"
-        work.mkdir()
-        with Commands(folder) as commands:
-            made = _sqlite if part == "sqlite" else _postgresql
-            for entry, value in made(commands, work):
-                yield f"{part}/{entry}", value
+    with started_commands() as commands:
+        made = _sqlite if part == "sqlite" else _postgresql
+        for entry, value in made(commands, commands.folder):
+            yield f"{part}/{entry}", value
 
 
 def _sqlite(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
     for version in (1, 2, 3):
         name = f"v{version}.db"
         (work / name).write_bytes(_file_of(version))
-        yield from _objects(commands, work, f"v{version}", name)
+        yield from _objects(commands, f"v{version}", name)
         yield from _tables(f"v{version}/dump", *_sqlite_rows(work / name), work)
         kept = sorted(path.name for path in work.glob(f"v{version}.v*"))
         same = [(work / one).read_bytes() == _file_of(version) for one in kept]
@@ -75,9 +77,9 @@ def _sqlite(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
         with closing(sqlite3.connect(work / name)) as connection, connection:
             connection.execute(sql)
         before = (work / name).read_bytes()
-        yield f"refused/{cause}", _said(commands, work, "list", "--database", name)
+        yield f"refused/{cause}", _said(commands, "list", "--database", name)
         yield f"refused/{cause}/untouched", (work / name).read_bytes() == before
-    yield from _fresh(commands, work, "fresh", "lab.db", "other.db")
+    yield from _fresh(commands, "fresh", "lab.db", "other.db")
     yield from _tables("fresh/dump", *_sqlite_rows(work / "lab.db"), work)
     yield from _tables("fresh/exported", *_sqlite_rows(work / "out.db"), work)
     yield from _tables("fresh/imported", *_sqlite_rows(work / "other.db"), work)
@@ -122,10 +124,10 @@ def _postgresql(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
                 url = new(f"v{version}")
                 with psycopg.connect(url, autocommit=True) as connection:
                     connection.execute((FIXTURES / f"database/v{version}.sql").read_bytes())
-                for entry, value in _objects(commands, work, f"v{version}", url):
+                for entry, value in _objects(commands, f"v{version}", url):
                     yield entry, _placeless(value, place)
                 yield from _tables(f"v{version}/dump", *rows(f"v{version}"), work)
-            for entry, value in _fresh(commands, work, "fresh", new("lab"), new("other")):
+            for entry, value in _fresh(commands, "fresh", new("lab"), new("other")):
                 yield entry, _placeless(value, place)
             yield from _tables("fresh/dump", *rows("lab"), work)
             yield from _tables("fresh/imported", *rows("other"), work)
@@ -140,23 +142,21 @@ def _file_of(version: int) -> bytes:
     return gzip.decompress((DATA / f"databases/v{version}.db.gz").read_bytes())
 
 
-def _objects(commands: Commands, work: Path, entry: str, url: str) -> Iterator[tuple[str, Any]]:
+def _objects(commands: Commands, entry: str, url: str) -> Iterator[tuple[str, Any]]:
     """Yield what the commands say of a database; the first one migrates it."""
     database = ("--database", url)
-    yield f"{entry}/list first", _said(commands, work, "list", *database)
-    listed = _said(commands, work, "list", *database)
+    yield f"{entry}/list first", _said(commands, "list", *database)
+    listed = _said(commands, "list", *database)
     yield f"{entry}/list", listed
-    yield f"{entry}/lab", _said(commands, work, "lab", *database)
+    yield f"{entry}/lab", _said(commands, "lab", *database)
     for one in listed["stdout"]["objects"]:
-        yield f"{entry}/show {one['name']}", _said(commands, work, "show", one["name"], *database)
+        yield f"{entry}/show {one['name']}", _said(commands, "show", one["name"], *database)
 
 
-def _fresh(
-    commands: Commands, work: Path, entry: str, url: str, other: str
-) -> Iterator[tuple[str, Any]]:
+def _fresh(commands: Commands, entry: str, url: str, other: str) -> Iterator[tuple[str, Any]]:
     """Yield what commands say that register objects and carry them to another database."""
-    (work / "made.yaml").write_text(MADE)
-    (work / "prism.yaml").write_text(THESIS)
+    (commands.folder / "made.yaml").write_text(MADE)
+    (commands.folder / "prism.yaml").write_text(THESIS)
     here, key = ("--database", url), ("--lab-key", LAB_KEY)
     for number, words in enumerate(
         (
@@ -169,18 +169,13 @@ def _fresh(
             ("import", "out.db", "--database", other, "--rename", "Rod=Stick"),
         )
     ):
-        yield f"{entry}/{number} {words[0]}", _said(commands, work, *words)
+        yield f"{entry}/{number} {words[0]}", _said(commands, *words)
     for database, named in ((url, "lab"), (other, "other")):
-        yield f"{entry}/list {named}", _said(commands, work, "list", "--database", database)
+        yield f"{entry}/list {named}", _said(commands, "list", "--database", database)
 
 
-def _said(commands: Commands, work: Path, *words: str) -> dict[str, Any]:
-    outcome = commands.run("encode-object", *words, "--json", cwd=work)
-    return {
-        "code": outcome.code,
-        "stdout": normal_value(outcome.value(), work),
-        "stderr": normal_text(outcome.stderr, work),
-    }
+def _said(commands: Commands, *words: str) -> dict[str, Any]:
+    return commands.entry("encode-object", *words, "--json")
 
 
 def _placeless(value: Any, place: str) -> Any:

@@ -11,13 +11,12 @@ from __future__ import annotations
 import gzip
 import hashlib
 import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from corpora.commands import DATA, FIXTURES, Commands, normal_text, normal_value
+from corpora.commands import DATA, FIXTURES, Commands, normal_text, started_commands
 
 NAME = "recordings"
 TOUCHES = ("touch", "touches", "scan", "gel", "small", "plain", "all-attributes")
@@ -40,10 +39,9 @@ IMPORTED = {
 
 def collect() -> Iterator[tuple[str, Any]]:
     """Yield the entries."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name).resolve()
-        work = folder / "work"
-        shutil.copytree(DATA / "recordings", work)
+    with started_commands() as commands:
+        work = commands.folder
+        shutil.copytree(DATA / "recordings", work, dirs_exist_ok=True)
         for packed in work.glob("*.gz"):
             (work / packed.stem).write_bytes(gzip.decompress(packed.read_bytes()))
             packed.unlink()
@@ -52,11 +50,8 @@ def collect() -> Iterator[tuple[str, Any]]:
         shutil.copy(FIXTURES / "database/v2.db", work / "old.db")
         packed = DATA / "databases/v3.db.gz"
         (work / "lab.db").write_bytes(gzip.decompress(packed.read_bytes()))
-        with Commands(folder) as commands:
-            yield from _read(commands, work)
-            yield from _recognised(commands, work)
-            yield from _imported(commands, work)
-            yield from _repaired(commands, work)
+        for entries in (_read, _recognised, _imported, _repaired):
+            yield from entries(commands, work)
 
 
 def _read(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
@@ -64,37 +59,37 @@ def _read(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
     for path in [*sorted(work.glob("*.h5")), work / "series.h5"]:
         name = path.name
         yield f"frames/{name}", _frames(path, work)
-        yield f"info/{name}", _said(commands, work, "probe-sensor", "info", name, "--json")
+        yield f"info/{name}", commands.entry("probe-sensor", "info", name, "--json")
         if name.endswith(".part.h5"):
             yield f"live/{name}", _frames(path, work, live=True)
         words = ("--csv", "out.csv", "--npy", "out.npy", "--replace", "--json")
-        yield f"export/{name}", _said(commands, work, "probe-sensor", "export", name, *words)
+        yield f"export/{name}", commands.entry("probe-sensor", "export", name, *words)
         yield from _written(work, f"export/{name}", "out.csv", "out.npy")
     yield (
         "calibration",
-        _said(commands, work, "probe-sensor", "info", "old-calibration.json", "--json"),
+        commands.entry("probe-sensor", "info", "old-calibration.json", "--json"),
     )
     for name in ("scan", "old-touch"):
         words = (f"{name}.h5", "--mcap", "out.mcap", "--replace")
-        _said(commands, work, "probe-sensor", "export", *words)
+        commands.entry("probe-sensor", "export", *words)
         back = ("import", "out.mcap", "-o", "back.h5", "--replace", "--json")
-        yield f"mcap/{name}", _said(commands, work, "probe-sensor", *back)
+        yield f"mcap/{name}", commands.entry("probe-sensor", *back)
         yield f"mcap/{name}/frames", _frames(work / "back.h5", work)
 
 
-def _recognised(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
+def _recognised(commands: Commands, _: Path) -> Iterator[tuple[str, Any]]:
     for name in TOUCHES:
         words = (f"{name}.h5", "--json")
-        yield f"recognised/{name}", _said(commands, work, "recognize-object", *words)
+        yield f"recognised/{name}", commands.entry("recognize-object", *words)
     for name, more in (("old-touch", ()), ("old-scan", ("--scan",))):
         words = (f"{name}.h5", "--database", "old.db", *more, "--json")
-        yield f"recognised/{name}", _said(commands, work, "recognize-object", *words)
+        yield f"recognised/{name}", commands.entry("recognize-object", *words)
 
 
 def _imported(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
     for name, more in IMPORTED.items():
         words = ("import", name, "-o", "imported.h5", "--replace", *more, "--json")
-        said = _said(commands, work, "probe-sensor", *words)
+        said = commands.entry("probe-sensor", *words)
         yield f"import/{name}", said
         if not said["code"]:
             yield f"import/{name}/frames", _frames(work / "imported.h5", work)
@@ -104,7 +99,7 @@ def _repaired(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
     """Yield what repair says of every file, and what is there afterwards; changes the files."""
     for path in sorted(work.glob("*.h5")):
         before = {one.name for one in work.iterdir()}
-        said = _said(commands, work, "probe-sensor", "repair", path.name, "--json")
+        said = commands.entry("probe-sensor", "repair", path.name, "--json")
         new = sorted({one.name for one in work.iterdir()} - before)
         gone = sorted(before - {one.name for one in work.iterdir()})
         yield f"repair/{path.name}", said | {"new files": new, "files gone": gone}
@@ -165,16 +160,3 @@ def _written(work: Path, entry: str, *names: str) -> Iterator[tuple[str, Any]]:
 
 def _sha256(arrays: list[Any]) -> str:
     return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
-
-
-def _said(commands: Commands, work: Path, *words: str) -> dict[str, Any]:
-    outcome = commands.run(*words, cwd=work)
-    try:
-        stdout = normal_value(outcome.value(), work)
-    except ValueError:
-        stdout = normal_text(outcome.stdout, work)
-    return {
-        "code": outcome.code,
-        "stdout": stdout,
-        "stderr": normal_text(outcome.stderr, work),
-    }

@@ -11,71 +11,38 @@ import gzip
 import json
 import shlex
 import shutil
-import tempfile
+import sqlite3
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from corpora.commands import DATA, FIXTURES, Commands, Outcome, normal_text, normal_value
+from corpora.commands import DATA, FIXTURES, LAB_KEY, Commands, normal_value, started_commands
 
 NAME = "texts"
 PARTS = ("help", "making", "decoding", "probing", "reading", "validating", "misuse", "specs")
 
-HELP = """
-encode-object
-encode-object init
-encode-object schema
-encode-object printers
-encode-object lab
-encode-object list
-encode-object show
-encode-object retire
-encode-object export
-encode-object import
-decode-window
-probe-sensor
-probe-sensor list
-probe-sensor info
-probe-sensor types
-probe-sensor live
-probe-sensor record
-probe-sensor replay
-probe-sensor export
-probe-sensor import
-probe-sensor repair
-probe-sensor simulate
-probe-sensor calibrate
-probe-sensor calibrate bias
-probe-sensor calibrate loads
-probe-sensor calibrate port
-probe-kit
-recognize-object
-recognize-object as-built
-recognize-object check
-validate-set
-validate-set compare
-validate-set worlds
-validate-set repeat
-validate-set report
-open-bench
-"""
-
-# Lines are commands, in their order; those that end in [twice] also run with --json.
-MAKING = """
+#: Lines are commands, in their order: one for each of the words {in,braces}; those that end in
+#: [twice] also run with --json.
+COMMANDS = {
+    "help": """
+encode-object --help
+encode-object {init,schema,printers,lab,list,show,retire,export,import} --help
+decode-window --help
+probe-sensor --help
+probe-sensor {list,info,types,live,record,replay,export,import,repair,simulate,calibrate} --help
+probe-sensor calibrate {bias,loads,port} --help
+probe-kit --help
+recognize-object --help
+recognize-object {as-built,check} --help
+validate-set --help
+validate-set {compare,worlds,repeat,report} --help
+open-bench --help
+""",
+    "making": """
 encode-object init --json
-encode-object init cube
-encode-object init box
-encode-object init triangular_prism
-encode-object init tetrahedron
-encode-object init octahedron
-encode-object init dodecahedron
-encode-object init prism
-encode-object init pyramid
-encode-object init cylinder
-encode-object init cone
-encode-object init polyhedron
-encode-object init file
+encode-object init {cube,box,triangular_prism,tetrahedron,octahedron,dodecahedron,prism,pyramid}
+encode-object init {cylinder,cone,polyhedron,file}
 encode-object init box -o box.yaml [twice]
 encode-object init box -o box.yaml --force
 encode-object schema
@@ -93,10 +60,8 @@ encode-object set.yaml --database set2.db --lab-key F1XT-VRES-0000-000Q --format
 encode-object blank.yaml --database new.db --format stl [twice]
 encode-object cube.yaml --database other.db --lab-key 0000-0000-0000-0000 --format stl
 encode-object cube.yaml --database verified.db --lab-key F1XT-VRES-0000-000Q --format 3mf --verify
-encode-object lab [twice]
-encode-object list [twice]
-encode-object show Cube [twice]
-encode-object show Rod [twice]
+encode-object {lab,list} [twice]
+encode-object show {Cube,Rod} [twice]
 encode-object show Guest --json
 encode-object show "Small box-2" [twice]
 encode-object show Prism --sensor-type gel-24x32
@@ -120,27 +85,19 @@ encode-object list --database into.db --json
 encode-object lab --database into.db
 encode-object list --database old.db --json
 encode-object lab --database old.db [twice]
-encode-object list --database newer.db [twice]
-encode-object list --database foreign.db [twice]
-encode-object list --database damaged.db [twice]
-encode-object list --database gone.db [twice]
+encode-object list --database {newer.db,foreign.db,damaged.db,gone.db} [twice]
 encode-object show Cube --database text.db [twice]
 encode-object list --database gone/lab.db
 encode-object list --database postgresql://nobody@127.0.0.1:1/none [twice]
 encode-object list --database mysql://host/name
 encode-object cube.yaml --database newer.db [twice]
-encode-object import newer.db
-encode-object import text.db
+encode-object import {newer.db,text.db}
 probe-kit gel-24x32 -o kit
-"""
-
-DECODING = """
+""",
+    "decoding": """
 decode-window "01 11 01 01 00 01" --profile thesis [twice]
-decode-window "01 11 01 01 00 01" --profile thesis --method table [twice]
-decode-window "01 11 01 01 00 01" --profile thesis --method serial [twice]
-decode-window "01 11 01 01 00 01" --profile thesis --method milestones [twice]
-decode-window "01 11 01 01 00 01" --profile thesis --method logarithm [twice]
-decode-window "01 11 01 01 00 01" --profile thesis --method likelihood [twice]
+decode-window "01 11 01 01 00 01" --profile thesis --method {table,serial,milestones} [twice]
+decode-window "01 11 01 01 00 01" --profile thesis --method {logarithm,likelihood} [twice]
 decode-window "01 1? 01 01 00 01" --profile thesis --method likelihood --json
 decode-window "0123 1032 2310" --json
 decode-window "012 103 231" --method likelihood --rotations 0,1,2,3 --json
@@ -170,41 +127,21 @@ decode-window "01" --database gone.db [twice]
 decode-window "01" --lab-key hello
 decode-window --version [twice]
 decode-window
-"""
-
-PROBING = """
+""",
+    "probing": """
 probe-sensor --version [twice]
 probe-sensor types [twice]
-probe-sensor types fsr-16 [twice]
-probe-sensor types gel-24x32 [twice]
-probe-sensor types mat-32x32
-probe-sensor types flexitac-12x32
-probe-sensor types flexitac-16x32
-probe-sensor types fsr-8x8
+probe-sensor types {fsr-16,gel-24x32} [twice]
+probe-sensor types {mat-32x32,flexitac-12x32,flexitac-16x32,fsr-8x8}
 probe-sensor types --schema
-probe-sensor types fsr16 [twice]
-probe-sensor types own-type.yaml [twice]
-probe-sensor types bad-type.yaml [twice]
+probe-sensor types {fsr16,own-type.yaml,bad-type.yaml} [twice]
 probe-sensor types gone.yaml
-probe-sensor info touch.h5 [twice]
-probe-sensor info touches.h5 [twice]
-probe-sensor info scan.h5 [twice]
-probe-sensor info calibration.json [twice]
-probe-sensor info gone.h5 [twice]
-probe-sensor info gone.json [twice]
-probe-sensor info text.h5 [twice]
-probe-sensor info newer.h5 [twice]
-probe-sensor info damaged.h5 [twice]
-probe-sensor info truncated.h5 [twice]
-probe-sensor info bad-calibration.json [twice]
-probe-sensor info newer-calibration.json [twice]
-probe-sensor info /dev/ttyGONE [twice]
-probe-sensor info serial:///dev/ttyGONE [twice]
-probe-sensor info sim:?speed=2 [twice]
+probe-sensor info {touch.h5,touches.h5,scan.h5,calibration.json,gone.h5,gone.json,text.h5} [twice]
+probe-sensor info {newer.h5,damaged.h5,truncated.h5,bad-calibration.json} [twice]
+probe-sensor info {newer-calibration.json,/dev/ttyGONE,serial:///dev/ttyGONE,sim:?speed=2} [twice]
 probe-sensor info smoke:thing [twice]
 probe-sensor info sim: --sensor 8
-probe-sensor live sim:nothing
-probe-sensor live sim:gone.db#Cube/F1
+probe-sensor live {sim:nothing,sim:gone.db#Cube/F1}
 probe-sensor record file:gone.h5 -o a.h5
 probe-sensor record sim: -o a.csv [twice]
 probe-sensor record sim: -o gone/a.h5 --frames 1
@@ -214,8 +151,7 @@ probe-sensor record file:touch.h5 -o copy.h5 --frames 4
 probe-sensor replay touch.h5 --speed 0
 probe-sensor replay scan.h5 --speed 0 --json
 probe-sensor replay gone.h5
-probe-sensor replay touch.h5 --speed fast
-probe-sensor replay touch.h5 --speed nan
+probe-sensor replay touch.h5 --speed {fast,nan}
 probe-sensor export touch.h5 --csv touch.csv --npy touch.npy [twice]
 probe-sensor export scan.h5 --csv scan.csv
 probe-sensor export scan.h5 --mcap scan.mcap [twice]
@@ -231,9 +167,7 @@ probe-sensor import short.csv -o short.h5 [twice]
 probe-sensor import gone.npy -o a.h5
 probe-sensor import touch.npy -o touch.h5
 probe-sensor import touch.npy -o rate.h5 --rate -1
-probe-sensor repair touch.h5 [twice]
-probe-sensor repair truncated.h5 [twice]
-probe-sensor repair beheaded.h5 [twice]
+probe-sensor repair {touch.h5,truncated.h5,beheaded.h5} [twice]
 probe-sensor repair gone.h5
 probe-sensor calibrate bias blank0.h5 [twice]
 probe-sensor calibrate bias gone.h5
@@ -250,11 +184,8 @@ probe-sensor simulate washer --x 1 --accuracy layer
 probe-sensor simulate washer --seed 2 --truth truth.json --touches 2 --noise quiet --json
 probe-sensor simulate lab.db#Cube/F1 --scan raster --touches 3 --seed 1 --json
 probe-sensor simulate lab.db#Cube/F1 --scan kinesthetic --touches 2 --seed 1 -o way.h5 --json
-probe-sensor simulate lab.db#Cube/F9 [twice]
-probe-sensor simulate lab.db#Nobody/F1 [twice]
-probe-sensor simulate lab.db#Cube
-probe-sensor simulate gone.stl
-probe-sensor simulate cube
+probe-sensor simulate {lab.db#Cube/F9,lab.db#Nobody/F1} [twice]
+probe-sensor simulate {lab.db#Cube,gone.stl,cube}
 probe-sensor simulate gone.db#Cube/F1 [twice]
 probe-sensor simulate washer --x 99 -o a.h5
 probe-sensor simulate washer --accuracy 1e-9
@@ -264,20 +195,16 @@ probe-sensor simulate washer --force -1 [twice]
 probe-sensor simulate washer --nope
 probe-sensor simulate washer --overlay wool [twice]
 probe-sensor simulate washer --noise loud
-probe-sensor simulate
-probe-sensor fly
+probe-sensor {simulate,fly}
 probe-sensor
-"""
-
-READING = """
-recognize-object touch.h5 [twice]
-recognize-object touches.h5 [twice]
+""",
+    "reading": """
+recognize-object {touch.h5,touches.h5} [twice]
 recognize-object touches.h5 --every --json
 recognize-object touches.h5 --scan [twice]
 recognize-object scan.h5 --scan --json
 recognize-object scan.h5 --scan --method thesis --json
-recognize-object gel.h5 [twice]
-recognize-object small.h5 [twice]
+recognize-object {gel.h5,small.h5} [twice]
 recognize-object plain.h5 --json
 recognize-object touch.h5 --flip columns [twice]
 recognize-object touch.h5 --flip sideways
@@ -286,8 +213,7 @@ recognize-object touch.h5 --touches 1 --overlay pad --json
 recognize-object touch.h5 --sensor-type gel-24x32 [twice]
 recognize-object touch.h5 --mcap answers.mcap --json
 recognize-object old.h5 --database old.db [twice]
-recognize-object blank0.h5 [twice]
-recognize-object load20.h5 [twice]
+recognize-object {blank0.h5,load20.h5} [twice]
 recognize-object built.h5 --learn state.json --json
 recognize-object touch.h5 --sensor-state state.json --json
 recognize-object as-built built.h5 [twice]
@@ -297,22 +223,14 @@ recognize-object check touch.h5 --at Cube/F1 [twice]
 recognize-object check touches.h5 --at Cube/F3 --every [twice]
 recognize-object check touch.h5 --at Cube/F9
 recognize-object check touch.h5
-recognize-object gone.h5 [twice]
-recognize-object text.h5 [twice]
-recognize-object newer.h5 [twice]
-recognize-object damaged.h5 [twice]
-recognize-object bad-type.h5 [twice]
-recognize-object other-shape.h5 [twice]
-recognize-object touch.h5 --database gone.db [twice]
-recognize-object touch.h5 --database text.h5 [twice]
-recognize-object touch.h5 --database newer.db [twice]
+recognize-object {gone.h5,text.h5,newer.h5,damaged.h5,bad-type.h5,other-shape.h5} [twice]
+recognize-object touch.h5 --database {gone.db,text.h5,newer.db} [twice]
 recognize-object touch.h5 --plot a.pdf
 recognize-object touch.h5 --calibration gone.json [twice]
 recognize-object touch.h5 --sensor-state gone.json [twice]
 recognize-object touch.h5 --sensor-state calibration.json
 recognize-object --port serial:///dev/nowhere [twice]
-recognize-object --port smoke:
-recognize-object --port sim:lab.db#Cube/F1?overlay=wool
+recognize-object --port {smoke:,sim:lab.db#Cube/F1?overlay=wool}
 recognize-object --json
 recognize-object a.h5 --port sim:
 recognize-object a.h5 --follow
@@ -324,16 +242,14 @@ recognize-object a.h5 --nope [twice]
 recognize-object touch.h5 --publish ftp://nowhere/x
 recognize-object --version [twice]
 recognize-object
-"""
-
-VALIDATING = """
+""",
+    "validating": """
 validate-set cube.yaml --touches 12 --study 0 --seed 3 -o run --json
 validate-set cube.yaml --touches 12 --study 0 --seed 3 -o run
 validate-set cube.yaml --touches 12 --study 0 --seed 4 --noise hard --policy next -o other --json
 validate-set --database lab.db --surfaces database --touches 8 --study 0 -o registered --json
 validate-set run --resume
-validate-set compare run other --json
-validate-set worlds run other --json
+validate-set {compare,worlds} run other --json
 validate-set repeat run 3 --json
 validate-set repeat run 99
 validate-set repeat gone 1
@@ -349,9 +265,8 @@ validate-set cube.yaml --touches 4 --policy best -o new
 validate-set --database gone.db --touches 4 -o new [twice]
 validate-set --version [twice]
 validate-set
-"""
-
-MISUSE = """
+""",
+    "misuse": """
 encode-object
 encode-object --dry-runn c.yaml [twice]
 encode-object list --data x [twice]
@@ -361,8 +276,7 @@ encode-object cube.yaml --format stepp [twice]
 encode-object cube.yaml --database mysql://h/n [twice]
 encode-object cube.yaml --lab-key hello [twice]
 encode-object cube.yaml --lab-key 0123-4567-89AB-CDEQ
-encode-object cube.yaml --sensor-type nose [twice]
-encode-object cube.yaml --sensor-type bad-type.yaml [twice]
+encode-object cube.yaml --sensor-type {nose,bad-type.yaml} [twice]
 encode-object cube.yaml --jobs 0
 encode-object cube.yaml --print-profile none --printed-check
 encode-object cube.yaml --printed-check --print-faults broken
@@ -370,29 +284,24 @@ encode-object cube.yaml -o text.h5/under --database a.db --lab-key F1XT-VRES-000
 encode-object gone.yaml [twice]
 encode-object folder
 encode-object init prisma [twice]
-encode-object init cube -o cube.yaml [twice]
-encode-object init cube -o gone/cube.yaml [twice]
-encode-object show
-encode-object retire
-encode-object export
+encode-object init cube -o {cube.yaml,gone/cube.yaml} [twice]
+encode-object {show,retire,export}
 encode-object import gone.db [twice]
-encode-object import lab.db --rename Cube
-encode-object import lab.db --rename Nobody=Somebody
+encode-object import lab.db --rename {Cube,Nobody=Somebody}
 encode-object export lab.db
 encode-object export out.db --object Nobody
 encode-object fly
-probe-kit nose -o kit [twice]
-probe-kit bad-type.yaml -o kit [twice]
+probe-kit {nose,bad-type.yaml} -o kit [twice]
 probe-kit
 probe-kit fsr-16 -o text.h5/kit
 probe-kit --version [twice]
 open-bench --port smoke: --database lab.db
-open-bench --database gone.db
-open-bench --database newer.db
+open-bench --database {gone.db,newer.db}
 open-bench --web-port 70000
 open-bench --overlay wool --database lab.db
 open-bench --nope
-"""
+""",
+}
 
 # One spec for every sort of mistake; each is read with --dry-run, every fourth as JSON too.
 SPECS = {
@@ -475,67 +384,44 @@ SPECS = {
 
 def collect(part: str) -> Iterator[tuple[str, Any]]:
     """Yield the entries of a part."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name).resolve()
-        work = folder / "work"
-        work.mkdir()
-        with Commands(folder) as commands:
-            _provide(work, commands)
-            times: Counter[str] = Counter()
-            for line in _lines(part, work):
-                words = shlex.split(line)
-                outcome = commands.run(*words, cwd=work)
-                times[line] += 1
-                again = f" #{times[line]}" if times[line] > 1 else ""
-                yield f"{part}/{line}{again}", _said(outcome, words, work)
+    with started_commands() as commands:
+        _provide(commands)
+        times: Counter[str] = Counter()
+        for line in _lines(part, commands.folder):
+            entry = commands.entry(*shlex.split(line))
+            lines = entry["stdout"].splitlines() if isinstance(entry["stdout"], str) else []
+            if lines and all(one.startswith(("{", "[")) for one in lines):  # objects, one a line
+                entry["stdout"] = [normal_value(json.loads(one), commands.folder) for one in lines]
+            times[line] += 1
+            again = f" #{times[line]}" if times[line] > 1 else ""
+            yield f"{part}/{line}{again}", entry
 
 
-def _lines(part: str, folder: Path) -> list[str]:
-    """Return the commands of a part, and write the specs that they name."""
-    if part == "help":
-        return [f"{line} --help" for line in HELP.split("\n") if line]
+def _lines(part: str, folder: Path) -> Iterator[str]:
+    """Yield the commands of a part, and write the specs that they name."""
     if part == "specs":
         for name, text in SPECS.items():
             (folder / f"{name}.yaml").write_text(text)
-        ending = "--dry-run --lab-key F1XT-VRES-0000-000Q"
-        lines = [f"encode-object {name}.yaml {ending}" for name in SPECS]
-        return [*lines, *(f"{line} --json" for line in lines[::4])]
-    text = {
-        "making": MAKING,
-        "decoding": DECODING,
-        "probing": PROBING,
-        "reading": READING,
-        "validating": VALIDATING,
-        "misuse": MISUSE,
-    }[part]
-    lines = []
-    for line in filter(None, text.split("\n")):
-        lines.append(line.removesuffix(" [twice]"))
-        if line.endswith("[twice]"):
-            lines.append(lines[-1] + " --json")
-    return lines
+        lines = [f"encode-object {name}.yaml --dry-run --lab-key {LAB_KEY}" for name in SPECS]
+        yield from (*lines, *(f"{line} --json" for line in lines[::4]))
+        return
+    for line in COMMANDS[part].strip().split("\n"):
+        for command in _expanded(line.removesuffix(" [twice]")):
+            yield command
+            if line.endswith("[twice]"):
+                yield f"{command} --json"
 
 
-def _said(outcome: Outcome, words: list[str], folder: Path) -> dict[str, Any]:
-    stdout: Any = normal_text(outcome.stdout, folder)
-    if "--json" in words or "schema" in words or "--schema" in words:
-        try:
-            stdout = normal_value(outcome.value(), folder)
-        except ValueError:  # several objects, each on a line, or a text after all
-            lines = outcome.stdout.splitlines()
-            if lines and all(line.startswith(("{", "[")) for line in lines):
-                stdout = [normal_value(json.loads(line), folder) for line in lines]
-    return {
-        "code": outcome.code,
-        "stdout": stdout,
-        "stderr": normal_text(outcome.stderr, folder),
-    }
+def _expanded(line: str) -> list[str]:
+    """Return a command for each of the words in braces; the line where there are none."""
+    head, _, rest = line.partition("{")
+    words, _, tail = rest.partition("}")
+    return [head + word + tail for word in words.split(",")] if "," in words else [line]
 
 
-def _provide(folder: Path, commands: Commands) -> None:
-    """Put what commands read into the folder."""
-    import sqlite3
-
+def _provide(commands: Commands) -> None:
+    """Put what commands read into their folder."""
+    folder = commands.folder
     for name in ("v3", "guest"):
         packed = DATA / "databases" / f"{name}.db.gz"
         target = folder / ("lab.db" if name == "v3" else f"{name}.db")
@@ -565,7 +451,7 @@ def _provide(folder: Path, commands: Commands) -> None:
     (folder / "folder").mkdir()
     (folder / "notes.txt").write_text("no model\n")
     (folder / "broken.stl").write_bytes(b"solid broken\nfacet normal 0 0\n")
-    own = commands.done("probe-sensor", "types", "gel-24x32", cwd=folder).stdout
+    own = commands.answer("probe-sensor", "types", "gel-24x32")
     (folder / "own-type.yaml").write_text(own)
     (folder / "bad-type.yaml").write_text(own.replace("rows:", "rowes:"))
     (folder / "cube.yaml").write_text("name: Cube\nshape: {cube: 40 mm}\n")

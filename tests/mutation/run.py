@@ -43,7 +43,7 @@ os.environ.update(make.ENVIRONMENT)  # before numpy loads
 
 LOADED = (  # third parties' modules that tests and code load
     "numpy", "scipy.ndimage", "scipy.optimize", "scipy.spatial", "scipy.stats", "pytest",
-    "sqlalchemy", "pydantic", "yaml", "h5py", "_pytest.assertion.rewrite", "xdist.plugin",
+    "sqlalchemy", "pydantic", "yaml", "h5py", "_pytest.assertion.rewrite",
 )  # fmt: skip
 OURS = ("encoded_objects", "generator", "decoder", "probe", "recognizer")
 LONGEST_S = 20.0  #: CPU seconds that no unit test needs; a mutant that takes longer is caught

@@ -1,9 +1,9 @@
 """A one-piece pad by finite elements in space, its free edge included: the layer's oracle.
 
 Small strain; the surface is rigid and without friction. A pad is condensed once (`elements_pad`)
-and kept. Heights are sampled at the nodes of its top: where a surface has walls, `walls_mm` puts
-lines of the mesh there. Node i stands at zeta_i = z + tilt_x y_i - tilt_y x_i and gives way by
-w_i = (C p)_i; an active set finds p >= 0 and the plate a = (z, tilt_x, tilt_y) with
+and kept. Heights are sampled at the nodes of its top. Node i stands at
+zeta_i = z + tilt_x y_i - tilt_y x_i and gives way by w_i = (C p)_i; an active set finds p >= 0 and
+the plate a = (z, tilt_x, tilt_y) with
 
     w_i + zeta_i >= h_i,    p_i (w_i + zeta_i - h_i) = 0,
     R'p = (force, 0, 0) + K (a - a_0),    R = [1, y, -x],    K = diag(0, k_x, k_y).
@@ -18,7 +18,7 @@ from functools import lru_cache
 
 import numpy as np
 import scipy.linalg as la
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Contact, Touch, heights_at
@@ -26,9 +26,6 @@ from probe.surface.contract import HeightMap
 from reference.elements_pad import Array, CondensedPad, PadLines, condense
 
 GROWTH = 1.5  # from element to element of the margin
-WALL_LINES = 0.15  # of an element: from a wall to the lines next to it
-NEAR = 0.1  # of an element: no two lines are as near as that, but walls and tactels
-TINY = 1e-6  # of an element: the same place
 FINER = 1.6  # elements get thinner towards the top, by this power
 FIRST = 0.02  # of the height: nodes so deep in an unloaded plate's way are the first guess
 MOST_STEPS = 60  # of the active set
@@ -43,15 +40,13 @@ def elements(
     per_tactel: int = 2,
     layers: int = 3,
     margin_mm: float = 0.0,
-    walls_mm: tuple[ArrayLike, ArrayLike] = ((), ()),
 ) -> Contact:
     """Press a pad, held by a wrist of some stiffness, on a surface.
 
     `per_tactel` and `layers` are quadratic elements along a tactel and through the pad, which
-    reaches `margin_mm` beyond the matrix (0: its sides are free there); at `walls_mm`, places |x|
-    and |y| of the sensor frame, the mesh has more lines.
+    reaches `margin_mm` beyond the matrix (0: its sides are free there).
     """
-    pad = condensed_pad(sensor, per_tactel, layers, margin_mm, walls_mm)
+    pad = _condensed_pad(sensor, per_tactel, layers, margin_mm)
     heights = heights_at(surface, touch, pad.nodes_mm)
     forces, plate, steps = _rest(pad, heights, touch, FIRST * sensor.overlay.height_mm)
     base = pad.base_forces(forces)
@@ -60,31 +55,14 @@ def elements(
     return Contact(pressed, *(float(v) for v in plate), "elements", steps)
 
 
-def condensed_pad(
-    sensor: SensorType,
-    per_tactel: int = 2,
-    layers: int = 3,
-    margin_mm: float = 0.0,
-    walls_mm: tuple[ArrayLike, ArrayLike] = ((), ()),
-) -> CondensedPad:
-    """Return the pad of a sensor, from memory if it has been there; parameters as `elements`."""
-    walls = [tuple(np.unique(np.abs(np.asarray(w, float))).tolist()) for w in walls_mm]
-    return _condense(sensor, per_tactel, layers, float(margin_mm), walls[0], walls[1])
-
-
 @lru_cache(maxsize=2)
-def _condense(
-    sensor: SensorType,
-    per_tactel: int,
-    layers: int,
-    margin_mm: float,
-    walls_x: tuple[float, ...],
-    walls_y: tuple[float, ...],
+def _condensed_pad(
+    sensor: SensorType, per_tactel: int, layers: int, margin_mm: float
 ) -> CondensedPad:
     overlay, pitch = sensor.overlay, sensor.pitch_mm
     lines = PadLines(
-        _element_boundaries(sensor.columns, pitch, per_tactel, margin_mm, walls_x),
-        _element_boundaries(sensor.rows, pitch, per_tactel, margin_mm, walls_y),
+        _element_boundaries(sensor.columns, pitch, per_tactel, margin_mm),
+        _element_boundaries(sensor.rows, pitch, per_tactel, margin_mm),
         overlay.height_mm * (1 - (1 - np.linspace(0, 1, layers + 1)) ** FINER),
     )
     edges = _edges(sensor.columns, pitch), _edges(sensor.rows, pitch)
@@ -95,32 +73,20 @@ def _edges(tactels: int, pitch: float) -> Array:
     return np.asarray((np.arange(tactels + 1) - tactels / 2) * pitch, dtype=np.float64)
 
 
-def _element_boundaries(
-    tactels: int, pitch: float, per_tactel: int, margin: float, walls: tuple[float, ...]
-) -> Array:
-    """Return element boundaries from 0 to the pad's edge: tactels divided, margin, walls."""
+def _element_boundaries(tactels: int, pitch: float, per_tactel: int, margin: float) -> Array:
+    """Return element boundaries from 0 to the pad's edge: tactels divided, then the margin."""
     edges = _edges(tactels, pitch)
     firm = np.unique(np.append(edges[edges >= 0], 0.0))
     parts = np.ceil(np.diff(firm) / pitch * per_tactel - 1e-9).astype(int)
     lines: Array = np.interp(
         np.arange(parts.sum() + 1), np.concatenate([[0], np.cumsum(parts)]), firm
     )
-    size = pitch / per_tactel
     if margin > 0:
+        size = pitch / per_tactel
         count = max(1, math.ceil(math.log1p(margin / size * (GROWTH - 1)) / math.log(GROWTH)))
         steps = np.cumsum(GROWTH ** np.arange(count))
         lines = np.concatenate([lines, lines[-1] + margin * steps / steps[-1]])
-    walls = tuple(w for w in walls if 0 < w < lines[-1])
-    firm = np.concatenate([firm, walls, lines[-1:]])
-    for wall in walls:  # a line there, in place of one too near, and one close by on each side
-        apart = np.abs(lines - wall) > NEAR * size
-        held = (np.abs(lines[:, None] - firm) <= TINY * size).any(axis=1)
-        lines = np.append(lines[apart | held], wall)
-        for near in (wall - WALL_LINES * size, wall + WALL_LINES * size):
-            if 0 < near < lines.max() and np.abs(lines - near).min() > NEAR * size:
-                lines = np.append(lines, near)
-    lines = np.sort(lines)
-    return np.asarray(lines[np.append(True, np.diff(lines) > TINY * size)])
+    return lines
 
 
 def _rest(

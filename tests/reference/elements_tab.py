@@ -32,11 +32,6 @@ class Tab:
     young_mpa: float = 1.0
     poisson: float = 0.4999
 
-    @property
-    def shape_factor(self) -> float:
-        """Loaded area over free area, S = D / 4H."""
-        return self.diameter_mm / (4 * self.height_mm)
-
 
 def compressed(tab: Tab, compression_mm: ArrayLike, *, parts: int = 8) -> Array:
     """Return the force (n,), N, at compressions (n,), mm, ascending, of a wholly covered tab."""

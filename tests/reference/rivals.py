@@ -15,7 +15,7 @@ F. J. MacWilliams, N. J. A. Sloane, The Theory of Error-Correcting Codes, chapte
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,21 +24,13 @@ from generator.array.field import Field, Labels
 from generator.array.fold import FoldedArray
 from reference.visible import PoseGrid, VisibleSet, visible_sets
 
-
-@dataclass(frozen=True, slots=True)
-class RankTest:
-    """When an array serves a sensor."""
-
-    most_short: float = 0.11
-    """Share of poses whose cells are dependent although they are no more than n, or have not
-    rank n although they are n or more. At a pitch of 7 mm (8.5 cells a touch): .10 for 63x65
-    with half of its polynomials, .56 to .93 for 255x257, .02 to .35 for 51x1285 (half of its
-    polynomials have .10 or less). At 5 mm and less all these have 0."""
-    poses: PoseGrid = field(default_factory=lambda: PoseGrid(places=12, turns=30))
-    """Poses that are tested: a tenth of a second, where the shares are good to .01."""
-
-
-RANK_TEST = RankTest()
+#: Share of poses whose cells may be dependent although they are no more than n, or have not rank n
+#: although they are n or more. At a pitch of 7 mm (8.5 cells a touch): .10 for 63x65 with half of
+#: its polynomials, .56 to .93 for 255x257, .02 to .35 for 51x1285 (half of its polynomials have .10
+#: or less). At 5 mm and less all these have 0.
+MOST_SHORT = 0.11
+#: That are tested: a tenth of a second, where the shares are good to .01.
+RANK_POSES = PoseGrid(places=12, turns=30)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,30 +62,15 @@ def rival_shares(array: FoldedArray, sets: Sequence[VisibleSet]) -> RivalShares:
     """
     extent = 1 + np.max([one.cells.max(axis=0, initial=0) for one in sets], axis=0)
     offsets = array.offsets(np.arange(extent[0])[:, None], np.arange(extent[1]))
-    cells = array.sequence.coefficients(offsets)
-    return code_shares(array.sequence.field, cells.reshape(*extent, -1), sets)
-
-
-def code_shares(gf: Field, cells: Labels, sets: Sequence[VisibleSet]) -> RivalShares:
-    """Return the shares for cells given by what they show.
-
-    Parameters
-    ----------
-    gf
-        GF(q).
-    cells
-        (rows, columns, n) labels: what cell (r, c) shows of a state, on a grid that holds
-        every set.
-    sets
-        Of `visible_sets`.
-    """
+    cells = array.sequence.coefficients(offsets).reshape(*extent, -1)  # what each shows of a state
+    gf = array.sequence.field
     degree = cells.shape[2]
     share = np.array([one.share for one in sets])
     number = np.array([len(one.cells) for one in sets])
     matrices = np.zeros((len(sets), degree, max(1, *number)), dtype=np.int64)
     for matrix, one in zip(matrices, sets, strict=True):
         matrix[:, : len(one.cells)] = cells[one.cells[:, 0], one.cells[:, 1]].T
-    rank, words = light_words(gf, matrices)
+    rank, words = _light_words(gf, matrices)
     unseen = float(gf.order) ** (degree - rank)  # states that show nothing
     rivals = np.cumsum(words, axis=1) * unseen[:, None] - 1
     poses, mean = share @ (rivals > 0), share @ rivals
@@ -110,42 +87,19 @@ def serves(
     pitch_mm: float,
     sensor_half_mm: tuple[float, float],
     symbol_half_mm: float,
-    test: RankTest = RANK_TEST,
 ) -> bool:
     """Whether the cells that a sensor sees whole have the rank that so many cells can have.
 
-    The test of a fold, and of a polynomial on a fold. Some poses may fail it, because at a
-    coarse pitch every array has some (`RankTest`).
-
-    Parameters
-    ----------
-    array
-        Candidate.
-    pitch_mm, sensor_half_mm, symbol_half_mm
-        As for `visible_sets`.
-    test
-        Poses and limit.
+    The test of a fold, and of a polynomial on a fold; measures as for `visible_sets`.
     """
-    sets = visible_sets(pitch_mm, sensor_half_mm, symbol_half_mm, test.poses)
-    return rival_shares(array, sets).short <= test.most_short
+    sets = visible_sets(pitch_mm, sensor_half_mm, symbol_half_mm, RANK_POSES)
+    return rival_shares(array, sets).short <= MOST_SHORT
 
 
-def reduced_rows(gf: Field, matrices: Labels) -> tuple[Labels, NDArray[np.bool_]]:
-    """Return many reduced row echelon forms over GF(q), rows unsorted.
+def _reduced_rows(gf: Field, matrices: Labels) -> tuple[Labels, NDArray[np.bool_]]:
+    """Return reduced row echelon forms (B, n, k) over GF(q), and which rows (B, n) have a pivot.
 
-    Parameters
-    ----------
-    gf
-        GF(q).
-    matrices
-        (B, n, k) labels.
-
-    Returns
-    -------
-    rows : (B, n, k)
-        Reduced; every pivot is 1 and alone in its column.
-    used : (B, n) bool
-        Rows that have a pivot; the others are 0.
+    Rows are unsorted; every pivot is 1 and alone in its column, rows without one are 0.
     """
     rows = matrices.astype(np.int64)
     used = np.zeros(rows.shape[:2], dtype=bool)
@@ -165,21 +119,9 @@ def reduced_rows(gf: Field, matrices: Labels) -> tuple[Labels, NDArray[np.bool_]
     return rows, used
 
 
-def light_words(gf: Field, matrices: Labels) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the rank of each generator and its words of weight 0, 1 and 2.
-
-    Parameters
-    ----------
-    gf, matrices
-        As for `reduced_rows`.
-
-    Returns
-    -------
-    rank : (B,)
-    words : (B, 3)
-        Number of words of that weight.
-    """
-    rows, used = reduced_rows(gf, matrices)
+def _light_words(gf: Field, matrices: Labels) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rank (B,) of generators (B, n, k), and how many words (B, 3) weigh 0, 1 and 2."""
+    rows, used = _reduced_rows(gf, matrices)
     weight = (rows != 0).sum(axis=2) - 1  # outside the pivot
     alone = ((weight == 0) & used).sum(axis=1)
     lead = np.take_along_axis(rows, _second(rows)[:, :, None], axis=2)

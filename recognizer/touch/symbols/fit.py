@@ -198,11 +198,11 @@ def _cross_gains(image: Image, found: Lattices, gains: int) -> Lattices:
 
 
 def _search_under(image: Image, bank: Bank, gain: Array) -> LatticeScores:
-    felt = normalize_image(image, gain[None])
-    response, bare = np.expm1(felt.psi[0] * math.log(1 + PSI)) / PSI, felt.bare[0]
+    measured = normalize_image(image, gain[None])
+    response, bare = np.expm1(measured.psi[0] * math.log(1 + PSI)) / PSI, measured.bare[0]
     rest = np.maximum(1.0 - bare, LEAST_REST)
     seen = psi(np.maximum(response - bare, 0.0) / rest)
-    weights = (felt.press[0] * rest) ** 2 * felt.trust
+    weights = (measured.press[0] * rest) ** 2 * measured.trust
     return score_lattices(
         bank,
         seen.reshape(bank.shape).astype(np.float32),

@@ -57,17 +57,17 @@ def linearize_image(
 
     `pose` (b, 7), `gain` (b, 4); `precision` (11,) of the prior, that of the image if not given.
     """
-    felt, labels, values = project_symbols(image, pose, gain, labels_at)
+    measured, labels, values = project_symbols(image, pose, gain, labels_at)
     if precision is None:
         precision = prior_precision(image)
     known = prior_departure(image, pose, gain)
-    value = _log_likelihood(felt, labels, values)
-    value += felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
+    value = _log_likelihood(measured, labels, values)
+    value += measured.measure + (measured.trust * np.log(measured.press)).sum(axis=1)
     value -= 0.5 * (known**2 * precision).sum(axis=1)
-    jacobian, force = force_jacobian(image, pose, gain, values, felt)
-    width = _width(values, felt)
+    jacobian, force = force_jacobian(image, pose, gain, values, measured)
+    width = _width(values, measured)
     left = image.forces - force
-    sure = np.where(np.abs(left / width) < FAR, felt.trust, 0.0) / width**2
+    sure = np.where(np.abs(left / width) < FAR, measured.trust, 0.0) / width**2
     return LinearizedImage(value, jacobian, left, sure, known, precision)
 
 
@@ -89,15 +89,15 @@ def prior_precision(image: Image) -> Array:
     return precision
 
 
-def _width(values: Array, felt: NormalizedImage) -> Array:
+def _width(values: Array, measured: NormalizedImage) -> Array:
     """Return the standard deviation (b, n) of forces, from that of psi."""
-    unit = FIRST_NOISE / felt.press
-    relative = unit * psi_deviation(felt, values[:, :, None], unit)[..., 0]
-    return np.asarray(relative * response_by_psi(response_of(values[..., 0])) * felt.plateau)
+    unit = FIRST_NOISE / measured.press
+    relative = unit * psi_deviation(measured, values[:, :, None], unit)[..., 0]
+    return np.asarray(relative * response_by_psi(response_of(values[..., 0])) * measured.plateau)
 
 
 def force_jacobian(
-    image: Image, pose: Array, gain: Array, values: Array, felt: NormalizedImage
+    image: Image, pose: Array, gain: Array, values: Array, measured: NormalizedImage
 ) -> tuple[Array, Array]:
     """Return the derivatives (b, n, 11) of the forces by pose and gain, and the forces (b, n)."""
     pressing, basis = image.pressing, image.plane
@@ -109,14 +109,14 @@ def force_jacobian(
     free = np.moveaxis(values[..., 3:], -1, 0)
     by_pose = np.stack([slope_x, slope_y, turn, *free, scale], axis=-1)
     total = response_of(values[..., 0])
-    by_pose = by_pose * (response_by_psi(total) * felt.plateau)[..., None]
-    symbol = np.clip((total - felt.bare) / np.maximum(1 - felt.bare, 1e-3), 0.0, 1.5)
+    by_pose = by_pose * (response_by_psi(total) * measured.plateau)[..., None]
+    symbol = np.clip((total - measured.bare) / np.maximum(1 - measured.bare, 1e-3), 0.0, 1.5)
     # beyond the edge of the face there is none
     rest = np.where(values[..., 0] > GRAZED, 1 - symbol, 0.0)
     unit = np.exp(gain[:, :1])
-    lower = felt.depth - pressing.symbol
-    force = unit * (symbol * felt.plain + rest * felt.lower)
-    slope = unit * (symbol * pressing.slope(felt.depth) + rest * pressing.slope(lower))
+    lower = measured.depth - pressing.symbol
+    force = unit * (symbol * measured.plain + rest * measured.lower)
+    slope = unit * (symbol * pressing.slope(measured.depth) + rest * pressing.slope(lower))
     by_gain = np.concatenate([force[..., None], slope[..., None] * basis], axis=-1)
     return np.concatenate([by_pose, by_gain], axis=-1), force
 
@@ -128,21 +128,21 @@ def project_symbols(
 
     Psi and slopes (b, n, 6) are those of the bare face where there is no symbol.
     """
-    felt = normalize_image(image, gain)
+    measured = normalize_image(image, gain)
     cells, offsets = _cells_under(image, pose)
     labels = labels_at(cells)
-    tables = _fit_form(image.template.of(offsets, labels.clip(min=0)), pose, felt)
-    return felt, labels, _with_bare_face(felt, labels, tables[:, :, 0].astype(np.float64))
+    tables = _fit_form(image.template.of(offsets, labels.clip(min=0)), pose, measured)
+    return measured, labels, _with_bare_face(measured, labels, tables[:, :, 0].astype(np.float64))
 
 
-def _with_bare_face(felt: NormalizedImage, labels: Ints, found: Array) -> Array:
+def _with_bare_face(measured: NormalizedImage, labels: Ints, found: Array) -> Array:
     """Return psi and slopes (b, n, 6), of the bare face where there is no symbol.
 
     Beyond the edge of a face nothing presses: a tactel without a symbol shows the nearer of both.
     """
     found[labels < 0] = 0.0
-    floor = psi(felt.bare)
-    bare = (labels < 0) & (felt.psi > floor / 2)
+    floor = psi(measured.bare)
+    bare = (labels < 0) & (measured.psi > floor / 2)
     found[bare, 0] = floor[bare]
     return np.asarray(found)
 
@@ -168,14 +168,14 @@ def _cells_under(image: Image, pose: Array) -> tuple[Ints, Array]:
     return cells.astype(np.int64), u - (cells + 0.5) * pitch
 
 
-def _fit_form(tables: Floats, pose: Array, felt: NormalizedImage) -> Floats:
+def _fit_form(tables: Floats, pose: Array, measured: NormalizedImage) -> Floats:
     """Return templates (b, n, q, 6) under form and gain; they may be changed."""
     for slope, by in enumerate(pose[:, 3:6, None, None].astype(np.float32).swapaxes(0, 1), 3):
         tables[..., 0] += tables[..., slope] * by
-    if (felt.contact < 1).any():
-        tables *= felt.contact[..., None, None].astype(np.float32)
-    if felt.bare.any():
-        bare = felt.bare[..., None].astype(np.float32)
+    if (measured.contact < 1).any():
+        tables *= measured.contact[..., None, None].astype(np.float32)
+    if measured.bare.any():
+        bare = measured.bare[..., None].astype(np.float32)
         response = response_of(tables[..., 0]).astype(np.float32)
         total = response + (1 - response) * bare
         by = (1 - bare) * (1 + 3 * response) / (1 + 3 * total)
@@ -184,46 +184,48 @@ def _fit_form(tables: Floats, pose: Array, felt: NormalizedImage) -> Floats:
     return tables
 
 
-def psi_deviation(felt: NormalizedImage, tables: Floats | Array, unit: Array) -> Floats:
+def psi_deviation(measured: NormalizedImage, tables: Floats | Array, unit: Array) -> Floats:
     """Return the spread (b, n, q) of psi around templates (b, n, q, 6), in units (b, n)."""
     value, x, y = tables[..., 0], tables[..., 1], tables[..., 2]
     square = QUIET**2 + value * value + DISPLACED_MM**2 * (x * x + y * y)
-    return np.asarray(np.sqrt(square + _readings_share(felt, value, unit)), np.float32)
+    return np.asarray(np.sqrt(square + _readings_share(measured, value, unit)), np.float32)
 
 
-def _readings_share(felt: NormalizedImage, value: Array | Floats, unit: Array) -> Array | float:
+def _readings_share(measured: NormalizedImage, value: Array | Floats, unit: Array) -> Array | float:
     """Return the share of the noise of readings in the square (b, n, q) of a spread."""
-    if felt.faint.max(initial=0.0) < LOUD:
+    if measured.faint.max(initial=0.0) < LOUD:
         return 0.0
-    return (reading_deviation(felt, value) / unit[..., None]) ** 2
+    return (reading_deviation(measured, value) / unit[..., None]) ** 2
 
 
-def reading_deviation(felt: NormalizedImage, value: Array | Floats) -> Array:
+def reading_deviation(measured: NormalizedImage, value: Array | Floats) -> Array:
     """Return the standard deviation of psi (b, n, q) by the noise of readings."""
     by_response = PSI / math.log1p(PSI) * np.exp(-math.log1p(PSI) * value)
-    return np.asarray(by_response * felt.faint[..., None])
+    return np.asarray(by_response * measured.faint[..., None])
 
 
-def _log_likelihood(felt: NormalizedImage, labels: Ints, values: Array) -> Array:
+def _log_likelihood(measured: NormalizedImage, labels: Ints, values: Array) -> Array:
     """Return the log-likelihoods (b,) of given labels (b, n), with their psi and slopes."""
-    unit = FIRST_NOISE / np.maximum(felt.press, 1e-3)
+    unit = FIRST_NOISE / np.maximum(measured.press, 1e-3)
     symbol = values[:, :, None].astype(np.float32)
-    own = log_densities(felt, symbol[..., 0], psi_deviation(felt, symbol, unit), unit)[..., 0]
-    return np.asarray(np.where(labels < 0, log_densities_of_none(felt, unit), own).sum(axis=1))
+    own = log_densities(measured, symbol[..., 0], psi_deviation(measured, symbol, unit), unit)[
+        ..., 0
+    ]
+    return np.asarray(np.where(labels < 0, log_densities_of_none(measured, unit), own).sum(axis=1))
 
 
-def log_densities_of_none(felt: NormalizedImage, unit: Array) -> Array:
+def log_densities_of_none(measured: NormalizedImage, unit: Array) -> Array:
     """Return the log-likelihood (b, n) of no symbol: beyond the edge of the face, or on it."""
-    floor = psi(felt.bare)
+    floor = psi(measured.bare)
     bare = np.stack([np.zeros_like(floor), floor], axis=-1)
-    width = np.sqrt(QUIET**2 + bare**2 + _readings_share(felt, bare, unit))
-    return np.asarray(log_densities(felt, bare, width, unit).max(axis=-1))
+    width = np.sqrt(QUIET**2 + bare**2 + _readings_share(measured, bare, unit))
+    return np.asarray(log_densities(measured, bare, width, unit).max(axis=-1))
 
 
 def log_densities(
-    felt: NormalizedImage, values: Array | Floats, widths: Array | Floats, unit: Array
+    measured: NormalizedImage, values: Array | Floats, widths: Array | Floats, unit: Array
 ) -> Array:
     """Return log-likelihoods (b, n, q) of values, each with its width in units of the noise."""
-    away = (felt.psi[..., None] - values) / (unit[..., None] * widths)
+    away = (measured.psi[..., None] - values) / (unit[..., None] * widths)
     each = -np.minimum(0.5 * away * away, MOST_NATS) - np.log(widths)
-    return np.asarray(felt.trust[:, None] * each, np.float64)
+    return np.asarray(measured.trust[:, None] * each, np.float64)

@@ -204,11 +204,11 @@ def fit_steps(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> _F
 def _linearize(
     image: Image, pose: Array, gain: Array, more: Array, labels_at: LabelsAt
 ) -> _Linearized:
-    felt, _, values = project_symbols(image, pose[None], gain[None], labels_at)
+    measured, _, values = project_symbols(image, pose[None], gain[None], labels_at)
     jacobian, force = (
-        one[0] for one in force_jacobian(image, pose[None], gain[None], values, felt)
+        one[0] for one in force_jacobian(image, pose[None], gain[None], values, measured)
     )
-    value, plateau, press = values[0], felt.plateau[0], felt.press[0]
+    value, plateau, press = values[0], measured.plateau[0], measured.press[0]
     unit = response_by_psi(response_of(value[:, 0])) * plateau / press
     columns = np.ones((len(force), 3))
     columns[:, 1:2], columns[:, 2:] = second_differences(force[:, None], image.shape)

@@ -90,8 +90,8 @@ def _opposite_pairs(responses: Floats) -> tuple[NDArray[np.int32], Floats, Float
     )
     number = np.arange(len(flat), dtype=np.int32)
     across = number.reshape(2, -1)[:, ::-1].ravel()
-    felt = np.maximum(np.abs(flat), np.abs(opposite)).max(axis=1) > NOTHING  # not in the corners
-    one = number[felt & (number <= across)]
+    held = np.maximum(np.abs(flat), np.abs(opposite)).max(axis=1) > NOTHING  # not in the corners
+    one = number[held & (number <= across)]
     taps = np.stack([one, across[one]])
     even, odd = (
         np.float32(0.5) * part for part in (flat[one] + opposite[one], flat[one] - opposite[one])

@@ -94,12 +94,12 @@ def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> R
     """Return the template of an alphabet, as embossed and on a sensor."""
     step, (low, high) = STEP_MM, EXPONENTS
     pad = sensor.overlay.kind == "pad"
-    felt = _RESPONSES[sensor.overlay.kind]
+    pressed_response = _RESPONSES[sensor.overlay.kind]
     half = style.pitch_mm / 2 if pad else _reach_mm(alphabet, style, sensor)
     steps = math.ceil(half / step) + (0 if pad else 1)
     axis = np.asarray((np.arange(2 * steps + 1) - steps) * step, np.float64)
     usual, wide = (
-        felt(alphabet, replace(style, stroke_mm=style.stroke_mm + by), sensor, axis)
+        pressed_response(alphabet, replace(style, stroke_mm=style.stroke_mm + by), sensor, axis)
         for by in (0.0, STROKE_UNIT_MM)
     )
     rimmed = np.zeros((len(axis) + 2, len(axis) + 2, alphabet.order, 6), np.float32)
@@ -130,12 +130,12 @@ def _tab_responses(
     reach = alphabet.reach * style.pitch_mm
     tip = _disc(sensor.overlay.tab_diameter_mm / 2, STEP_MM)
 
-    def felt(strokes: Array) -> Array:
+    def pressed_response(strokes: Array) -> Array:
         presence = _presence(_distance(strokes * reach, x, y), style)
         cover = np.clip(_convolved(presence, tip), 0, 1)
         return np.asarray(cover * (1 + BULGE * (1 - cover)))
 
-    return np.stack([felt(np.array(glyph.strokes, float)) for glyph in alphabet.glyphs])
+    return np.stack([pressed_response(np.array(glyph.strokes, float)) for glyph in alphabet.glyphs])
 
 
 def _pad_responses(
@@ -228,10 +228,12 @@ def _gel_responses(
 _RESPONSES = {"tab": _tab_responses, "pad": _pad_responses, "gel": _gel_responses}
 
 
-def _with_cross_talk(felt: Array, share: float, sensor: SensorType, step: float) -> Array:
+def _with_cross_talk(
+    pressed_response: Array, share: float, sensor: SensorType, step: float
+) -> Array:
     """Return responses of tactels with a share of the readings one tactel away, all around."""
-    around = _convolved(felt, _annulus(math.sqrt(math.prod(sensor.step_mm)), step))
-    return np.asarray(np.maximum((1 - share) * felt + share * around, 0.0))
+    around = _convolved(pressed_response, _annulus(math.sqrt(math.prod(sensor.step_mm)), step))
+    return np.asarray(np.maximum((1 - share) * pressed_response + share * around, 0.0))
 
 
 def _convolved(values: Array, weights: Array) -> Array:

@@ -285,6 +285,11 @@ def test_the_first_edge_comes_first_then_the_longest_and_twelve_at_most():
     assert found[2:] == pytest.approx(longest[:10])
 
 
+def test_directions_that_mirror_each_other_are_two():
+    roof = edge_rotations([region([(0, 0), (60, 0), (30, 30 * 3**0.5)])])
+    assert np.sort(roof) == pytest.approx(np.pi / 6 * np.array([-1, 0, 1]), abs=1e-9)
+
+
 def test_directions_that_differ_by_less_than_rounding_are_one():
     for apart, count in ((0.0, 1), (2e-10, 1), (1e-7, 2)):
         loop = [(0, 0), (50, 0), (50 + 0.0, 40), (0, 40 + 50 * apart)]

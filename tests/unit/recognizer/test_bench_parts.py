@@ -1,22 +1,27 @@
-"""The bench without a server: files, watch, images, messages, board, time line, calibration."""
+"""The bench without a server: files, watch, images, messages, board, time line, pictures."""
 
 from __future__ import annotations
 
 import asyncio
 import hashlib
 import json
+import re
 import struct
 import time
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from hostile_recordings import write_zeros
 
 from encoded_objects.base.sensor_type import SensorType
+from generator.database.open import open_database
+from generator.database.read import read_object
 from generator.database.registered import RegisteredPart
+from generator.database.transaction import read_transaction
 from probe.calibration.guide import LONGEST
 from probe.errors import RecordingError
 from probe.frame import frame_from
@@ -35,6 +40,7 @@ from recognizer.bench.files import (
     part_to_send,
 )
 from recognizer.bench.frames import FrameHandler, page_guide
+from recognizer.bench.lab_json import drawn_faces, face_sheets, object_svg, symbol_poses
 from recognizer.bench.message import FILTERS, filter_image, mosaic_message
 from recognizer.bench.reading import (
     AGAIN_S,
@@ -479,6 +485,66 @@ def test_a_probe_that_nobody_wants_is_let_go_and_comes_back():
         assert feed.as_json()["state"] == "live"
     finally:
         feed.close()
+
+
+# -- pictures of objects, and the sheets and symbols that these are drawn of
+
+SHAPES = {"Cube": "{cube: 30 mm}", "Can": "{cylinder: {diameter: 40 mm, height: 30 mm}}"}
+
+
+@pytest.fixture(scope="module")
+def held(make_lab):
+    """Registered objects by their names."""
+    folder = make_lab(*(f"name: {name}\nshape: {shape}\n" for name, shape in SHAPES.items()))
+    with read_transaction(open_database(f"{folder}/lab.db", writable=False)) as connection:
+        return {name: read_object(connection, name) for name in SHAPES}
+
+
+def polygons(svg):
+    """Return the polygons of a picture, and how many dots it has."""
+    root = ElementTree.fromstring(svg)
+    paths = [one.get("d") for one in root]
+    flat = [np.array(re.findall(r"-?[\d.]+", d), float) for d in paths if d.endswith("z")]
+    return flat, sum(d.count("h0") for d in paths if d.endswith("h0"))
+
+
+def test_a_cube_shows_three_faces_and_their_symbols_alone(held):
+    flat, dots = polygons(object_svg(held["Cube"]))
+    assert [len(one) for one in flat] == [8, 8, 8]
+    towards = [
+        len(layout.labels)
+        for face, layout in zip(held["Cube"].faces, held["Cube"].layout.faces, strict=True)
+        if face.T_object_face[:3, 2] @ (0.55, -1.0, 0.6) > 0
+    ]
+    assert (len(towards), dots) == (3, sum(towards))
+
+
+def test_a_round_face_is_drawn_in_its_facets_within_the_picture(held):
+    svg = object_svg(held["Can"])
+    flat, dots = polygons(svg)
+    assert len(flat) > 20
+    assert dots > 10
+    x, y, w, h = map(float, re.search('viewBox="([^"]*)"', svg).group(1).split())
+    points = np.concatenate([one.reshape(-1, 2) for one in flat])
+    assert (points >= [x, y]).all()
+    assert (points <= [x + w, y + h]).all()
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_sheets_close_a_surface_and_symbols_stand_on_it(held, name):
+    area = 0.0
+    for number in drawn_faces(held[name]):
+        face = held[name].faces[number]
+        centres = held[name].layout.faces[number].centres_mm
+        poses = symbol_poses(face, centres)
+        normals = poses[:, :3, 2]
+        assert np.allclose(np.linalg.norm(normals, axis=1), 1.0)
+        for loops in face_sheets(face):
+            outer = loops[0]
+            cross = np.cross(outer - outer[0], np.roll(outer, -1, axis=0) - outer[0]).sum(axis=0)
+            area += np.linalg.norm(cross) / 2
+    wanted = 6 * 30**2 if name == "Cube" else np.pi * 40 * 30 + 2 * np.pi * 20**2
+    assert area == pytest.approx(wanted, rel=5e-3)
 
 
 # -- the page's files

@@ -117,7 +117,7 @@ def test_the_place_of_a_clear_touch_is_found_with_its_likelihood(small, cells, p
         assert [one.score for one in found] == sorted((one.score for one in found), reverse=True)
 
 
-@pytest.mark.parametrize("cells", [SQUARE, APART])
+@pytest.mark.parametrize("cells", [SQUARE, APART, [(i + 3, j) for i, j in SQUARE]])
 @pytest.mark.parametrize("size", [(2**32 - 5, 2**30), (2**29 + 5, 2**31), (2**31, 2**29 + 5)])
 def test_places_of_arrays_too_large_to_name_them_by_one_number(small, cells, size):
     rows, columns = size
@@ -127,7 +127,8 @@ def test_places_of_arrays_too_large_to_name_them_by_one_number(small, cells, siz
         for own in [(int(r > 0), (r * r + 3 * c + r * c) % 4)]
     }
     lab = small.Lab(held, rows, columns)
-    for place in ((1, columns - 2, 0), (rows - 2, 1, 0), (5, 0, 1)):
+    for row, column, face in ((1, columns - 2, 0), (rows - 2, 1, 0), (5, 0, 1)):
+        place = (row, (column - cells[0][0]) % columns, face)
         fit = soft(lab, place, cells, small, seed=3, spread=0.5)
         found = find_hypotheses(lab.embossed, (fit,), ALL)
         places = where(found)
