@@ -13,20 +13,3 @@
     dataset      touches with their truth, for training;  printing  printed surfaces
     pipeline     all of it in order: `validate`;  command  validate-set
 """
-
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from recognizer.validation.pipeline import ValidationResult, validate
-
-__all__ = ["ValidationResult", "validate"]
-
-
-def __getattr__(name: str) -> Any:
-    if name in __all__:  # numpy and the simulation load when they are used
-        from recognizer.validation import pipeline
-
-        return getattr(pipeline, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -104,12 +104,11 @@ def _worlds(rows: Columns, campaign: Mapping[str, Any]) -> Iterator[tuple[dict[s
     """
     engine, surface = campaign["engine"], surface_name(campaign)
     registered = rows["object"] != ""
-    names = ("engine", "surface", "sensor", "registered")
     for level in names_in(rows["level"][registered], campaign["levels"]):
-        world = dict(zip(names, (engine, surface, level, True), strict=True))
+        world = {"engine": engine, "surface": surface, "sensor": level, "registered": True}
         yield world, registered & (rows["level"] == level)
     for kind in names_in(rows["kind"][~registered], campaign["kinds"]):
-        world = dict(zip(names, (engine, kind, ALL, False), strict=True))
+        world = {"engine": engine, "surface": kind, "sensor": ALL, "registered": False}
         yield world, ~registered & (rows["kind"] == kind)
 
 

@@ -222,11 +222,9 @@ def judge(
 def find_face(lab: Lab, object_name: str, face: str) -> tuple[EncodedFace, int] | None:
     """Return a face of the lab, and the cells of its array's window; None if it is foreign."""
     for encoding in lab.arrays:
-        for object_id, name in encoding.names.items():
-            if name != object_name:
-                continue
-            for number in np.flatnonzero(encoding.faces[:, 0] == object_id).tolist():
-                held = encoding.face(number)
-                if held.face == face:
-                    return held, encoding.array.window[0] * encoding.array.window[1]
+        ids = [number for number, name in encoding.names.items() if name == object_name]
+        for number in np.flatnonzero(np.isin(encoding.faces[:, 0], ids)).tolist():
+            held = encoding.face(number)
+            if held.face == face:
+                return held, encoding.array.window[0] * encoding.array.window[1]
     return None

@@ -98,26 +98,6 @@ def test_a_recording_that_is_ended_by_a_signal_is_complete(tmp_path, number):
     assert not part.exists()
 
 
-def test_a_recording_killed_by_signal_9_is_repaired(asked, tmp_path):
-    out, part = tmp_path / "a.h5", tmp_path / "a.part.h5"
-    with started("record", "sim:?rate=400", "-o", out) as process:
-        wait_for(lambda: held_in(part))
-        code, _, err = asked("repair", out)
-        assert code == 2
-        assert "still being written" in err
-        process.kill()
-    assert not out.exists()
-    code, text, _ = asked("info", out, "--json")
-    left = json.loads(text)["frames"]
-    assert code == 0
-    code, text, _ = asked("repair", out, "--json")
-    told = json.loads(text)
-    assert (code, told["changed"], told["lost"]) == (0, True, 0)
-    frames = list(Recording(out).frames())
-    assert len(frames) == told["frames"] == left >= 64
-    assert [f.seq for f in frames] == list(range(len(frames)))
-
-
 class Terminal:
     """A command on a terminal of its own."""
 

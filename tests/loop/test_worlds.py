@@ -3,10 +3,11 @@
 from types import SimpleNamespace
 
 from generator.command import run as encode_object
-from recognizer.validation import encoded_set, validate
+from recognizer.validation import encoded_set
 from recognizer.validation.campaign import Campaign, series_of
 from recognizer.validation.encoded_set import is_extra
 from recognizer.validation.files import columns_of, read_series
+from recognizer.validation.pipeline import validate
 
 KINDS = ("copy", "near", "small", "side", "same_profile")
 SET = """objects:

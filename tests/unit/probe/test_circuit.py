@@ -132,12 +132,11 @@ def scenes(decades):
     rng = np.random.default_rng(decades)
     x = np.arange(16) - 7.5
     radius = np.hypot(x, x[:, None])
-    low = 10.0**-decades
-    hidden = np.full((16, 16), low)
+    hidden = np.full((16, 16), 10.0**-decades)
     hidden[[2, 2, 9], [2, 9, 2]] = 1
     return {
         "even in decades": 10 ** rng.uniform(-decades, 0, (16, 16)),
-        "washer": np.where((radius > 2.2) & (radius < 4.8), 1.0, low),
+        "washer": np.where((radius > 2.2) & (radius < 4.8), 1.0, 10.0**-decades),
         "hidden corner": hidden,
     }
 
@@ -207,7 +206,7 @@ def read(electronics, forces, fsr=None, seed=0):
 
 
 def test_each_ideal_readout_by_its_formula():
-    forces = pressed()
+    forces = pressed(most=3.0)
     g, _ = conductances(fsr_of(), forces)
     through = 2200 / (2200 + effective_resistances(g))
     ideal = {
@@ -218,14 +217,7 @@ def test_each_ideal_readout_by_its_formula():
     for readout, share in ideal.items():
         expected = np.clip(np.rint(share * 1023), 0, 1023)
         np.testing.assert_array_equal(read(replace(IDEAL, readout=readout), forces), expected)
-
-
-def test_counts_rise_with_force_and_stop_at_full_scale():
-    virtual = replace(IDEAL, readout="virtual")
-    counts = [int(read(virtual, np.full((16, 16), f))[3, 3]) for f in (0, 0.1, 0.5, 1, 3, 50)]
-    assert counts == sorted(counts)
-    assert counts[0] == 0
-    assert counts[-1] == 1023
+    assert (expected == 1023).any()
 
 
 def test_the_tactel_before_is_seen_as_much_as_the_settling_leaves():
@@ -307,12 +299,6 @@ def test_boards_that_are_none():
 READOUTS = ["floating", "grounded", "virtual"]
 
 
-def washer(decades):
-    x = np.arange(16) - 7.5
-    radius = np.hypot(x, x[:, None])
-    return np.where((radius > 2.2) & (radius < 4.8), 1.0, 10.0**-decades)
-
-
 def few(number, seed, contrast=1e3):
     rng = np.random.default_rng(seed)
     g = np.full(256, 1 / contrast)
@@ -340,7 +326,7 @@ def digitised(g, e, seed):
 
 @pytest.mark.parametrize("decades", [0, 2, 4, 6])
 def test_floating_rows_over_six_decades(decades):
-    for g in (washer(decades), 10 ** np.random.default_rng(1).uniform(-decades, 0, (16, 16))):
+    for g in scenes(decades).values():
         for scale in (1.0, 1e-9):
             found = solve_floating(effective_resistances(scale * g))
             assert np.abs(found.conductance_s / (scale * g) - 1).max() <= 1e-8

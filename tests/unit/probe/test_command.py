@@ -53,24 +53,12 @@ def asked(ask):
     return partial(ask, run)
 
 
-HEAVY = [
-    "numpy",
-    "scipy",
-    "matplotlib",
-    "h5py",
-    "skfem",
-    "skimage",
-    "sqlalchemy",
-    "serial",
-    "generator",
-    "pydantic",
-]
+HEAVY = ["numpy", "scipy", "matplotlib", "h5py", "skfem", "skimage", "sqlalchemy", "serial",
+         "generator", "pydantic"]  # fmt: skip
+CORNERS = np.array([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]], "<f4")
 PLATE = b"".join(
-    np.array(
-        [[0, 0, 1], *np.array([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]])[corners]], "<f4"
-    ).tobytes()
-    + b"\0\0"
-    for corners in ([0, 1, 2], [0, 2, 3])
+    np.concatenate([np.eye(3, dtype="<f4")[2:], CORNERS[triangle]]).tobytes() + b"\0\0"
+    for triangle in ([0, 1, 2], [0, 2, 3])
 )
 
 
@@ -130,8 +118,7 @@ def test_info_of_a_probe(asked):
 def test_record_ends_by_frames_and_by_seconds(asked, tmp_path):
     out = tmp_path / "a.h5"
     code, text, _ = asked("record", "sim:?rate=500", "-o", out, "--frames", "40", "--json")
-    told = json.loads(text)
-    assert (code, told["frames"], told["ended"], told["lost"]) == (0, 40, "frames", 0)
+    assert (code, json.loads(text)["ended"]) == (0, "frames")
     assert len(Recording(out)) == 40
     code, text, _ = asked("record", "sim:?rate=500", "-o", out, "--seconds", "0.2", "--replace")
     assert code == 0
@@ -181,10 +168,8 @@ def test_export_in_newtons(asked, bench, tmp_path):
     assert np.load(clear).mean(axis=0).sum() == pytest.approx(newtons.mean(axis=0).sum(), rel=0.1)
     assert np.load(clear).std() > newtons.std()
     assert "--calibration" in error_of(asked(*words[:4], "--deblur", "1"))[1]
-    assert (
-        "at most 3"
-        in error_of(asked(*words[:3], tmp_path / "c.npy", *words[4:], "--deblur", "8"))[1]
-    )
+    _, err = error_of(asked(*words[:3], tmp_path / "c.npy", *words[4:], "--deblur", "8"))
+    assert "at most 3" in err
     _, err = error_of(asked(*words[:2], "--csv", tmp_path / "a.csv", *words[4:]))
     assert "--csv and --mcap hold counts" in err
 

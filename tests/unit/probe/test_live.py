@@ -105,12 +105,3 @@ def test_the_view_fits_terminals_of_any_size(state, height, colours):
     assert "the device went away" in text
     assert KEYS in text
     assert ("\x1b[" in "".join(lines)) or not colours
-
-
-def test_trouble_is_yellow_and_the_sensor_has_a_name(state):
-    state.take(frames_of(flat(3)))
-    text = shown(state, colours=True)
-    assert re.search(r"lost +\x1b\[0m\x1b\[33m3\x1b", text)
-    assert re.search(r"reboots +\x1b\[0m0", text)
-    assert "2 of FSR-uno, 10 bits" in text
-    assert "..." in shown(state, ident=None)

@@ -132,7 +132,7 @@ def test_it_is_silent_until_it_is_started_and_after_it_is_stopped():
 
 
 def test_one_frame_at_a_time():
-    port = SoftwareProbe("sim:", frames(10), IDENT, speed=1)
+    port = SoftwareProbe("sim:", frames(10), IDENT)
     port.write(b"g")
     assert [p.seq for p in packets(port, 3)] == [0]
     port.write(b"gg")
@@ -161,14 +161,8 @@ def test_the_end_is_told_after_the_last_frame():
 
 
 def test_jumps_are_announced():
-    jumping = [
-        frame(0, 0),
-        frame(1, 10**7),
-        frame(5, 5 * 10**7),
-        frame(6, 10**10),
-        frame(2, 10**10),
-    ]
-    port = SoftwareProbe("file:x", iter(jumping), IDENT, speed=0)
+    at_ns = {0: 0, 1: 10**7, 5: 5 * 10**7, 6: 10**10, 2: 10**10}
+    port = SoftwareProbe("file:x", itertools.starmap(frame, at_ns.items()), IDENT, speed=0)
     port.write(b"s")
     seen = [(type(p).__name__[0], p.seq) for p in packets(port)]
     assert seen == [
@@ -227,9 +221,15 @@ def test_images_come_out_of_any_pieces(pieces):
     assert marked.sure
 
 
-def test_a_marker_inside_images_that_stand_still_is_told_by_the_pauses():
+def still_image():
+    """Return an image with the marker in it."""
     image = np.zeros(LENGTH, np.uint8)
     image[100:102], image[200] = (0xAA, 0x55), 7
+    return image
+
+
+def test_a_marker_inside_images_that_stand_still_is_told_by_the_pauses():
+    image = still_image()
     marked, found = MarkedImages(LENGTH), []
     block = MARKER + image.tobytes()
     for part in [block[300:], *[block] * 20]:
@@ -240,9 +240,7 @@ def test_a_marker_inside_images_that_stand_still_is_told_by_the_pauses():
 
 
 def test_without_pauses_nothing_is_guessed():
-    image = np.zeros(LENGTH, np.uint8)
-    image[100:102] = 0xAA, 0x55
-    found, marked = found_in(stream_of(np.tile(image, (50, 1))), 20)
+    found, marked = found_in(stream_of(np.tile(still_image(), (50, 1))), 20)
     assert len(found) == 0
     assert not marked.sure
     assert len(marked._rest) <= 5 * (LENGTH + 2) + 1
@@ -286,12 +284,6 @@ def line_of(images, period_s=0.004, skip=50):
         thread.join(5)
         os.close(slave)
         os.close(master)
-
-
-def still_image():
-    image = np.zeros(LENGTH, np.uint8)
-    image[100:102], image[200] = (0xAA, 0x55), 7
-    return image
 
 
 @pytest.mark.parametrize("images", [images_of(9), still_image()[None]], ids=["changing", "still"])

@@ -93,6 +93,8 @@ def test_flushed_frames_are_read_while_others_are_written(tmp_path):
         for name in (path, tmp_path / "touch.part.h5"):
             with pytest.raises(RecordingError, match=r"still being written; .*live"):
                 Recording(name)
+            with pytest.raises(RecordingError, match="still being written; stop the recording"):
+                repair(name)
             assert len(Recording(name, live=True)) == 64
         recorder.flush()
         assert all(map(same, Recording(path, live=True).frames(), frames(100)))
