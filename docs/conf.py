@@ -34,4 +34,4 @@ napoleon_google_docstring = False
 napoleon_use_rtype = False
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
-suppress_warnings = ["myst.xref_missing"]  # links to files of the repository beside the guide
+suppress_warnings = ["myst.xref_missing"]  # links to files of the repository outside the guide

@@ -58,18 +58,8 @@ def main() -> int:
     port, data, log = free_port(), folder / "data", folder / "log"
     server = None
     try:
-        make = [
-            "-D",
-            data,
-            "-A",
-            "trust",
-            "-U",
-            "postgres",
-            "-E",
-            "UTF8",
-            "--locale=C",
-            "--no-sync",
-        ]
+        make = ["-D", data, "-A", "trust", "-U", "postgres", "-E", "UTF8"]
+        make += ["--locale=C", "--no-sync"]
         done = subprocess.run([binaries / "initdb", *make], capture_output=True, text=True, **user)
         if done.returncode:
             sys.exit(f"initdb failed: {done.stderr}")

@@ -1,7 +1,7 @@
 """A world to touch in: an arm, a compliant wrist, the probe, and encoded objects on a table.
 
-MuJoCo moves the arm, presses the probe through the wrist's springs onto objects whose poses nobody
-told, and says what the tactels feel of the written meshes and how the plate comes to rest on them.
+MuJoCo moves the arm, presses the probe through the wrist's springs onto objects of unknown
+pose, and says what the tactels feel of the written meshes and how the plate comes to rest on them.
 The robot knows its link table, encoders with play and noise, and the wrist's four distances. It
 presses over the table until something is higher than that, reads, goes where `next` says, and tells
 object and pose in its base.
@@ -65,7 +65,7 @@ SEARCH_MM = [(x, y) for x in (0, 28, -28) for y in (0, 28, -28)]
 
 
 @dataclass
-class Told:
+class Trial:
     """What became of one object: answer and truth in the base."""
 
     trial: int
@@ -231,7 +231,7 @@ class Bench:
         return reading.counts
 
     def _rest(self, T_base_face: Array, lean: Rotation, at_mm: Array) -> None:
-        """Let the plate hang as the symbols hold it: tilts, height, and where it was felt."""
+        """Let the plate hang as the symbols hold it: tilts, height, and place."""
         R_base_level = pose(self.data.body("link5"))[:3, :3] @ LEVEL
         out = -(R_base_level.T @ T_base_face[:3, :3] @ lean.as_matrix())[:, 2]  # of the plate
         self.data.joint("ty").qpos[0] = math.atan2(out[0], out[2])
@@ -295,12 +295,12 @@ class Bench:
             at, turn, scan = middle + off, 0.0, Scan(self.reader)
             while read < most + 2:
                 try:
-                    felt = self.touch(at, turn)
+                    pressed = self.touch(at, turn)
                 except PoseError:
                     break
-                if felt is None:
+                if pressed is None:
                     break
-                counts, sensor = felt
+                counts, sensor = pressed
                 read += 1
                 found = scan.add(counts.astype(float), sensor, seq=read)
                 if shown:
@@ -324,22 +324,23 @@ def error_of(T: Array, truth: Array) -> Array:
 
 def compare(
     trial: int, name: str, bench: Bench, found: Any, sensor: SensorPose | None, read: int
-) -> Told:
-    """Return an answer beside the simulator's truth."""
-    told = Told(trial, name, found.object if found else "", read, bench.presses)
+) -> Trial:
+    """Return an answer with the simulator's truth."""
+    result = Trial(trial, name, found.object if found else "", read, bench.presses)
     if not found or sensor is None or found.object not in OBJECTS:
-        return told
+        return result
     placed = object_pose(found, sensor)
     assert placed is not None
     off = error_of(placed.T_robot_object, pose(bench.data.body(ON + found.object)))
     turn = off[3:]
-    told.position_mm, told.turn_deg = np.linalg.norm(off[:3]), math.degrees(np.linalg.norm(turn))
-    told.chi2 = float(off @ np.linalg.solve(placed.covariance, off))
-    told.off, told.covariance = off.tolist(), placed.covariance.tolist()
+    result.position_mm = np.linalg.norm(off[:3])
+    result.turn_deg = math.degrees(np.linalg.norm(turn))
+    result.chi2 = float(off @ np.linalg.solve(placed.covariance, off))
+    result.off, result.covariance = off.tolist(), placed.covariance.tolist()
     flat = [0, 1, 5]
     part = placed.covariance[np.ix_(flat, flat)]
-    told.planar = float(off[flat] @ np.linalg.solve(part, off[flat]))
-    return told
+    result.planar = float(off[flat] @ np.linalg.solve(part, off[flat]))
+    return result
 
 
 class Film:
@@ -357,8 +358,8 @@ class Film:
             options.geomgroup[3] = 0  # not what is hit
             renderer.update_scene(bench.data, "film", options)
             picture = Image.fromarray(renderer.render())
-        felt = (counts / counts.max() * 255).astype(np.uint8)
-        picture.paste(Image.fromarray(felt).resize((128, 128), Image.Resampling.NEAREST), (8, 8))
+        grey = (counts / counts.max() * 255).astype(np.uint8)
+        picture.paste(Image.fromarray(grey).resize((128, 128), Image.Resampling.NEAREST), (8, 8))
         said = f"{found.object}/{found.face}" if found else found.reason
         if not found and found.next is not None:
             said += f"; next: {found.next.dx_mm:.0f}, {found.next.dy_mm:.0f} mm"
@@ -392,9 +393,9 @@ def load(folder: Path) -> tuple[mujoco.MjModel, str]:
     return build(folder), f"sqlite:///{folder / 'bench.db'}"
 
 
-def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Told]:
+def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Trial]:
     """Lay out, search and read; three objects a trial."""
-    (model, lab), told = make(folder), []
+    (model, lab), results = make(folder), []
     for trial in range(trials):
         bench = Bench(model, lab, np.random.default_rng([seed, trial]))
         bench.lay_out()
@@ -402,9 +403,9 @@ def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Told]
             bench.presses = 0
             where = {n: pose(bench.data.body(ON + n))[:2, 3] for n in OBJECTS}
             name = min(where, key=lambda n: abs(math.atan2(where[n][1], where[n][0]) - sector))
-            told.append(compare(trial, name, bench, *bench.find(sector, shown=shown)))
-            print(json.dumps(told[-1].__dict__), flush=True)
-    return told
+            results.append(compare(trial, name, bench, *bench.find(sector, shown=shown)))
+            print(json.dumps(results[-1].__dict__), flush=True)
+    return results
 
 
 if __name__ == "__main__":

@@ -11,8 +11,8 @@ from encoded_objects import Reader, encode, open_lab, simulate
 from probe.recording.imported import import_array
 
 encode({"name": "Cube", "shape": {"cube": "60 mm"}}, database="lab.db", formats=["stl"])
-felt = simulate("lab.db#Cube/F4", x=28, y=31, force=80).counts
-np.save("mine.npy", np.stack([felt, felt]) / 1023)  # here: in volts of the amplifier, say
+counts = simulate("lab.db#Cube/F4", x=28, y=31, force=80).counts
+np.save("mine.npy", np.stack([counts, counts]) / 1023)  # here: in volts of the amplifier, say
 
 recording = import_array(Path("mine.npy"), Path("mine.h5"))  # as counts, for the commands, too
 print(recording)

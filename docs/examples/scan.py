@@ -1,4 +1,4 @@
-"""Where one touch shows too few symbols, touch again beside it: several are one belief."""
+"""Where one touch shows too few symbols, touch again next to it: several are one belief."""
 
 import numpy as np
 

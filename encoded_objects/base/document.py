@@ -181,10 +181,10 @@ def suggest(word: str, known: Iterable[str], otherwise: str) -> str:
 def _suggest_similar(path: Path, kind: DocumentKind) -> str:
     """Return a fix that names similar files of the same folder."""
     try:
-        beside = sorted(entry.name for entry in path.parent.iterdir())
+        siblings = sorted(entry.name for entry in path.parent.iterdir())
     except (OSError, ValueError):
         return f"check the folder '{path.parent}'"
-    near = get_close_matches(path.name, beside, n=3, cutoff=0.6)
+    near = get_close_matches(path.name, siblings, n=3, cutoff=0.6)
     if near:
         return "did you mean " + " or ".join(f"'{path.parent / name}'" for name in near) + "?"
     return kind.first

@@ -42,7 +42,7 @@ def file_exists_error(out: Path) -> EncodedObjectsError:
 
 @contextmanager
 def staged_file(out: Path, *, replace: bool = True) -> Iterator[Path]:
-    """Yield a name beside `out` to write to; it becomes `out` when all went well.
+    """Yield a name next to `out` to write to; it becomes `out` when all went well.
 
     Raises `OSError`, of `out`; without `replace`, `FileExistsError` if `out` has come up meanwhile.
     """

@@ -57,7 +57,7 @@ class Overlay:
     tab_diameter_mm: float = 1.2666  #: half of a cell's area; no meaning for pad and gel
     young_mpa: float = 1.0
     poisson: float = 0.4999
-    membrane_mm: float = 0.0  #: of a gel: way over which its membrane bridges beside a stroke
+    membrane_mm: float = 0.0  #: of a gel: way over which its membrane bridges next to a stroke
     blur_mm: float = 0.0  #: of a gel: standard deviation of what optics and matching blur
 
 

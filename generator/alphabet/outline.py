@@ -58,9 +58,9 @@ def nib_outline(strokes: NDArray[np.float64], width_mm: float) -> list[Lines]:
         normals = np.concatenate([_FLATS, [side, -side]])
         # On the flats, the support is that of the end point; elsewhere that of a nib corner.
         support = np.maximum(_FLATS @ a, _FLATS @ b) + radius
-        beside = (corners @ np.stack([side, -side], axis=1)).max(axis=0)
+        sideways = (corners @ np.stack([side, -side], axis=1)).max(axis=0)
         hulls.append(CrossSection.hull_points(corners))
-        lines.append(np.c_[normals, np.concatenate([support, beside])])
+        lines.append(np.c_[normals, np.concatenate([support, sideways])])
     known = np.concatenate(lines)
     union = CrossSection.batch_boolean(hulls, OpType.Add)
     scale = float(np.abs(strokes).max()) + width_mm
@@ -127,7 +127,7 @@ class Tiers:
     tier; edge i of ring k (corner i to i + 1) has one direction on all tiers, so
     neighbouring tiers join by planar quadrilaterals. With a, b the corners on one tier and
     c, d those after it, the loop (a_i, a_i+1, b_i+1, b_i) has its normal out of the
-    material in both cases: beside an embossed stroke, or into the void of an engraved one.
+    material in both cases: next to an embossed stroke, or into the void of an engraved one.
     The facet in z = 0 is cut by the first tier's rings reversed; inside each hole ring of
     the first tier it goes on (an island of the facet). The last tier's rings, as they are,
     bound the top (or the floor), whose normal is +z in both cases.

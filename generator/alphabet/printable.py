@@ -37,9 +37,9 @@ def gap_inside_mm(tiers: Tiers) -> float:
     i, j = i[facing], j[facing]
     between = middle[j] - middle[i]
     gap = (between * normal[i]).sum(axis=1)
-    beside = np.abs((between * along[i]).sum(axis=1)) - (length[i] + length[j]) / 2
-    gap, beside = gap[gap > 0], np.maximum(beside[gap > 0], 0.0)
-    return float(np.hypot(gap, beside).min(initial=np.inf))
+    apart = np.abs((between * along[i]).sum(axis=1)) - (length[i] + length[j]) / 2
+    gap, apart = gap[gap > 0], np.maximum(apart[gap > 0], 0.0)
+    return float(np.hypot(gap, apart).min(initial=np.inf))
 
 
 def gap_between_mm(alphabet: Alphabet, style: SymbolStyle) -> float:

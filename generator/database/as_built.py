@@ -27,9 +27,9 @@ class AsBuilt:
     part: str | None  #: one part of the object; None: all of it
     printer: str
     material: str
-    scale_x: float  #: felt length / drawn length
+    scale_x: float  #: measured length / drawn length
     scale_y: float
-    skew_rad: float  #: by which x and y are felt off a right angle
+    skew_rad: float  #: by which x and y are off a right angle
     stroke_mm: float  #: width of the strokes of symbols
     covariance: NDArray[np.float64]  #: (4, 4) of (scale_x, scale_y, skew_rad, stroke_mm)
     touches: int  #: on which it rests

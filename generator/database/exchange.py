@@ -55,21 +55,21 @@ def export_objects(
     if not file.parent.is_dir():
         fix = f"make it with: mkdir -p {file.parent}"
         raise DatabaseError(f"folder {file.parent} does not exist", fix=fix, place=str(file))
-    beside = file.with_name(f".{file.name}.{os.getpid()}")
+    partial = file.with_name(f".{file.name}.{os.getpid()}")
     try:
-        made = open_database(str(beside))
+        made = open_database(str(partial))
         homes = (engine.url, normal_url(str(file)))
         with read_transaction(engine) as source, write_transaction(made) as target:
             carried = copy_objects(source, target, names=names, homes=homes)
         if force:
-            beside.replace(file)
+            partial.replace(file)
         else:
-            os.link(beside, file)  # fails, unlike a rename, if the file has come up meanwhile
+            os.link(partial, file)  # fails, unlike a rename, if the file has come up meanwhile
     except OSError as error:
         fix = "choose a folder that may be written"
         raise DatabaseError(f"cannot write: {error.strerror}", fix=fix, place=str(file)) from error
     finally:
-        beside.unlink(missing_ok=True)
+        partial.unlink(missing_ok=True)
     return carried
 
 

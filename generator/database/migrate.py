@@ -1,7 +1,7 @@
 """Bring a database of an earlier schema version to this one: whole, or not at all.
 
 A new version is `migrations/vN.py`; all versions in between are one transaction, so that a killed
-migration leaves the database as it was. A SQLite file is copied first (`lab.v1.db` beside
+migration leaves the database as it was. A SQLite file is copied first (`lab.v1.db` next to
 `lab.db`); of a server's database the copies are its administrator's.
 """
 

@@ -158,7 +158,7 @@ def _sqlite_engine(url: URL, path: Path, writable: bool, wait_s: float) -> Engin
 
 
 def _check_writable(path: Path) -> None:
-    # The journal stands beside the file, so the folder must be writable too.
+    # The journal stands next to the file, so the folder must be writable too.
     for need in (path, path.parent) if path.exists() else (path.parent,):
         if not os.access(need, os.W_OK, effective_ids=os.access in os.supports_effective_ids):
             fix = "allow writing there, or choose another database with --database"
@@ -283,7 +283,7 @@ def _schema_version(connection: Connection) -> int | None:
     url = connection.engine.url
     names = set(inspect(connection).get_table_names())
     ours = names & set(metadata.tables)
-    # On a server other programs may have tables beside ours; a file belongs to one program.
+    # On a server other programs may have tables next to ours; a file belongs to one program.
     if not ours and (not names or url.get_backend_name() != "sqlite"):
         return None
     stored: dict[str, str] = {}

@@ -133,7 +133,7 @@ def require_in_use(connection: Connection, known: ObjectEntry) -> None:
 
 
 def record_parts(connection: Connection, object_id: int, written: Sequence[RegisteredPart]) -> None:
-    """Note the files of an object; a part of the same name and format is written anew."""
+    """Note the files of an object; a part of the same name and format replaces the one before."""
     parts = tables.parts.c
     for part in written:
         connection.execute(

@@ -113,12 +113,12 @@ class RoundFace:
         inward = -1.0 if not self.surface.concave else 1.0
         if alpha == 0.0:
             up = (high - low) / np.hypot(*(high - low))
-            beside = float((np.array([x, y]) - low) @ (up[1], -up[0]))
+            across = float((np.array([x, y]) - low) @ (up[1], -up[0]))
             back = np.eye(4)
-            back[:2, 3] = -beside * up[1], beside * up[0]
+            back[:2, 3] = -across * up[1], across * up[0]
             axis = T[:3, :2] @ up
             centre = T[:3, :2] @ low + T[:3, 3] + inward * self.surface.radius_mm * T[:3, 2]
-            turn = -inward * beside / self.surface.radius_mm
+            turn = -inward * across / self.surface.radius_mm
             return np.asarray(_rotation_about(centre, axis, turn) @ T @ back)
         tip = self._tip()
         middle, away = (low + high) / 2.0 - tip, np.array([x, y]) - tip

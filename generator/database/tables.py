@@ -305,9 +305,9 @@ as_built = Table(
     Column("object_id", ForeignKey("objects.object_id", ondelete="CASCADE"), index=True),
     Column("part", Text),  #: name in `parts`
     *required(Text, "printer", "material"),
-    Column("scale_x", REAL, nullable=False),  #: felt length / drawn length
+    Column("scale_x", REAL, nullable=False),  #: measured length / drawn length
     Column("scale_y", REAL, nullable=False),
-    Column("skew_rad", REAL, nullable=False),  #: by which x and y are felt off a right angle
+    Column("skew_rad", REAL, nullable=False),  #: by which x and y are off a right angle
     Column("stroke_mm", REAL, nullable=False),
     Column("covariance", Text, nullable=False),  #: JSON, 4 rows of 4, in the order above
     Column("touches", Integer, nullable=False),  #: on which it rests

@@ -103,8 +103,8 @@ class Staging:
                         sha256.update(piece)
                 file.flush()
                 os.fsync(file.fileno())
-        told = sha256.hexdigest() if digest else ""
-        self.written.append(StagedFile(final, self._hidden / name, size, told))
+        checksum = sha256.hexdigest() if digest else ""
+        self.written.append(StagedFile(final, self._hidden / name, size, checksum))
         return self.written[-1]
 
     def commit(self) -> tuple[StagedFile, ...]:

@@ -35,10 +35,10 @@ def covered_parts(
     start = np.cumsum([0] + [sum(map(len, face.loops)) for face in polyhedron.faces])[:-1]
     corner = np.concatenate([loop for face in polyhedron.faces for loop in face.loops])
     normals = np.array([face_normal(polyhedron, k) for k in range(len(polyhedron.faces))])
-    beside: dict[int, set[int]] = defaultdict(set)
+    neighbours: dict[int, set[int]] = defaultdict(set)
     for edge in polyhedron.edges:
-        beside[edge.left].add(edge.right)
-        beside[edge.right].add(edge.left)
+        neighbours[edge.left].add(edge.right)
+        neighbours[edge.right].add(edge.left)
     touching = TOUCHING * size(polyhedron)
     found = {}
     for face in faces:
@@ -53,7 +53,7 @@ def covered_parts(
         near &= (normals @ T_object_face[:3, 2] < FACING) & (
             (low[:, :2] < outline[0].max(axis=0)) & (high[:, :2] > outline[0].min(axis=0))
         ).all(axis=1)
-        near[[face, *beside[face]]] = False
+        near[[face, *neighbours[face]]] = False
         over = [
             _slice(local, polyhedron.faces[other].loops, touching, distance_mm)
             for other in np.flatnonzero(near).tolist()

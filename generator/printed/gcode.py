@@ -477,12 +477,12 @@ def _heights(path: Toolpath) -> Floats:
 
 def _check_widths(path: Toolpath, diameter: float) -> None:
     """Refuse volumes that contradict the widths announced: another filament was meant."""
-    told = path.of_part & (path.width_mm > 0) & (path.length_mm > 1.0)
-    if np.count_nonzero(told) < 10:
+    announced = path.of_part & (path.width_mm > 0) & (path.length_mm > 1.0)
+    if np.count_nonzero(announced) < 10:
         return
-    h = path.height_mm[told]
-    width = path.volume_mm3[told] / path.length_mm[told] / h + h * (1 - math.pi / 4)
-    ratio = float(np.median(width / path.width_mm[told]))
+    h = path.height_mm[announced]
+    width = path.volume_mm3[announced] / path.length_mm[announced] / h + h * (1 - math.pi / 4)
+    ratio = float(np.median(width / path.width_mm[announced]))
     if not _WIDTHS_AGREE[0] <= ratio <= _WIDTHS_AGREE[1]:
         raise PrintError(
             f"beads of {ratio:.2f} times the widths announced, with filament of {diameter:g} mm",

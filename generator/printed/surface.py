@@ -78,7 +78,7 @@ def interpolate(
     return found
 
 
-FORMAT = 1  #: of the files; another one is made anew
+FORMAT = 1  #: of the files; another one is made again
 UNIT_MM = 0.0005  #: of a stored height: far below what a slicer's files tell
 MAPPED = 48  #: surfaces that a process keeps mapped; 3 MB each for 60 mm
 

@@ -80,7 +80,7 @@ def heights_sideways(
 
 
 def _highest_of_strips(a: Floats, b: Floats, half: Floats, t: Floats) -> Floats:
-    """Return the highest n of strips at places t, -inf beside them."""
+    """Return the highest n of strips at places t, -inf off them."""
     ends = []
     for end in (a, b):
         under = half**2 - (t - end[:, 0]) ** 2
@@ -90,11 +90,11 @@ def _highest_of_strips(a: Floats, b: Floats, half: Floats, t: Floats) -> Floats:
     along = np.abs(way[:, 0]) > _UPRIGHT * np.maximum(length, _UPRIGHT)
     run = np.where(along, way[:, 0], 1.0)
     lean = way[:, 1] / run  # dn/dt
-    # The long side that faces outwards: its foot on the middle line lies beside t.
+    # The long side that faces outwards: its foot on the middle line lies at t's side.
     foot = t + half * lean / np.hypot(1.0, lean)
-    beside = along & (foot >= np.minimum(a[:, 0], b[:, 0])) & (foot <= np.maximum(a[:, 0], b[:, 0]))
+    within = along & (foot >= np.minimum(a[:, 0], b[:, 0])) & (foot <= np.maximum(a[:, 0], b[:, 0]))
     side = a[:, 1] + (t - a[:, 0]) * lean + half * np.hypot(1.0, lean)
-    return np.maximum(np.maximum(*ends), np.where(beside, side, -np.inf))
+    return np.maximum(np.maximum(*ends), np.where(within, side, -np.inf))
 
 
 def heights_from_above(
@@ -154,7 +154,7 @@ def _columns(a: Floats, b: Floats, half: Floats, owner: Index, y: Floats) -> tup
 
 
 def _profile(beads: Beads, a: Floats, b: Floats, owner: Index, points: Floats) -> Floats:
-    """Return z of beads at points, -inf beside them."""
+    """Return z of beads at points, -inf off them."""
     way = (b - a)[owner]
     to = points - a[owner]
     squared = (way * way).sum(axis=1)

@@ -266,8 +266,8 @@ def _closes(
     ]
     for rim, seen in ((face.low, face.low.vertices[::-1]), (face.high, face.high.vertices)):
         if rim.radius_mm > 0.0 and seen not in others:
-            beside = {holders.get(step) for step in pairwise(seen)}
-            if len(beside) != 1 or None in beside:
+            adjacent = {holders.get(step) for step in pairwise(seen)}
+            if len(adjacent) != 1 or None in adjacent:
                 return False
     return True
 

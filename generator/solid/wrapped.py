@@ -46,7 +46,7 @@ class Strip:
         """Number of facets."""
         return len(self.development.T_object_flat)
 
-    def beside(self, line: int, points: Points) -> Points:
+    def across(self, line: int, points: Points) -> Points:
         """Return how far points (k, 2) lie to the right of a line, mm."""
         distance: Points = (points - self.development.low[line]) @ self.right[line]
         return distance
@@ -74,7 +74,7 @@ class Strip:
     def lifted(self, facet: int, points: Points, z_mm: Points) -> Points:
         """Return points (k, 2) of a facet at heights (k,) on the solid, (k, 3) object frame."""
         d = self.development
-        left, right = self.beside(facet, points), -self.beside(facet + 1, points)
+        left, right = self.across(facet, points), -self.across(facet + 1, points)
         share = (left / (left + right))[:, None]
         bend = (1.0 - share) * d.bends[facet] + share * d.bends[facet + 1]
         T = d.T_object_flat[facet]
@@ -169,11 +169,11 @@ class Knife:
             raise SolidError("a symbol lies beside its face", place=place)
         foot = np.concatenate([ring for tier in rings for ring in tier])
         first, last = home, home + 1  # lines around the symbol, neither of which it meets
-        while first > 0 and strip.beside(first, foot).min() < NUDGE_MM:
+        while first > 0 and strip.across(first, foot).min() < NUDGE_MM:
             first -= 1
-        while last < strip.facets and strip.beside(last, foot).max() > -NUDGE_MM:
+        while last < strip.facets and strip.across(last, foot).max() > -NUDGE_MM:
             last += 1
-        if strip.beside(first, foot).min() <= 0.0 or strip.beside(last, foot).max() >= 0.0:
+        if strip.across(first, foot).min() <= 0.0 or strip.across(last, foot).max() >= 0.0:
             raise SolidError("a symbol reaches over the side of its face", place=place)
         self.first, self.lines = first, range(first + 1, last)
         self.points = [[self._numbered(ring, z) for ring in tier]
@@ -199,10 +199,10 @@ class Knife:
         ring = ring.copy()
         facet = np.full(len(ring), self.first)
         for line in self.lines:
-            beside = self.strip.beside(line, ring)
-            least = np.maximum(np.abs(beside), NUDGE_MM)
-            off = np.where(beside < 0.0, -least, least)
-            ring += (off - beside)[:, None] * self.strip.right[line]
+            aside = self.strip.across(line, ring)
+            least = np.maximum(np.abs(aside), NUDGE_MM)
+            off = np.where(aside < 0.0, -least, least)
+            ring += (off - aside)[:, None] * self.strip.right[line]
             facet = np.where(off > 0.0, line, facet)
         first = len(self.made.flat)
         for point, number in zip(ring, facet.tolist(), strict=True):
@@ -228,7 +228,7 @@ class Knife:
             ends = np.array([made.flat[start], made.flat[end]])
             found = []
             for line in lines:
-                one, two = self.strip.beside(line, ends).tolist()
+                one, two = self.strip.across(line, ends).tolist()
                 share = one / (one - two)
                 z = made.z_mm[start] + share * (made.z_mm[end] - made.z_mm[start])
                 found.append(self._add(ends[0] + share * (ends[1] - ends[0]), z, -1, line))

@@ -29,7 +29,7 @@ class CalibrationGuide:
     seconds: float  #: least time that a load is read, device time
     step: int = 0  #: 0: the unloaded sensor
     taken: list[NDArray[np.uint16]] = field(default_factory=list)  #: counts of the steps done
-    felt: list[str] = field(default_factory=list)  #: in words, of the steps done
+    described: list[str] = field(default_factory=list)  #: in words, of the steps done
     frames: list[Frame] = field(default_factory=list)  #: of the step that is, or was last, read
     reading: bool = False  #: whether frames are wanted
     _different: int = 0  #: frames that differ from the one before
@@ -64,7 +64,7 @@ class CalibrationGuide:
         if self.step:
             self.step -= 1
             self.taken.pop()
-            self.felt.pop()
+            self.described.pop()
 
     def take(self, frames: Iterable[Frame]) -> None:
         """Take frames; a step ends when its time is over, and enough was read for an average.
@@ -89,5 +89,5 @@ class CalibrationGuide:
         """End the step with the frames so far."""
         counts, self.reading = np.stack([frame.counts for frame in self.frames]), False
         self.taken.append(counts)
-        self.felt.append(describe_load(counts, self.taken[0] if self.step else None))
+        self.described.append(describe_load(counts, self.taken[0] if self.step else None))
         self.step += 1

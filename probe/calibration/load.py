@@ -125,10 +125,10 @@ def describe_load(counts: NDArray[np.uint16], rest: NDArray[np.uint16] | None) -
     if rest is None:
         return f"{len(counts)} frames at rest, median {np.median(mean):.1f} counts"
     rise = mean - rest.mean(axis=0)
-    felt, half = int((rise > LOADED_COUNTS).sum()), len(counts) // 2
+    loaded, half = int((rise > LOADED_COUNTS).sum()), len(counts) // 2
     change = float(np.median(counts[half:].mean(axis=0) - counts[: max(half, 1)].mean(axis=0)))
     words = (
-        f"{len(counts)} frames, felt by {felt} of {rise.size} tactels, "
+        f"{len(counts)} frames, felt by {loaded} of {rise.size} tactels, "
         f"median {np.median(rise):.1f} counts above rest"
     )
     if abs(change) > max(1.0, STEADY * float(np.median(rise))):

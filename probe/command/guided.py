@@ -85,7 +85,7 @@ def _lead_through_step(guide: CalibrationGuide, client: Client, url: str) -> Non
                 if not guide.frames:
                     raise PortError("no frame came", fix="see probe-sensor info", place=url)
                 guide.end_step()
-        message(f"     {guide.felt[-1]}")
+        message(f"     {guide.described[-1]}")
         if _ask("     Enter goes on, r reads it again: ") != "r":
             return
         guide.again()

@@ -50,12 +50,12 @@ def touch_picture(
     """
     forces, readings = np.asarray(forces_n, np.float64), np.asarray(counts, np.float64)
     with page(path, 1440, 430) as figure:
-        patch, felt, read = figure.subplots(1, 3)
+        patch, pressed, read = figure.subplots(1, 3)
         figure.suptitle(title)
         top = _patch(figure, patch, surface, sensor, touch)
         at_mm, above_mm = _heights_under(surface, sensor, touch)
         for axes, values, what, label in (
-            (felt, forces, f"force, {forces.sum():.3g} N in all", UNITS["N"]),
+            (pressed, forces, f"force, {forces.sum():.3g} N in all", UNITS["N"]),
             (read, readings, "reading", UNITS["counts"]),
         ):
             _image(figure, axes, values, sensor, label)

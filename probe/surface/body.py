@@ -109,10 +109,10 @@ def _errors(h: Array) -> Array:
             missed = np.abs(heights[::two, step::two] - ends / 2)
             if half:
                 inner = found[half::step, half::step]
-                beside = np.maximum(inner[:, ::2], inner[:, 1::2])
+                adjacent = np.maximum(inner[:, ::2], inner[:, 1::2])
                 within = np.zeros_like(missed)
-                within[:-1] = beside[::2]
-                within[1:] = np.maximum(within[1:], beside[1::2])
+                within[:-1] = adjacent[::2]
+                within[1:] = np.maximum(within[1:], adjacent[1::2])
                 missed += within
             found[::two, step::two] = missed
         falling = h[:-1:two, :-1:two] + h[two::two, two::two]

@@ -156,7 +156,7 @@ class PageGuide:
             "ask": "Every load was read." if guide.done else ask,
             "reading": guide.reading,
             "done": guide.done,
-            "felt": list(guide.felt),
+            "felt": list(guide.described),
         }
 
 

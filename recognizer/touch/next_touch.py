@@ -123,7 +123,7 @@ def propose_next(
         return NextTouch(0.0, 0.0, 0.0, limits.force_n, "nothing is felt: press onto the object")
     steps = _steps(limits)
     pitch_mm = min(each.style.pitch_mm for each in reader.lab.arrays)
-    before = tuple((pose, _loaded_tactels(felt, limits)) for pose, felt in earlier)
+    before = tuple((pose, _loaded_tactels(seen, limits)) for pose, seen in earlier)
     area = LoadedArea(reader.sensor, _loaded_tactels(signal, limits), before)
     share = float(area.loaded.mean())
     novelty = NOVELTY_INSIDE if share >= WHOLE_SHARE else NOVELTY

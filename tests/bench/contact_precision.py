@@ -98,12 +98,9 @@ def reference(kind, case, surface, sensor, touch):
         part = section(r, z, *elastic)
 
     def heights(r):
-        return surface.heights_mm(np.stack([r, np.zeros_like(r)], axis=1))
-
-    if case == "washer":  # nodes on an edge belong to the washer, whatever the last bit says
-
-        def heights(r):
+        if case == "washer":  # nodes on an edge belong to the washer, whatever the last bit says
             return np.where((r > 3.5 - 1e-9) & (r < 7.5 + 1e-9), 0.0, -np.inf)
+        return surface.heights_mm(np.stack([r, np.zeros_like(r)], axis=1))
 
     c, s = math.cos(touch.theta_rad), math.sin(touch.theta_rad)
     axis = (-c * touch.x_mm - s * touch.y_mm, s * touch.x_mm - c * touch.y_mm)
@@ -189,11 +186,8 @@ def draw(known, path):
 def main():
     """Measure what is asked for; `--overlay` tab or pad, `--case` some indenters."""
     given = runner.asked(__doc__, seed=1, places=0, repeat=3, case=[""], overlay=["tab", "pad"],
-                         write=False, draw=False)  # fmt: skip
+                         write=False)  # fmt: skip
     known = json.loads(TABLE.read_text())
-    if given.draw:
-        draw(known, PICTURE)
-        return
     lines = {(p["overlay"], p["case"], p["level"]): p for p in known["cases"]}
     for kind in given.overlay:
         sensor = SensorType(overlay=Overlay(kind=kind))

@@ -53,17 +53,15 @@ def encoded(model: Path) -> dict[str, object]:
     row: dict[str, object] = {"scale": 1.0, "faces": "", "result": "refused", "reason": ""}
     try:
         solid = read_shape(model)
-    except GeneratorError as error:
-        return row | refusal(error)
-    runs = [surface.facets for surface in solid.surfaces]
-    other = {solid.faces[k].name.partition(".")[0] for k in solid.blank}
-    planar = len(solid.faces) - sum(map(len, runs)) - len(solid.blank)
-    row["scale"] = scale = scale_of(solid)
-    row["faces"] = f"{planar}/{len(runs)}/{len(other)}"
-    try:
+        runs = [surface.facets for surface in solid.surfaces]
+        other = {solid.faces[k].name.partition(".")[0] for k in solid.blank}
+        planar = len(solid.faces) - sum(map(len, runs)) - len(solid.blank)
+        row["scale"] = scale = scale_of(solid)
+        row["faces"] = f"{planar}/{len(runs)}/{len(other)}"
         solid = read_shape(model, scale)
     except GeneratorError as error:
-        return row | refusal(error)
+        complete = all((error.place, error.cause, error.fix))
+        return row | {"reason": error.cause, "fix": error.fix, "complete": complete}
     if problem := volume_problem(model, solid, scale):
         return row | {"result": "FAILED", "reason": problem}
     for parts in ("panels", "whole") if not (runs or other) else ("whole",):
@@ -85,12 +83,6 @@ def encoded(model: Path) -> dict[str, object]:
         if UNVERIFIED in problems[0]["fix"] or code != 2:
             return row | {"result": "FAILED"}
     return row
-
-
-def refusal(error: GeneratorError) -> dict[str, object]:
-    """Return what a row says of a model that is refused when it is read."""
-    complete = all((error.place, error.cause, error.fix))
-    return {"reason": error.cause, "fix": error.fix, "complete": complete}
 
 
 def scale_of(solid: Polyhedron) -> float:

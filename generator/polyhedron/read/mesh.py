@@ -124,15 +124,15 @@ def _notes(
     if not regions:
         return ()
     facets = sum(map(len, regions))
-    told = []
+    places = []
     for number, region in enumerate(regions[:LISTED], first):
         points = vertices[[v for f in region for loop in faces[f] for v in loop]]
         x, y, z = ((points.min(axis=0) + points.max(axis=0)) / 2).tolist()
-        told.append(f"F{number} about ({x:.4g}, {y:.4g}, {z:.4g})")
+        places.append(f"F{number} about ({x:.4g}, {y:.4g}, {z:.4g})")
     more = f" and {len(regions) - LISTED} more" if len(regions) > LISTED else ""
     what = "region stays" if len(regions) == 1 else "regions stay"
     note = (
         f"{len(regions)} curved {what} blank, {facets} of {len(faces)} facets: "
-        f"{', '.join(told)}{more}; in STEP, cylinders and cones carry symbols"
+        f"{', '.join(places)}{more}; in STEP, cylinders and cones carry symbols"
     )
     return (note,)

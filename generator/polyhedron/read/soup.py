@@ -182,8 +182,8 @@ def _corners_on(soup: Soup, start: int, end: int, corners: Integers, tolerance: 
     length = float(np.linalg.norm(along))
     from_a = soup.points[corners] - a
     at = from_a @ along / length
-    beside = np.linalg.norm(from_a - np.outer(at / length, along), axis=1)
-    inside = (at > tolerance) & (at < length - tolerance) & (beside <= tolerance)
+    aside = np.linalg.norm(from_a - np.outer(at / length, along), axis=1)
+    inside = (at > tolerance) & (at < length - tolerance) & (aside <= tolerance)
     return [int(corners[k]) for k in np.flatnonzero(inside)[np.argsort(at[inside], kind="stable")]]
 
 

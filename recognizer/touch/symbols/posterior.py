@@ -79,12 +79,12 @@ USUAL_FORM = 5.0  #: ... 4.7 in own simulation, 8.8 in MuJoCo (medians)
 class TactelScatter:
     """Standard deviations of psi on a covered tactel, and of the place of a tip."""
 
-    felt: float
+    psi: float
     aside_mm: float
 
     def variances(self, parts: Array) -> Array:
         """Return (n,) of forces; `parts` (2, n) are those of a scatter of 1 and 1."""
-        return np.asarray(self.felt**2 * parts[0] + self.aside_mm**2 * parts[1])
+        return np.asarray(self.psi**2 * parts[0] + self.aside_mm**2 * parts[1])
 
     def log_likelihood(self, left: Array, parts: Array, trust: Array) -> float:
         """Return that of residuals (n,), nats, up to a constant."""
@@ -198,7 +198,7 @@ def fit_steps(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> _F
             at, damping = tried, damping / EASIER
         else:
             damping *= HARDER
-    return at.pose, at.gain, at.more, np.square([scatter.felt, scatter.aside_mm]), normal
+    return at.pose, at.gain, at.more, np.square([scatter.psi, scatter.aside_mm]), normal
 
 
 def _linearize(
@@ -288,7 +288,7 @@ def fit_scatter(
     by what was fitted, `known` (k, k) the prior precision of that.
     """
     usual = np.square([USUAL_SCATTER, USUAL_ASIDE_MM])
-    now = np.square([before.felt, before.aside_mm])
+    now = np.square([before.psi, before.aside_mm])
     for _ in range(ROUNDS):
         scatter = TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
         weights = scatter.weights(left, parts, trust)

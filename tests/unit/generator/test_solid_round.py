@@ -102,7 +102,7 @@ def test_pieces_of_a_symbol_cover_it_wherever_it_stands(x, y, rotation, label):
         assert area == pytest.approx(wanted, abs=2 * NUDGE_MM * length)
     for number, line in enumerate(cut.line):
         if line >= 0:
-            assert abs(strip.beside(line, flat[number : number + 1])[0]) < 1e-9
+            assert abs(strip.across(line, flat[number : number + 1])[0]) < 1e-9
 
 
 def test_corners_on_a_line_are_moved_off_it():

@@ -420,7 +420,7 @@ def test_a_load_is_read_anew_where_the_board_starts_again():
     for t_ms in (*range(5000, 5200, 10), *range(0, 310, 10)):
         assert guide.as_json()["reading"]
         guide.guide.take([frame_from(np.full((16, 16), t_ms), t_ns=t_ms * 1_000_000, seq=0)])
-    assert guide.guide.felt[0].startswith("31 frames")
+    assert guide.guide.described[0].startswith("31 frames")
 
 
 def test_loads_that_are_none_are_refused():

@@ -265,7 +265,7 @@ def test_the_last_fit_is_the_same(name, monkeypatch):
     assert one.gain == pytest.approx(other.gain, abs=1e-6)
     assert one.covariance == pytest.approx(other.covariance, rel=1e-5, abs=1e-9)
     assert one.blur == pytest.approx(other.blur, abs=1e-7)
-    assert one.scatter.felt == pytest.approx(other.scatter.felt, rel=1e-6)
+    assert one.scatter.psi == pytest.approx(other.scatter.psi, rel=1e-6)
     assert one.scatter.aside_mm == pytest.approx(other.scatter.aside_mm, rel=1e-6)
 
 

@@ -105,7 +105,7 @@ def test_tips_that_stand_aside_widen_it_and_even_gains_do_not_hide_them(touch):
 def test_what_all_readings_have_too_much_is_told(touch):
     plain, lifted = (fit(touch(2, 0.03, offset=offset)) for offset in (0.0, 12.0))
     assert lifted.pose[:3] == pytest.approx(plain.pose[:3], abs=0.01)
-    assert lifted.scatter.felt == pytest.approx(plain.scatter.felt, rel=0.1)  # else 2.4 times
+    assert lifted.scatter.psi == pytest.approx(plain.scatter.psi, rel=0.1)  # else 2.4 times
 
 
 def test_blur_of_rows_and_of_columns_is_told_and_flattens_slopes(touch):
@@ -249,17 +249,17 @@ def test_a_touch_tells_even_sensors_from_straight_ones(felt, aside, monkeypatch)
     monkeypatch.setattr(posterior, "USUAL_WEIGHT", 0.5)
     found = [told(*touched(felt, aside, seed)) for seed in range(20)]
     # Student's scale of normal errors is a little less than their deviation
-    assert np.mean([one.felt for one in found]) == pytest.approx(0.93 * felt, rel=0.12)
+    assert np.mean([one.psi for one in found]) == pytest.approx(0.93 * felt, rel=0.12)
     assert np.mean([one.aside_mm for one in found]) == pytest.approx(0.93 * aside, rel=0.25)
 
 
 def test_few_tactels_leave_it_as_usual_and_many_do_not():
     few = told(*touched(0.3, 0.3, 1, count=2))
     many = told(*touched(0.3, 0.3, 1, count=2000))
-    assert many.felt > 0.25
-    assert few.felt < 0.2
+    assert many.psi > 0.25
+    assert few.psi < 0.2
     nothing = told(np.zeros(3), np.ones((2, 3)), trust=np.zeros(3))
-    assert (nothing.felt, nothing.aside_mm) == pytest.approx((0.08, 0.08))
+    assert (nothing.psi, nothing.aside_mm) == pytest.approx((0.08, 0.08))
 
 
 def test_a_dead_tactel_does_not_widen_it():
@@ -267,7 +267,7 @@ def test_a_dead_tactel_does_not_widen_it():
     sound = told(left, parts)
     left[7] = 40.0
     dead = told(left, parts)
-    assert dead.felt == pytest.approx(sound.felt, rel=0.1)
+    assert dead.psi == pytest.approx(sound.psi, rel=0.1)
 
 
 def test_what_was_fitted_away_is_counted():
@@ -277,8 +277,8 @@ def test_what_was_fitted_away_is_counted():
     jacobian = rng.standard_normal((256, 128))
     taken = left - jacobian @ np.linalg.lstsq(jacobian, left, rcond=None)[0]
     assert np.std(taken) < 0.75 * np.std(left)
-    assert told(taken, parts, jacobian).felt == pytest.approx(told(left, parts).felt, rel=0.25)
-    assert told(taken, parts).felt < 0.8 * told(left, parts).felt
+    assert told(taken, parts, jacobian).psi == pytest.approx(told(left, parts).psi, rel=0.25)
+    assert told(taken, parts).psi < 0.8 * told(left, parts).psi
 
 
 def test_second_differences_by_hand():
