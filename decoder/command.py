@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from encoded_objects.base import console, output
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.options import Argument, Option, command
+from encoded_objects.base.options import Application, Argument, Option, command
 
 if TYPE_CHECKING:
     from decoder.decoded import Decoded
@@ -32,7 +32,7 @@ ROWS are the symbols, rows apart by spaces, ? where none is seen: [bold]decode-w
 EPILOG = "Exit codes: 0 decoded, 1 not decoded, 2 bad input, 4 database, 130 interrupted."
 NAME = "decode-window"
 
-app = console.application()
+app = Application()
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

@@ -127,11 +127,6 @@ def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) 
     return code
 
 
-def application(**settings: Any) -> Application:
-    """Return an application without commands."""
-    return Application(**settings)
-
-
 def one_thread() -> None:
     """Let matrix libraries use one thread, unless the user says otherwise; call before numpy loads.
 

@@ -63,29 +63,21 @@ class Option:
 
     def for_typer(self, name: str, default: object) -> Any:
         """Return the declaration that typer reads."""
-        from typer import Option as TyperOption
+        import typer
 
         shown = default not in (None, "", inspect.Parameter.empty)
-        metavar = self.metavar or "|".join(self.choices) or None
-        return TyperOption(
-            *self.typed(name), help=self.help, metavar=metavar, show_default=shown,
-            min=self.least, max=self.most, envvar=self.variable or None,
-        )  # fmt: skip
+        said: dict[str, Any] = {
+            "help": self.help, "metavar": self.metavar or "|".join(self.choices) or None,
+            "show_default": shown, "min": self.least, "max": self.most,
+        }  # fmt: skip
+        if isinstance(self, Argument):
+            return typer.Argument(**said)
+        return typer.Option(*self.typed(name), envvar=self.variable or None, **said)
 
 
 @dataclass(frozen=True, slots=True)
 class Argument(Option):
     """An argument: it is given by its position."""
-
-    def for_typer(self, name: str, default: object) -> Any:  # noqa: ARG002
-        """Return the declaration that typer reads."""
-        from typer import Argument as TyperArgument
-
-        shown = default not in (None, "", inspect.Parameter.empty)
-        return TyperArgument(
-            help=self.help, metavar=self.metavar or None, show_default=shown,
-            min=self.least, max=self.most,
-        )  # fmt: skip
 
 
 class Options:

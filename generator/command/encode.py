@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from encoded_objects.base import console
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.options import Argument, Json, Option, command
+from encoded_objects.base.options import Application, Argument, Json, Option, command
 from generator.command import NAME
 
 HELP = """Emboss objects with a pseudo-random array, so that a touch tells object, face and place.
@@ -34,7 +33,7 @@ More commands, each with --help:
 [bold]encode-object export[/] FILE     objects for another lab; [bold]import[/] FILE takes them over
 """
 
-app = console.application()
+app = Application()
 
 
 @command(app, help=HELP, epilog=EPILOG, version_of=NAME)

@@ -6,14 +6,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from encoded_objects.base import console
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.options import Argument, Json, Option, command
+from encoded_objects.base.options import Application, Argument, Json, Option, command
 
 if TYPE_CHECKING:
     from sqlalchemy import Engine
 
-app = console.application()
+app = Application()
 Database = Annotated[str, Option("lab.db, sqlite:///lab.db, postgresql://host/name.", "URL")]
 Only = Annotated[
     list[str] | None,

@@ -6,13 +6,12 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from encoded_objects.base import console
-from encoded_objects.base.options import Argument, Json, Option, command
+from encoded_objects.base.options import Application, Argument, Json, Option, command
 
 if TYPE_CHECKING:
     from generator.printers import Printer
 
-app = console.application()
+app = Application()
 
 
 @command(app)

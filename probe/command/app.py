@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from encoded_objects.base.console import application
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.options import Argument, Json, Option, Replace, command
+from encoded_objects.base.options import Application, Argument, Json, Option, Replace, command
 from probe.command import NAME
 from probe.command.options import (
     URLS,
@@ -31,8 +30,8 @@ Try it without one: [bold]probe-sensor live sim:[/]
 EPILOG = """Exit codes: 0 done, 1 ran but failed, 2 bad input, 3 device, 4 database, 130 \
 interrupted.
 """
-app = application(help=HELP, epilog=EPILOG, version_of=NAME)
-calibrate = application(
+app = Application(help=HELP, epilog=EPILOG, version_of=NAME)
+calibrate = Application(
     help="Find out what a sensor's counts mean: bias, unsound tactels, force law of each."
 )
 

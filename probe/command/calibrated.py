@@ -73,7 +73,7 @@ def report_bias(
         "sensor": name or "not named",
         "bias": f"{values['bias_counts']:.2f} counts, median of {rest.mean.size} tactels",
         "noise": f"{values['noise_counts']:.2f} counts a frame",
-        "raised": places(high) or "none",
+        "raised": tactel_words(high) if high.any() else "none",
     }
     trouble = ""
     if calibration is not None:
@@ -335,7 +335,7 @@ def describe_laws(
         else f"{found.board.readout}, {found.board.bits} bits",
         "loads": ", ".join(found.loads),
         "sound": f"{values['sound']} of {alive.size} tactels",
-        **{title: places(where) for title, where in unsound.items() if where.any()},
+        **{title: tactel_words(where) for title, where in unsound.items() if where.any()},
         "fit": f"{found.scatter:.2f} (loads miss the law by so many of their errors)"
     }  # fmt: skip
     for force, median, worst in errors:
@@ -353,8 +353,3 @@ def _uncertainty(found: Calibration, force_n: float) -> tuple[float, float, floa
     if not errors.size:
         return force_n, math.inf, math.inf
     return force_n, float(np.median(errors)), float(np.quantile(errors, 0.95))
-
-
-def places(where: NDArray[np.bool_]) -> str:
-    """Return tactels in words; empty if there are none."""
-    return tactel_words(where) if where.any() else ""

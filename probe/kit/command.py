@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from encoded_objects.base import console, output
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.options import Argument, Json, Option, command
+from encoded_objects.base.options import Application, Argument, Json, Option, command
 from encoded_objects.base.output import progress_bar
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ probe-sensor types lists the types; a file of yours is one too.
 """
 EPILOG = "Exit codes: 0 done, 1 could not be written, 2 bad input, 130 interrupted."
 
-app = console.application()
+app = Application()
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

@@ -13,23 +13,18 @@ from probe.protocol import Command, IdentPacket, Packet, StatisticsPacket, encod
 class CommandedProbe:
     """The state that commands give a probe.
 
-    `url` opens it again; `ident` describes it. With `bits` 10 and `adjustable`, it obeys the
+    `ident` describes it. With `bits` 10 and `adjustable`, it obeys the
     commands for 8 and 10 bits.
     """
 
     def __init__(self, url: str, ident: IdentPacket, *, adjustable: bool = False) -> None:
-        self._url = url
+        self.url = url  #: opens this port again
         self.ident = ident
         self.streaming = False
         self.wanted = 0  #: single frames that were asked for
         self.sent = self.waits = self.errors = 0
         self._adjustable = adjustable
         self._replies: list[bytes] = []
-
-    @property
-    def url(self) -> str:
-        """The URL that opens this port again."""
-        return self._url
 
     def write(self, data: bytes) -> None:
         """Obey the commands, one byte each."""

@@ -52,13 +52,8 @@ class SerialLine:
     """An open serial line, a `Port`."""
 
     def __init__(self, url: str, line: serial.Serial) -> None:
-        self._url = url
+        self.url = url  #: opens this port again
         self._line = line
-
-    @property
-    def url(self) -> str:
-        """The URL that opens this port again."""
-        return self._url
 
     def read(self, timeout_s: float) -> bytes:
         """Return the bytes that came; b"" when none came in `timeout_s`."""
@@ -88,7 +83,7 @@ class SerialLine:
         self._line.close()
 
     def _gone(self) -> PortError:
-        return PortError("the device went away", fix="plug it in again", place=self._url)
+        return PortError("the device went away", fix="plug it in again", place=self.url)
 
 
 def _explain_refusal(address: Address, failed: Exception, baud: int) -> PortError:

@@ -118,13 +118,11 @@ def join_blocks(blocks: Sequence[FrameBlock], shape: tuple[int, int]) -> FrameBl
     if len(blocks) < 2:
         return blocks[0] if blocks else FrameBlock.empty(shape)
     poses = [np.full((len(b), 4, 4), np.nan) if b.pose is None else b.pose for b in blocks]
-    return FrameBlock(
-        np.concatenate([block.counts for block in blocks]),
-        np.concatenate([block.t_ns for block in blocks]),
-        np.concatenate([block.seq for block in blocks]),
-        np.concatenate([block.wrist for block in blocks]),
-        np.concatenate(poses) if any(block.pose is not None for block in blocks) else None,
-    ).frozen()
+    known = any(block.pose is not None for block in blocks)
+    arrays = zip(*((b.counts, b.t_ns, b.seq, b.wrist) for b in blocks), strict=True)
+    counts, t_ns, seq, wrist = map(np.concatenate, arrays)
+    pose = np.concatenate(poses) if known else None
+    return FrameBlock(counts, t_ns, seq, wrist, pose).frozen()
 
 
 def are_rigid(poses: NDArray[Any]) -> bool:

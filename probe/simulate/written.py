@@ -26,6 +26,7 @@ from probe.surface.polygon import FaceRegion, polygon
 
 if TYPE_CHECKING:
     from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
+    from generator.database.round_face import RoundFace
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,8 @@ class RoundPart:
     corners_mm: Array  #: (n, 3, 3) object frame
     low_mm: Array  #: (n, 3) least coordinates of each triangle
     high_mm: Array  #: (n, 3) greatest
-    face: RegisteredFace
+    round: RoundFace
+    face: str
     region: FaceRegion  #: the unrolled face: where touches may have their centre
     name: str
     object_name: str
@@ -73,7 +75,7 @@ class RoundPart:
         Raises `SurfaceError` if nothing of the part is there.
         """
         x, y = touch.x_mm, touch.y_mm
-        T_object_plane = self.tangent(x, y)
+        T_object_plane = self.round.tangent(x, y)
         middle = (T_object_plane @ (x, y, 0.0, 1.0))[:3]
         near = (self.low_mm < middle + AROUND_MM) & (self.high_mm > middle - AROUND_MM)
         corners = self.corners_mm[near.all(axis=1)]
@@ -81,19 +83,13 @@ class RoundPart:
         seen = np.cross(b - a, c - a) @ T_object_plane[:3, 2] > 0
         T_plane_object = np.linalg.inv(T_object_plane)
         surface = mesh(corners[seen], T_plane_object, place=self.name)
-        return Scene(surface, self.region, self.name, self.object_name, self.face.name,
+        return Scene(surface, self.region, self.name, self.object_name, self.face,
                      T_object_plane, self.under)  # fmt: skip
 
     def scene(self) -> Scene:
         """Return the face, as a touch of its middle meets it."""
         x, y = Scene(FlatPlate(), self.region, self.name).centre_mm().tolist()
         return self.under(Touch(x, y, 0.0, 0.0))
-
-    def tangent(self, x: float, y: float) -> Array:
-        """Return T_object_plane (4, 4) of the plane that touches at a place."""
-        if self.face.round is None:
-            raise SurfaceError(f"{self.name} is flat", fix="touch it as a flat face")
-        return self.face.round.tangent(x, y)
 
 
 def round_part(
@@ -109,4 +105,4 @@ def round_part(
     T = part.T_object_part
     corners = written_triangles(file) @ T[:3, :3].T + T[:3, 3]
     low, high, region = corners.min(axis=1), corners.max(axis=1), polygon([face.round.outline_mm])
-    return RoundPart(corners, low, high, face, region, name, held.entry.name)
+    return RoundPart(corners, low, high, face.round, face.name, region, name, held.entry.name)

@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from encoded_objects.base import console
 from encoded_objects.base.errors import require
-from encoded_objects.base.options import command
+from encoded_objects.base.options import Application, command
 from recognizer.bench.options import BenchOptions
 
 HELP = """See the part, the touch and the answer in a web page.
@@ -20,7 +20,7 @@ Try it without a probe: [bold]open-bench --database lab.db[/], open the page, cl
 """
 EPILOG = "Exit codes: 0 ended, 2 bad input, 3 device, 4 database."
 
-app = console.application()
+app = Application()
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from encoded_objects.base import console
-from encoded_objects.base.options import command
+from encoded_objects.base.options import Application, command
 from recognizer.command import NAME
 from recognizer.command.options import RecognizeOptions
 
@@ -18,7 +17,7 @@ EPILOG = """Exit codes: 0 recognised, 1 nothing recognised, 2 bad input, 3 devic
 130 interrupted.
 """
 
-app = console.application()
+app = Application()
 
 
 def _kernels() -> dict[str, str]:

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from encoded_objects.base import console
-from encoded_objects.base.options import Argument, Json, Option, command
+from encoded_objects.base.options import Application, Argument, Json, Option, command
 from recognizer.command.options import Calibration, Database
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ part's file. With [bold]--store[/] the database keeps it, and every later pose o
 on parts of the same printer that nobody has touched so, is corrected by it.
 """
 
-app = console.application(named=True)
+app = Application(named=True)
 
 
 @command(app, "as-built", help=HELP)

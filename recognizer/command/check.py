@@ -6,9 +6,8 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated
 
-from encoded_objects.base import console
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.options import Argument, Json, Option, command
+from encoded_objects.base.options import Application, Argument, Json, Option, command
 from recognizer.command.options import Database
 
 if TYPE_CHECKING:
@@ -23,7 +22,7 @@ RECORDING holds such touches; with --port the next touch is taken.
 """
 EPILOG = "Exit codes: 0 as drawn, 1 otherwise or not recognised, 2 bad input, 3 device, 4 database."
 
-app = console.application(named=True)
+app = Application(named=True)
 
 
 @command(app, "check", help=HELP, epilog=EPILOG)

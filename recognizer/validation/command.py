@@ -21,13 +21,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from encoded_objects.base import console, output
-from encoded_objects.base.options import Argument, Json, Option, Options, command
+from encoded_objects.base.options import Application, Argument, Json, Option, Options, command
 from encoded_objects.base.output import progress_bar
 from probe.contact.engines import ENGINES
 from probe.simulate.world.levels import LEVELS
 
 if TYPE_CHECKING:
-    from encoded_objects.base.options import Application
     from recognizer.validation.pipeline import ValidationResult
 
 NAME = "validate-set"
@@ -52,8 +51,8 @@ More commands, each with --help:
 [bold]validate-set report[/] DIR            the report anew from the touches that are there
 """
 
-app = console.application()
-tools = console.application()
+app = Application()
+tools = Application()
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

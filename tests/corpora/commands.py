@@ -140,6 +140,7 @@ def normal_text(text: str, folder: Path) -> str:
         Where the commands work; it is written FOLDER.
     """
     text = text.replace(str(folder), "FOLDER").replace(str(ROOT), "ROOT")
+    text = re.sub(r"Matplotlib is building the font cache[^\n]*\n", "", text)  # slow machines
     text = text.replace(os.path.relpath(ROOT, folder), "ROOT")
     text = re.sub(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(\.\d+)?(Z|\+00:00)?", "UTC", text)
     text = re.sub(r"(?<=/)(\.[\w-]+\.\w+)\.\d+\b", r"\1.PROCESS", text)  # drafts of files

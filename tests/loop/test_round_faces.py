@@ -188,7 +188,7 @@ def test_a_plate_sees_the_written_face_fall_away_under_it(touched, name):
         about = rng.uniform(-8.0, 8.0, (400, 2))
         at = np.array([touch.x_mm, touch.y_mm])
         heights = part.under(touch).surface.heights_mm(at + about)
-        over = heights + part.face.round.bend(*at).falls_mm(about)
+        over = heights + part.round.bend(*at).falls_mm(about)
         assert over.min() > -0.05
         assert over.max() < 1.05
         assert np.mean(np.abs(over) < 0.05) > 0.3  # between symbols
@@ -200,7 +200,7 @@ def test_one_touch_of_the_written_part_tells_object_face_and_pose(touched, name)
     database, parts = touched
     reader, part = Reader(open_lab(database), SensorType()), parts[name]
     sensor = LevelSensor(reader.sensor, LEVELS["typical"])
-    surface = part.face.round.surface
+    surface = part.round.surface
     rng, answered = np.random.default_rng(8), 0
     drawn = random_touches(part.region, rng, TouchRanges((40.0, 120.0), margin_mm=INSIDE_MM))
     for _, touch in zip(range(5), drawn, strict=False):
@@ -224,7 +224,7 @@ def test_one_touch_of_the_written_part_tells_object_face_and_pose(touched, name)
         radial = np.array([x, y, 0.0]) / math.hypot(x, y)
         outward = math.cos(alpha) * radial + math.sin(alpha) * np.array([0.0, 0.0, 1.0])
         assert answer.T_object_probe[:3, 2] == pytest.approx(outward, abs=1e-3)
-        there = part.tangent(touch.x_mm, touch.y_mm) @ (touch.x_mm, touch.y_mm, 1.0, 1.0)
+        there = part.round.tangent(touch.x_mm, touch.y_mm) @ (touch.x_mm, touch.y_mm, 1.0, 1.0)
         assert answer.T_object_probe[:3, 3] == pytest.approx(there[:3], abs=0.25)
     assert answered >= 4
 
@@ -232,7 +232,7 @@ def test_one_touch_of_the_written_part_tells_object_face_and_pose(touched, name)
 def test_the_reader_takes_no_blank_round_face_for_an_encoded_one(touched):
     database, parts = touched
     reader, part = Reader(open_lab(database), SensorType()), parts["Tube"]
-    radius = part.face.round.surface.radius_mm
+    radius = part.round.surface.radius_mm
     rng = np.random.default_rng(2)
     drawn = random_touches(part.region, rng, TouchRanges(margin_mm=INSIDE_MM))
     for _, touch in zip(range(3), drawn, strict=False):

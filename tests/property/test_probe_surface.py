@@ -87,7 +87,7 @@ def test_lattice_gives_the_heights_of_every_symbol_by_itself(alphabet, turn, see
     labels = random.integers(0, len(alphabet), len(cells))
     shift = random.uniform(-9, 9, 2)
     lattice = LatticeSurface(known, list_lookup(cells[:, 0], cells[:, 1], labels), turn, *shift)
-    points = random.uniform(-30, 30, (1500, 2))
+    points = np.r_[random.uniform(-30, 30, (1500, 2)), [(-1e4, 1e4), (1e4, -1e4)]]
     c, s = math.cos(turn), math.sin(turn)
     at = points @ np.array([[c, s], [-s, c]]) + shift
     want = np.zeros(len(points))

@@ -12,14 +12,14 @@ from typer.testing import CliRunner
 
 from encoded_objects.base import console
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.options import Argument, Json, Option, Options, command
+from encoded_objects.base.options import Application, Argument, Json, Option, Options, command
 
 PROGRAM = """
 import gc, json, os, sys
 from encoded_objects.base import console
-from encoded_objects.base.options import command
+from encoded_objects.base.options import Application, command
 
-app = console.application()
+app = Application()
 
 class Cycle:
     def __init__(self): self.own = self
@@ -58,8 +58,8 @@ def test_plugins_that_somebody_asks_for_are_left():
     assert json.loads(done.stdout)[1] == "one"
 
 
-app = console.application(help="Do things.", version_of="do")
-part = console.application()
+app = Application(help="Do things.", version_of="do")
+part = Application()
 app.groups["part"] = part
 
 
@@ -113,7 +113,7 @@ class CookOptions(Options):
 
 
 taken: list[object] = []
-kitchen = console.application()
+kitchen = Application()
 
 
 @command(kitchen, version_of="do", parts=lambda: {"stove": "gas"})

@@ -87,22 +87,6 @@ def test_dead_stuck_and_preloaded_tactels():
     assert loaded[0, 2] > loaded[5, 5]
 
 
-def test_forces_and_laws_that_are_none():
-    fsr = fsr_of()
-    for bad in (np.zeros((15, 16)), np.full((16, 16), -1.0), np.full((16, 16), np.nan)):
-        with pytest.raises(CircuitError):
-            conductances(fsr, bad)
-    _, state = conductances(fsr, np.zeros((3, 16, 16)))
-    with pytest.raises(CircuitError, match="state"):
-        conductances(fsr, np.zeros((16, 16)), state)
-    with pytest.raises(CircuitError, match="gain_s"):
-        replace(fsr, gain_s=np.zeros((16, 16)))
-    with pytest.raises(CircuitError, match="shape"):
-        replace(fsr, exponent=np.ones((3, 3)))
-    with pytest.raises(CircuitError, match="leak"):
-        replace(fsr, leak_s=0.0)
-
-
 def exact_resistances(g, digits=50):
     """Return the resistances by a 31x31 inverse in many digits."""
     rows, columns = g.shape
@@ -175,22 +159,6 @@ def test_what_the_multiplexer_costs_a_virtual_ground_on_a_washer(on, error):
     g = scenes(4)["washer"]
     read = transconductances(g, on, on)
     assert np.abs(read / g - 1)[g > 0.5].max() == pytest.approx(error, rel=0.15)
-
-
-def test_networks_that_fall_apart_or_make_no_sense_are_refused():
-    apart = np.zeros((16, 16))
-    apart[:8, :8] = apart[8:, 8:] = 1
-    with pytest.raises(CircuitError, match="falls into parts"):
-        effective_resistances(apart)
-    empty = np.ones((16, 16))
-    empty[3] = 0
-    with pytest.raises(CircuitError, match="leak"):
-        effective_resistances(empty)
-    for bad in (-np.ones((4, 4)), np.full((4, 4), np.nan), np.ones(16)):
-        with pytest.raises(CircuitError):
-            effective_resistances(bad)
-        with pytest.raises(CircuitError):
-            transconductances(bad)
 
 
 IDEAL = Electronics(noise=QUIET, settling_s=1.0, coupling=0.0, bias_lsb=0.0)
@@ -279,21 +247,6 @@ def test_touches_side_by_side_are_read_as_alone(readout):
     alone = [read(board, force) for force in forces]
     np.testing.assert_array_equal(read(board, forces), alone)
     assert read(board, forces).dtype == np.uint16
-
-
-def test_boards_that_are_none():
-    for change in (
-        {"readout": "open"},
-        {"bits": 0},
-        {"bits": 17},
-        {"load_ohm": 0.0},
-        {"row_ohm": -1.0},
-        {"coupling": 0.5},
-        {"tau_s": float("nan")},
-        {"noise": Noise(idle_lsb=-1)},
-    ):
-        with pytest.raises(CircuitError):
-            replace(Electronics(), **change)
 
 
 READOUTS = ["floating", "grounded", "virtual"]
@@ -420,10 +373,34 @@ def test_frames_side_by_side_are_inverted_as_alone(readout):
         np.testing.assert_array_equal(together.lost[i], alone.lost)
 
 
-def test_counts_that_are_none():
-    e = Electronics()
-    for bad in (np.full((16, 16), 1024), np.full((16, 16), -1), np.full((16, 16), np.nan), [1, 2]):
-        with pytest.raises(CircuitError):
-            invert_readings(bad, e)
-    with pytest.raises(CircuitError, match="not above 0"):
-        solve_floating(np.zeros((16, 16)))
+FORCES, BLOCKS, GAPPED = np.zeros((16, 16)), np.kron(np.eye(2), np.ones((8, 8))), np.ones((16, 16))
+GAPPED[3] = 0
+
+
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        *((lambda bad=bad: conductances(fsr_of(), bad), ".")
+          for bad in (np.zeros((15, 16)), FORCES - 1, FORCES + np.nan)),
+        (lambda: conductances(fsr_of(), FORCES, conductances(fsr_of(), np.zeros((3, 16, 16)))[1]),
+         "state"),
+        (lambda: replace(fsr_of(), gain_s=FORCES), "gain_s"),
+        (lambda: replace(fsr_of(), exponent=np.ones((3, 3))), "shape"),
+        (lambda: replace(fsr_of(), leak_s=0.0), "leak"),
+        (lambda: effective_resistances(BLOCKS), "falls into parts"),
+        (lambda: effective_resistances(GAPPED), "leak"),
+        *((lambda solve=solve, bad=bad: solve(bad), ".")
+          for solve in (effective_resistances, transconductances)
+          for bad in (-np.ones((4, 4)), np.full((4, 4), np.nan), np.ones(16))),
+        *((lambda change=change: replace(Electronics(), **change), ".")
+          for change in ({"readout": "open"}, {"bits": 0}, {"bits": 17}, {"load_ohm": 0.0},
+                         {"row_ohm": -1.0}, {"coupling": 0.5}, {"tau_s": float("nan")},
+                         {"noise": Noise(idle_lsb=-1)})),
+        *((lambda bad=bad: invert_readings(bad, Electronics()), ".")
+          for bad in (FORCES + 1024, FORCES - 1, FORCES + np.nan, [1, 2])),
+        (lambda: solve_floating(FORCES), "not above 0"),
+    ],
+)  # fmt: skip
+def test_what_is_no_film_network_board_or_reading_is_refused(call, match):
+    with pytest.raises(CircuitError, match=match):
+        call()

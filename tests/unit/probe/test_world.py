@@ -49,6 +49,12 @@ def film_s(forces_n):
     return LEAK_S + GAIN_S * np.maximum(np.asarray(forces_n) - BREAK_N, 0.0)
 
 
+def assert_read(counts, share, load_ohm=22.0):
+    """Check counts against the shares (rows, columns) of the supply that are read."""
+    expected = np.clip(8 + 1023 * 150 / (1023 * load_ohm * GAIN_S) * share, 0, 1023)
+    assert np.abs(counts - expected).max() <= 0.5 + 1e-6
+
+
 def brute_force(g, floating, load_ohm):
     """Solve each pair's network of rows + columns anew, every node by Kirchhoff."""
     rows, columns = g.shape
@@ -154,8 +160,7 @@ def test_floating_rows_carry_the_ghosts_of_the_network(name, rows):
     floating = sample_sensor(sensor, np.random.default_rng(3)).floating_rows(level)
     assert floating.sum() == rows
     share = brute_force(film_s(contact.forces_n), floating, 220.0)
-    expected = np.clip(8 + 1023 * 150 / (1023 * 220 * GAIN_S) * share, 0, 1023)
-    assert np.abs(counts - expected).max() <= 0.5 + 1e-6
+    assert_read(counts, share, 220.0)
 
 
 def test_film_on_its_way_back_reads_higher_where_it_was_pressed_more():
@@ -164,31 +169,27 @@ def test_film_on_its_way_back_reads_higher_where_it_was_pressed_more():
     now, before = (tabs(STRIP, SENSOR, t, Tips()).forces_n for t in (touch, rocked))
     felt = np.clip(before, now, 1.4 * now)
     g = film_s(felt)
-    expected = np.clip(8 + 1023 * 150 / (1023 * 22 * GAIN_S) * g / (g.sum(0) + 1 / 22), 0, 1023)
-    counts = counts_of(replace(SOUND, hysteresis=0.4), STRIP, touch)
-    assert np.abs(counts - expected).max() <= 0.5 + 1e-6
+    assert_read(counts_of(replace(SOUND, hysteresis=0.4), STRIP, touch), g / (g.sum(0) + 1 / 22))
     pressed = now > 0.05
     ratio = felt[pressed] / now[pressed]
     assert ratio.min() < 1.1
     assert ratio.max() == pytest.approx(1.4)  # not one factor for all
 
 
-@pytest.mark.parametrize(("name", "places"), [("slide-2", 5)])
-def test_slide_is_the_mean_of_the_forces_on_its_way(name, places):
-    level = replace(SOUND, slide_mm=LEVELS[name].slide_mm)
+def test_slide_is_the_mean_of_the_forces_on_its_way():
+    level = replace(SOUND, slide_mm=LEVELS["slide-2"].slide_mm)
     counts = counts_of(level, STRIP)
     rng = np.random.default_rng(3)
     sample_sensor(SENSOR, rng)
     towards = rng.uniform(-np.pi, np.pi)
-    ways = np.linspace(-level.slide_mm / 2, level.slide_mm / 2, places)
+    ways = np.linspace(-level.slide_mm / 2, level.slide_mm / 2, 5)
     forces = np.mean(
         [tabs(STRIP, SENSOR, replace(HERE, x_mm=HERE.x_mm + way * np.cos(towards),
                                      y_mm=HERE.y_mm + way * np.sin(towards))).forces_n
          for way in ways], axis=0,
     )  # fmt: skip
     g = film_s(forces)
-    expected = np.clip(8 + 1023 * 150 / (1023 * 22 * GAIN_S) * g / (g.sum(0) + 1 / 22), 0, 1023)
-    assert np.abs(counts - expected).max() <= 0.5 + 1e-6
+    assert_read(counts, g / (g.sum(0) + 1 / 22))
 
 
 def test_mountings_put_each_tactel_where_they_say():
