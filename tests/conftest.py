@@ -30,14 +30,6 @@ def pytest_xdist_auto_num_workers():
     return (os.cpu_count() or 1) + 1
 
 
-@pytest.hookimpl(tryfirst=True)  # xdist reads the groups in the same hook
-def pytest_collection_modifyitems(items):
-    """Keep the tests of a file in one process, with what they set up; each corpus part is alone."""
-    for item in items:
-        if item.path.name != "test_corpora.py":
-            item.add_marker(pytest.mark.xdist_group(item.nodeid.split("::")[0]))
-
-
 @pytest.fixture(scope="session", autouse=True)
 def one_lab_key():
     """Draw the same key for every new database of this process: the same arrays in every run."""

@@ -1,31 +1,9 @@
-"""What the code makes is what is stored: each part of each corpus, in a process of its own.
+"""How corpora are compared, and the short ones as they are stored."""
 
-`make.py` sets what floating point and output depend on before anything is loaded.
-"""
+from corpora import make
+from corpora.stored import as_stored
 
-import subprocess
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
-
-import pytest
-
-MAKE = Path(__file__).with_name("make.py")
-SPEC = spec_from_file_location("corpora_make", MAKE)
-make = module_from_spec(SPEC)
-SPEC.loader.exec_module(make)
-
-
-# The longest ones begin first.
-PARTS = [part for name in reversed(make.CORPORA) for part in make.parts_of(name)]
-
-
-@pytest.mark.parametrize("part", PARTS)
-def test_corpus_is_as_stored(part, tmp_path):
-    run = subprocess.run(
-        [sys.executable, MAKE, "--check", part], cwd=tmp_path, capture_output=True, text=True
-    )
-    assert not run.returncode, run.stdout + run.stderr
+test_recordings_and_databases_are_as_stored = as_stored("recordings", "databases")
 
 
 def test_numbers_may_round_and_nothing_else_may_differ():

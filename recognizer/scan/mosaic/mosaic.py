@@ -1,8 +1,8 @@
 """The mosaic of a face: touches, their poses and covariances, and the image. Thesis 4.3.
 
-Its frame is that of the face as soon as one touch is decoded, until then that of the arm's plane.
-`add_touch` costs the registration of the touch with its neighbours and one solution of the pose
-graph.
+Its frame is that of the face where touches are decoded, otherwise that of the arm's plane; all
+touches have one kind of place. `add_touch` costs the registration of the touch with its neighbours
+and one solution of the pose graph.
 
 A decoded touch has its pose; images of neighbours only check it. Any other touch is searched for on
 the mean of all touches near it, which shows more than each of them and excludes more places that
@@ -42,7 +42,6 @@ from recognizer.scan.mosaic.planar import (
     PlanarBelief,
     compose_poses,
     composed_covariance,
-    inverse,
     pose_difference,
     relative_covariance,
     relative_pose,
@@ -50,9 +49,6 @@ from recognizer.scan.mosaic.planar import (
     transform_points,
 )
 from recognizer.scan.mosaic.pose_graph import (
-    ARM,
-    FREE_CHI2,
-    OUTLIER_WEIGHT,
     PLANE,
     Constraint,
     Kind,
@@ -103,8 +99,6 @@ class Mosaic:
     covariances: Array  #: (n, 3, 3); of older touches too large
     reasons: tuple[str, ...]  #: "" where decoded or registered, otherwise why not
     gains: Array  #: (n,) factors that make the readings of touches equal
-    arm: Array  #: (3,) T_plane_arm
-    arm_covariance: Array  #: (3, 3); zero where the arm's plane is the frame
     constraints: tuple[Constraint, ...]
     entries: tuple[CanvasEntry | None, ...]  #: of each touch on the canvas
     canvas: Canvas
@@ -113,20 +107,9 @@ class Mosaic:
         return len(self.touches)
 
     @property
-    def on_face(self) -> bool:
-        """Whether the frame is that of the face; otherwise that of the arm's plane."""
-        return any(touch.decoded is not None for touch in self.touches)
-
-    @property
     def image(self) -> GlobalImage:
         """The global tactile image."""
         return image_of(self.canvas)
-
-    def frame_pose(self, frame: int) -> Array:
-        """Return the pose (3,) of a touch by its number, of ARM or PLANE."""
-        if frame == PLANE:
-            return np.zeros(3)
-        return self.arm if frame == ARM else np.asarray(self.poses[frame])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,8 +144,6 @@ def no_touches(sensor: SensorType, period_mm: float = PERIOD_MM) -> Mosaic:
         covariances=np.zeros((0, 3, 3)),
         reasons=(),
         gains=np.zeros(0),
-        arm=np.zeros(3),
-        arm_covariance=np.zeros((3, 3)),
         constraints=(),
         entries=(),
         canvas=empty_canvas(sensor.pitch_mm),
@@ -172,13 +153,10 @@ def no_touches(sensor: SensorType, period_mm: float = PERIOD_MM) -> Mosaic:
 def add_touch(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
     """Return the mosaic of one face with one touch added; the first is `no_touches`.
 
-    The first decoded touch turns the mosaic's frame into that of the face; it needs a place in the
-    old frame, too.
-
     Raises
     ------
     MosaicError
-        Another sensor's image, or a touch without a frame.
+        Another sensor's image, or a touch in another frame.
     """
     shape = touch.signal.forces.shape
     if shape != (mosaic.sensor.rows, mosaic.sensor.columns):
@@ -187,9 +165,14 @@ def add_touch(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
             fix=f"the sensor has {mosaic.sensor.rows} x {mosaic.sensor.columns}",
             place=f"touch {touch.seq}",
         )
+    if len(mosaic) and (touch.decoded is None) != (mosaic.touches[0].decoded is None):
+        raise MosaicError(
+            "touches in two frames: some are decoded, some have a pose by the arm",
+            fix="give all touches a decoded place, or none",
+            place=f"touch {touch.seq}",
+        )
     number = len(mosaic)
     patch = patch_of(mosaic.sensor, touch.signal)
-    mosaic = _frame_for_touch(mosaic, touch, patch)
     place = _place_touch(mosaic, touch, patch)
     constraints = mosaic.constraints + place.constraints
     met = {constraint.a for constraint in place.constraints if constraint.kind == "pair"}
@@ -206,21 +189,13 @@ def add_touch(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
         constraints=constraints,
     )
     fresh = {number, *(constraint.a for constraint in place.constraints if constraint.a >= 0)}
-    found = _solve(grown)
-    doubted = [k for k, constraint in enumerate(constraints) if constraint.kind == "decoded"]
-    if any(found.weights[k] < OUTLIER_WEIGHT for k in doubted):
-        found = _vote_on_frame(grown, found)
-    return _apply_solution(grown, found, fresh)
+    return _apply_solution(grown, solve_pose_graph(constraints, grown.poses), fresh)
 
 
 def _place_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> TouchPlacement:
     number = len(mosaic)
     given = _given_constraints(touch, number)
     predicted = _predict_pose(mosaic, touch)
-    if _contradicts_decoded(mosaic, touch):  # neighbours decide which source is right
-        other = _place_touch(mosaic, replace(touch, decoded=None), patch)
-        if not other.reason:
-            return replace(other, constraints=(given[0], *other.constraints))
     near = _overlapping_neighbours(mosaic, patch, predicted)
     reason, start = _search_mosaic(mosaic, patch, predicted, near)
     pairs: list[tuple[int, ImageRegistration]] = []
@@ -246,9 +221,9 @@ def _place_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> Touch
         reason = PARTLY
     starts = [predicted.pose, start]
     starts += [
-        compose_poses(mosaic.frame_pose(constraint.a), constraint.pose)
+        compose_poses(mosaic.poses[constraint.a], constraint.pose)
         for constraint in constraints
-        if constraint.a != ARM
+        if constraint.a != PLANE
     ]
     pose = min(starts, key=lambda pose: _disagreement(mosaic, constraints, pose))
     return TouchPlacement(pose, tuple(constraints), _gain(mosaic, pairs), reason)
@@ -258,34 +233,21 @@ def _given_constraints(touch: PlacedTouch, number: int) -> list[Constraint]:
     def constraint(a: int, place: PlanarBelief, kind: Kind) -> Constraint:
         return Constraint(a, number, place.pose, np.asarray(np.linalg.inv(place.covariance)), kind)
 
-    constraints = []
     if touch.decoded is not None:
-        constraints.append(constraint(PLANE, touch.decoded, "decoded"))
+        return [constraint(PLANE, touch.decoded, "decoded")]
+    constraints = []
     if touch.believed is not None:
-        constraints.append(constraint(ARM, touch.believed, "believed"))
+        constraints.append(constraint(PLANE, touch.believed, "believed"))
     if touch.stepped is not None and number > 0:
         constraints.append(constraint(number - 1, touch.stepped, "stepped"))
     return constraints
-
-
-def _contradicts_decoded(mosaic: Mosaic, touch: PlacedTouch) -> bool:
-    if touch.decoded is None or not len(mosaic) or not (touch.believed or touch.stepped):
-        return False
-    expected = _predict_pose(mosaic, replace(touch, decoded=None))
-    away = pose_difference(touch.decoded.pose, expected.pose)
-    spread = expected.covariance + touch.decoded.covariance
-    return float(away @ np.linalg.solve(spread, away)) > FREE_CHI2
 
 
 def _predict_pose(mosaic: Mosaic, touch: PlacedTouch) -> PlanarBelief:
     """Return the expected pose of a touch, without its image."""
     if touch.decoded is not None:
         return touch.decoded
-    found: list[PlanarBelief] = []
-    if touch.believed is not None and np.isfinite(mosaic.arm_covariance).all():
-        pose, covariance = touch.believed.pose, touch.believed.covariance
-        spread = composed_covariance(mosaic.arm, pose, mosaic.arm_covariance, covariance)
-        found.append(PlanarBelief(compose_poses(mosaic.arm, pose), spread))
+    found = [] if touch.believed is None else [touch.believed]
     if touch.stepped is not None and len(mosaic):
         pose, covariance = touch.stepped.pose, touch.stepped.covariance
         before, sure = mosaic.poses[-1], mosaic.covariances[-1]
@@ -293,8 +255,8 @@ def _predict_pose(mosaic: Mosaic, touch: PlacedTouch) -> PlanarBelief:
         found.append(PlanarBelief(compose_poses(before, pose), spread))
     if not found:
         raise MosaicError(
-            "a touch without a frame: no touch before it connects the arm to the face",
-            fix="give one touch both a decoded place and the arm's pose",
+            "the first touch has a step, and no touch before it",
+            fix="give it the arm's pose",
             place=f"touch {touch.seq}",
         )
     return min(found, key=lambda place: float(np.trace(place.covariance[:2, :2])))
@@ -368,7 +330,8 @@ def _disagreement(mosaic: Mosaic, constraints: Sequence[Constraint], pose: Array
     """Return the robust cost of a touch's constraints at a pose."""
     chi2 = []
     for constraint in constraints:
-        at = relative_pose(mosaic.frame_pose(constraint.a), pose)
+        a = constraint.a
+        at = pose if a == PLANE else relative_pose(mosaic.poses[a], pose)
         away = pose_difference(at, constraint.pose)
         chi2.append(float(away @ constraint.information @ away))
     return float(robust_cost(np.array(chi2))[0].sum())
@@ -383,96 +346,16 @@ def _gain(mosaic: Mosaic, pairs: Sequence[tuple[int, ImageRegistration]]) -> flo
     return float(np.exp(weights @ logs / weights.sum()))
 
 
-def _frame_for_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> Mosaic:
-    """Return the mosaic in the frame in which a touch can be placed."""
-    if touch.decoded is None:
-        if not mosaic.on_face or touch.believed is None or _uses_arm(mosaic):
-            return mosaic
-        # the arm's frame is not known: no decoded touch has a pose by the arm
-        return replace(mosaic, arm_covariance=np.full((3, 3), np.inf))
-    believed = touch.believed
-    if believed is not None and not _uses_arm(mosaic) and (mosaic.on_face or not len(mosaic)):
-        mosaic = replace(mosaic, arm=compose_poses(touch.decoded.pose, inverse(believed.pose)))
-    if mosaic.on_face or not len(mosaic):
-        return mosaic
-    if believed is None and touch.stepped is None:
-        raise MosaicError(
-            "the first decoded touch has no pose by the arm",
-            fix="give the arm's pose of it, too",
-            place=f"touch {touch.seq}",
-        )
-    pose = _place_touch(mosaic, replace(touch, decoded=None), patch).pose
-    T_face_plane = compose_poses(touch.decoded.pose, inverse(pose))
-    return _change_frame(mosaic, T_face_plane)
-
-
-def _change_frame(mosaic: Mosaic, T_new_old: Array) -> Mosaic:
-    turn = rotation(float(T_new_old[2]))
-    canvas, entries = empty_canvas(mosaic.sensor.pitch_mm), list(mosaic.entries)
-    for n, entry in enumerate(mosaic.entries):
-        if entry is not None:
-            pose = compose_poses(T_new_old, entry.pose)
-            moved = CanvasEntry(pose, turn @ entry.covariance @ turn.T, entry.gain)
-            entries[n] = moved
-            canvas = add_to_canvas(canvas, mosaic.patches[n], moved)
-    return replace(
-        mosaic,
-        poses=compose_poses(T_new_old, mosaic.poses),
-        covariances=turn @ mosaic.covariances @ turn.T,
-        arm=compose_poses(T_new_old, mosaic.arm),
-        arm_covariance=turn @ mosaic.arm_covariance @ turn.T,
-        entries=tuple(entries),
-        canvas=canvas,
-    )
-
-
-def _uses_arm(mosaic: Mosaic) -> bool:
-    return any(constraint.a == ARM for constraint in mosaic.constraints)
-
-
-def _solve(mosaic: Mosaic) -> PoseGraphSolution:
-    fixed = not mosaic.on_face
-    return solve_pose_graph(mosaic.constraints, mosaic.poses, mosaic.arm, arm_fixed=fixed)
-
-
-def _vote_on_frame(mosaic: Mosaic, found: PoseGraphSolution) -> PoseGraphSolution:
-    """Return a better solution, if other decoded touches give the face another pose.
-
-    The first decoded touch fixes the frame. If it is wrong, all later ones look wrong: each of them
-    proposes a frame, and the cost decides.
-    """
-    for constraint in mosaic.constraints:
-        if constraint.kind == "decoded":
-            shift = compose_poses(constraint.pose, inverse(found.poses[constraint.b]))
-            if far_apart(shift, np.zeros(3), mosaic.sensor) < 0.1:
-                continue
-            moved = replace(
-                mosaic, poses=compose_poses(shift, found.poses), arm=compose_poses(shift, found.arm)
-            )
-            other = _solve(moved)
-            if other.cost < found.cost - 1e-6:
-                found = other
-    return found
-
-
 def _apply_solution(mosaic: Mosaic, found: PoseGraphSolution, fresh: set[int]) -> Mosaic:
     """Return the mosaic with the poses of a solution, and its image with them."""
     numbers = sorted(fresh)
-    free = mosaic.on_face and _uses_arm(mosaic)
-    spread = covariances(found.normal, [*numbers, len(mosaic)] if free else numbers)
     kept = mosaic.covariances.copy()
-    kept[numbers] = spread[: len(numbers)]
+    kept[numbers] = covariances(found.normal, numbers)
     canvas, entries = mosaic.canvas, list(mosaic.entries)
     for n, entry in enumerate(entries):
         canvas, entries[n] = _move_entry(mosaic, canvas, found, n, entry)
     return replace(
-        mosaic,
-        poses=found.poses,
-        covariances=kept,
-        arm=found.arm,
-        arm_covariance=spread[-1] if free else np.zeros((3, 3)),
-        entries=tuple(entries),
-        canvas=canvas,
+        mosaic, poses=found.poses, covariances=kept, entries=tuple(entries), canvas=canvas
     )
 
 

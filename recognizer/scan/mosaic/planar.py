@@ -4,10 +4,10 @@ A pose is (..., 3): x, y (mm) and the turn theta (rad) of one frame in another. 
 of frame b to frame a: p_a = R(theta) p_b + (x, y). Errors of a pose are differences of its three
 numbers, so covariances belong to (x, y, theta) in the axes of frame a.
 
-A touch has up to three sources for its pose. The arm believes a pose in a frame of its own (robot
-base or first touch), wrong by about a tactel. The reader decodes a pose in the frame of the face,
-right to hundredths of a tactel, where the touch shows enough symbols. A probe moved by hand counts
-the steps from touch to touch.
+The pose of a touch has one of three sources. The arm believes a pose in the frame of the first
+touch, wrong by about a tactel. The reader decodes a pose in the frame of the face, right to
+hundredths of a tactel, where the touch shows enough symbols. A probe moved by hand counts the steps
+from touch to touch.
 """
 
 from __future__ import annotations

@@ -2,8 +2,7 @@
 
 Every constraint gives the pose of frame b in frame a with its information:
 
-    face   - touch    decoded by the reader
-    arm    - touch    believed by the arm, in a frame of its own
+    plane  - touch    decoded by the reader, or believed by the arm
     touch  - touch    registered images (`register`), or a counted step
 
 so there is one residual, r = T_a^-1 T_b - z. A constraint that disagrees with the rest is switched
@@ -27,10 +26,9 @@ from recognizer.scan.mosaic.planar import pose_difference, relative_pose, wrap_a
 
 Array = NDArray[np.float64]
 
-PLANE, ARM = -2, -1  #: the mosaic's frame, which is fixed, and the arm's
+PLANE = -1  #: the mosaic's frame, which is fixed
 
 FREE_CHI2 = 16.0  #: chi^2 of three numbers from which a constraint is doubted; .1 % of good ones
-OUTLIER_WEIGHT = 0.5  #: weight under which a constraint counts as wrong
 LEAST_WEIGHT = 1e-4  #: of a constraint that is switched off; keeps every touch somewhere
 STEPS = 30  #: at most
 DONE_MM = 1e-4  #: of x and y: a step under both is the last one
@@ -44,7 +42,7 @@ Kind = Literal["decoded", "believed", "stepped", "pair"]
 class Constraint:
     """The pose of frame b in frame a."""
 
-    a: int  #: number of a touch, PLANE or ARM
+    a: int  #: number of a touch, or PLANE
     b: int  #: number of a touch
     pose: Array  #: (3,) T_a_b, mm and rad
     information: Array  #: (3, 3) inverse covariance, axes of a; may be singular
@@ -56,25 +54,21 @@ class PoseGraphSolution:
     """Poses with the fit of each constraint."""
 
     poses: Array  #: (n, 3) T_plane_touch
-    arm: Array  #: (3,) T_plane_arm
-    weights: Array  #: (m,) 0 ... 1; under `OUTLIER_WEIGHT` a constraint counts as wrong
+    weights: Array  #: (m,) 0 ... 1; less for a constraint that disagrees
     cost: float
-    normal: Any  #: sparse matrix (3 n + 3) square, inverse covariance of poses and arm
+    normal: Any  #: sparse matrix (3 n) square, inverse covariance of poses
 
 
-def solve_pose_graph(
-    constraints: Sequence[Constraint], poses: Array, arm: Array, *, arm_fixed: bool
-) -> PoseGraphSolution:
+def solve_pose_graph(constraints: Sequence[Constraint], poses: Array) -> PoseGraphSolution:
     """Return the poses that agree best with all constraints.
 
-    Constraints connect every touch to the plane; `poses` (n, 3) and `arm` (3,) are the start. With
-    `arm_fixed` the arm's frame is the plane's: no touch was decoded.
+    Constraints connect every touch to the plane; `poses` (n, 3) are the start.
     """
     from scipy.sparse import diags
     from scipy.sparse.linalg import splu
 
-    linearise = _linearise(constraints, len(poses), arm_fixed=arm_fixed)
-    at, damping = np.concatenate([poses, arm[None]]), 1e-6
+    linearise = _linearise(constraints, len(poses))
+    at, damping = poses, 1e-6
     cost, weights, normal, pull = linearise(at)
     for _ in range(STEPS):
         diagonal = diags(normal.diagonal() * damping)
@@ -89,11 +83,11 @@ def solve_pose_graph(
         at, (cost, weights, normal, pull) = moved, then
         if np.abs(step[:, :2]).max() < DONE_MM and np.abs(step[:, 2]).max() < DONE_RAD:
             break
-    return PoseGraphSolution(at[:-1], at[-1], weights, cost, normal)
+    return PoseGraphSolution(at, weights, cost, normal)
 
 
 def covariances(normal: Any, numbers: Sequence[int]) -> Array:
-    """Return covariances (k, 3, 3) of some poses (mm and rad); the arm is the n-th."""
+    """Return covariances (k, 3, 3) of some poses (mm and rad)."""
     from scipy.sparse.linalg import splu
 
     factor, size = splu(normal.tocsc()), normal.shape[0]
@@ -117,22 +111,18 @@ def robust_cost(chi2: Array) -> tuple[Array, Array]:
 
 
 def _linearise(
-    constraints: Sequence[Constraint], n: int, *, arm_fixed: bool
+    constraints: Sequence[Constraint], n: int
 ) -> Callable[[Array], tuple[float, Array, Any, Array]]:
-    """Return the cost, weights (m,), normal matrix and its right side by poses (n + 1, 3).
+    """Return the cost, weights (m,), normal matrix and its right side by poses (n, 3).
 
-    The arm's pose is the last one; the plane, which is fixed, has the number n + 1.
+    The plane, which is fixed, has the number n.
     """
     from scipy.sparse import coo_matrix
 
-    number = {PLANE: n + 1, ARM: n}
-    a = np.array([number.get(constraint.a, constraint.a) for constraint in constraints])
+    a = np.array([n if constraint.a == PLANE else constraint.a for constraint in constraints])
     b = np.array([constraint.b for constraint in constraints])
     measured = np.array([constraint.pose for constraint in constraints])
     information = np.array([constraint.information for constraint in constraints])
-    fixed = np.zeros(n + 2, np.bool_)
-    fixed[n + 1], fixed[n] = True, arm_fixed or not (a == n).any()
-    held = np.flatnonzero(fixed[:-1])  # the arm, where it is fixed
     i, j = np.mgrid[:3, :3]
 
     def linearise(at: Array) -> tuple[float, Array, Any, Array]:
@@ -143,22 +133,19 @@ def _linearise(
         costs, weights = robust_cost(chi2)
         by_a, by_b = _slopes(every[a, 2], relative)
         heavy = information * weights[:, None, None]
-        rows, columns = [held], [held]
-        blocks = [np.broadcast_to(np.eye(3), (len(held), 3, 3))]
-        pull = np.zeros((n + 2, 3))
+        rows, columns, blocks = [], [], []
+        pull = np.zeros((n + 1, 3))
         for one, by_one in ((a, by_a), (b, by_b)):
             left = by_one.swapaxes(1, 2) @ heavy
-            free = ~fixed[one]
-            np.add.at(pull, one[free], -(left @ residual[:, :, None])[free, :, 0])
+            np.add.at(pull, one, -(left @ residual[:, :, None])[:, :, 0])
             for other, by_other in ((a, by_a), (b, by_b)):
-                both = free & ~fixed[other]
+                both = (one < n) & (other < n)
                 rows.append(one[both])
                 columns.append(other[both])
                 blocks.append((left @ by_other)[both])
         row, column = (3 * np.concatenate(k)[:, None, None] for k in (rows, columns))
         places = (row + i).reshape(-1), (column + j).reshape(-1)
-        size = 3 * n + 3
-        normal = coo_matrix((np.concatenate(blocks).reshape(-1), places), shape=(size, size))
+        normal = coo_matrix((np.concatenate(blocks).reshape(-1), places), shape=(3 * n, 3 * n))
         return float(costs.sum()), weights, normal.tocsc(), pull[:-1].reshape(-1)
 
     return linearise
