@@ -350,7 +350,7 @@ def _wrong_value(
 def _value_text(value: Any) -> str:
     """Return a value as it may stand in a sentence."""
     if isinstance(value, str):
-        return f"'{value if len(value) <= 40 else value[:37] + '...'}'"
+        return f"'{_shorten(value)}'"
     if isinstance(value, dict):
         return "a block of settings"
     if isinstance(value, list):

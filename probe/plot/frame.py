@@ -7,7 +7,7 @@ matplotlibrc: the same picture is the same bytes everywhere.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ DPI = 100
 HEAT = "inferno"
 _SETTINGS = {"font.family": "DejaVu Sans", "font.size": 9.0, "svg.hashsalt": "probe"}
 UNITS = {"counts": "reading (ADC counts)", "N": "force (N)", "scaled": "reading (scaled)"}
-WIDTH, HEIGHT = 1000, 440  #: px, of each image
+WIDTH, HEIGHT = 1000, 440  #: px
 #: left, low, wide and high of heat map, its scale, and the surface: shares of WIDTH and HEIGHT
 _PLACES = ((0.07, 0.13, 0.352, 0.8), (0.437, 0.2, 0.015, 0.66), (0.5, 0.02, 0.49, 0.96))
 
@@ -63,43 +63,26 @@ def frame_picture(
     azimuth_deg: float = -60.0,
     elevation_deg: float = 40.0,
 ) -> None:
-    """Draw an image twice, from above and as a surface; see `frames_picture`."""
-    frames_picture({title: image}, path, unit=unit, sensor=sensor, azimuth_deg=azimuth_deg,
-                   elevation_deg=elevation_deg)  # fmt: skip
+    """Draw an image (rows, columns) twice, from above and as a surface.
 
-
-def frames_picture(
-    images: Mapping[str, ArrayLike],
-    path: Path,
-    *,
-    unit: str = "counts",
-    sensor: SensorType | None = None,
-    azimuth_deg: float = -60.0,
-    elevation_deg: float = 40.0,
-) -> None:
-    """Draw images (rows, columns) below each other, each from above and as a surface.
-
-    `images` holds them by title, `path` is the PNG. Their unit is counts, N, or another; `sensor`
-    is that of the thesis by default; the angles say from where the surfaces are seen.
+    `path` is the PNG. The unit is counts, N, or another; `sensor` is that of the thesis by default;
+    the angles say from where the surface is seen.
     """
     matrix = sensor or SensorType()
     half_x, half_y = matrix.half_mm
-    label = UNITS.get(unit, f"reading ({unit})")
-    with page(path, WIDTH, HEIGHT * len(images)) as figure:
+    values = np.asarray(image, dtype=np.float64)
+    heat = Normalize(min(0.0, float(values.min())), max(float(values.max()), 1e-9))
+    with page(path, WIDTH, HEIGHT) as figure:
         figure.set_layout_engine("none")
-        high = 1 / len(images)
-        for row, (title, image) in enumerate(images.items()):
-            values = np.asarray(image, dtype=np.float64)
-            heat = Normalize(min(0.0, float(values.min())), max(float(values.max()), 1e-9))
-            low = 1 - (row + 1) * high
-            flat, scale, turned = (
-                figure.add_axes((x, low + y * high, wide, tall * high), projection=kind)
-                for (x, y, wide, tall), kind in zip(_PLACES, (None, None, "3d"), strict=True)
-            )
-            flat.imshow(values, cmap=HEAT, norm=heat, extent=(-half_x, half_x, -half_y, half_y))
-            in_mm(flat, title)
-            figure.colorbar(ScalarMappable(heat, HEAT), cax=scale, label=label)
-            _surface(turned, values, matrix, heat, (azimuth_deg, elevation_deg))
+        flat, scale, turned = (
+            figure.add_axes(place, projection=kind)
+            for place, kind in zip(_PLACES, (None, None, "3d"), strict=True)
+        )
+        flat.imshow(values, cmap=HEAT, norm=heat, extent=(-half_x, half_x, -half_y, half_y))
+        in_mm(flat, title)
+        label = UNITS.get(unit, f"reading ({unit})")
+        figure.colorbar(ScalarMappable(heat, HEAT), cax=scale, label=label)
+        _surface(turned, values, matrix, heat, (azimuth_deg, elevation_deg))
 
 
 def _surface(

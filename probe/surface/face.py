@@ -73,7 +73,7 @@ class FaceSurface:
 
 
 def endless_face(
-    labels: ArrayLike | Callable[[Index, Index], ArrayLike],
+    labels: ArrayLike,
     glyphs: Sequence[Strokes],
     *,
     pitch_mm: float = 7.0,
@@ -85,8 +85,8 @@ def endless_face(
     Parameters
     ----------
     labels
-        (rows, columns) labels, repeated without end; or a function of rows (n,) and columns
-        (n,), any whole numbers. Cell (r, c) has its centre at ((c + 1/2) p, -(r + 1/2) p).
+        (rows, columns) labels, repeated without end. Cell (r, c) has its centre at
+        ((c + 1/2) p, -(r + 1/2) p).
     glyphs
         Strokes of each label, between nodes in units of `unit_mm`.
 
@@ -96,8 +96,7 @@ def endless_face(
         When the symbols overlap or collapse.
     """
     symbols = emboss(tuple(glyphs), unit_mm, relief or Relief())
-    label_at: LabelAt = call_lookup(labels) if callable(labels) else tile_lookup(labels)
-    return FaceSurface(LatticeSurface(template(symbols, pitch_mm), label_at))
+    return FaceSurface(LatticeSurface(template(symbols, pitch_mm), tile_lookup(labels)))
 
 
 #: Rows (n,) and columns (n,), counted from the anchor -> labels (n,), -1 for no symbol.
@@ -182,24 +181,6 @@ def tile_lookup(labels: ArrayLike) -> LabelAt:
 
     def label_at(rows: Index, columns: Index) -> Index:
         found: Index = grid.ravel().take((rows % height) * width + columns % width)
-        return found
-
-    return label_at
-
-
-def call_lookup(label: Callable[[Index, Index], ArrayLike]) -> LabelAt:
-    """Return the look-up of a function of rows and columns (n,), called once a cell in view."""
-
-    def label_at(rows: Index, columns: Index) -> Index:
-        if not len(rows):
-            return np.zeros(0, dtype=np.int64)
-        r, c = int(rows.min()), int(columns.min())
-        height, width = int(rows.max()) - r + 1, int(columns.max()) - c + 1
-        if height * width > len(rows):  # far apart: fewer points than cells between them
-            return np.asarray(label(rows, columns), dtype=np.int64)
-        i, j = np.divmod(np.arange(height * width), width)
-        grid = np.asarray(label(i + r, j + c), dtype=np.int64)
-        found: Index = grid.take((rows - r) * width + (columns - c))
         return found
 
     return label_at

@@ -8,7 +8,7 @@ from PIL import Image
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.press import press
-from probe.plot.frame import HEAT, HEIGHT, WIDTH, frame_picture, frames_picture
+from probe.plot.frame import HEAT, HEIGHT, WIDTH, frame_picture
 from probe.plot.touch import MARK, OUTLINE, touch_picture
 from probe.surface.indenters import Washer
 
@@ -48,16 +48,6 @@ def test_the_same_image_is_the_same_file_under_any_settings(tmp_path):
         frame_picture(image, tmp_path / "b.png", unit="N", title="a")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert not mpl.get_backend().lower().startswith("qt")
-
-
-def test_images_below_each_other(tmp_path):
-    images = {"one": np.eye(16), "two": np.eye(16)[::-1]}
-    frames_picture(images, tmp_path / "a.png", azimuth_deg=30, elevation_deg=20)
-    pixels = pixels_of(tmp_path / "a.png")
-    assert pixels.shape == (2 * HEIGHT, WIDTH, 3)
-    frame_picture(images["two"], tmp_path / "b.png", title="two", azimuth_deg=30,
-                  elevation_deg=20)  # fmt: skip
-    assert np.abs(pixels[HEIGHT:].astype(int) - pixels_of(tmp_path / "b.png")).mean() < 1
 
 
 def test_a_touch_shows_surface_force_and_reading(tmp_path):

@@ -16,8 +16,6 @@ from probe.surface import indenters
 from probe.surface.body import close_below, manifold_from, mesh_heights, triangulate
 from probe.surface.face import (
     LatticeSurface,
-    call_lookup,
-    endless_face,
     list_lookup,
     template,
     tile_lookup,
@@ -425,23 +423,6 @@ def test_an_endless_lattice_repeats_its_tile():
         want = symbols.heights_mm(np.full(500, label), x, y) if label >= 0 else np.zeros(500)
         for k in (0, 3, -5):
             assert np.abs(cell_heights(endless, r + 4 * k, c + 5 * k, x, y) - want).max() < 1e-9
-
-
-def test_array_as_a_function_is_asked_once_for_every_cell_in_view():
-    asked = []
-
-    def label(rows, columns):
-        asked.append(len(rows))
-        return (rows * 7 + columns) % 3
-
-    face = endless_face(label, GLYPHS)
-    points = np.random.default_rng(0).uniform(-12, 12, (5000, 2)) + 1e7 * PITCH
-    heights = face.heights_mm(points)
-    assert asked[0] <= 25
-    assert len(asked) == 1
-    table = endless_face((np.arange(3)[:, None] * 7 + np.arange(3)) % 3, GLYPHS)
-    assert np.array_equal(heights, table.heights_mm(points))
-    assert call_lookup(label)(np.zeros(0, int), np.zeros(0, int)).shape == (0,)
 
 
 def test_two_symbols_in_one_cell_are_refused():
