@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.database.as_built import AsBuilt, read_as_built, write_as_built
+from generator.database.as_built import PARAMETERS, AsBuilt, read_as_built, write_as_built
 from generator.database.open import existing_database, open_database
 from generator.database.read import list_objects, read_object
 from generator.database.transaction import read_transaction, write_transaction
@@ -30,7 +30,6 @@ from recognizer.errors import AsBuiltError
 from recognizer.touch.lab import printer_of
 
 Array = NDArray[np.float64]
-FourNumbers = tuple[float, float, float, float]  #: of scale x, scale y, skew and stroke
 
 LEAST_TOUCHES = 10  #: without which there is no estimate
 ENOUGH_TOUCHES = 25  #: that users are asked for
@@ -39,10 +38,11 @@ MEDIAN_CHI2 = 3.357  #: of the four numbers of a touch
 ROUNDS = 50  #: of reweighing, at most
 SETTLED = 1e-9  #: change of a strain that ends them
 UNSEEN = 1e-6  #: of the largest eigenvalue: below it a direction was not touched
-#: standard deviations that no number of touches reduces: templates differ from real readings
-ALWAYS: FourNumbers = (0.0006, 0.0006, 0.0005, 0.1)
-#: least standard deviations between the parts of one printer and material
-BETWEEN: FourNumbers = (0.0015, 0.0015, 0.001, 0.1)
+#: standard deviations of `PARAMETERS` that no number of touches reduces: templates differ from
+#: real readings
+ALWAYS = (0.0006, 0.0006, 0.0005, 0.1)
+#: least ones between the parts of one printer and material
+BETWEEN = (0.0015, 0.0015, 0.001, 0.1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +128,7 @@ def estimate_printer(parts: Sequence[AsBuilt]) -> AsBuilt:
 
     Their spread is measured, and no less than `BETWEEN`.
     """
-    values = np.array([[one.scale_x, one.scale_y, one.skew_rad, one.stroke_mm] for one in parts])
+    values = np.array([[getattr(one, name) for name in PARAMETERS] for one in parts])
     mean, count = values.mean(axis=0), len(parts)
     between = np.square(BETWEEN)
     if count > 1:
@@ -139,10 +139,7 @@ def estimate_printer(parts: Sequence[AsBuilt]) -> AsBuilt:
         part=None,
         printer=parts[0].printer,
         material=parts[0].material,
-        scale_x=float(mean[0]),
-        scale_y=float(mean[1]),
-        skew_rad=float(mean[2]),
-        stroke_mm=float(mean[3]),
+        **dict(zip(PARAMETERS, mean.tolist(), strict=True)),
         covariance=known + np.diag(between) * (1 + 1 / count),
         touches=sum(one.touches for one in parts),
     )

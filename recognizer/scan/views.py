@@ -82,16 +82,13 @@ def estimate_poses(
     believed = touches[-1].believed
     pitch = min(embossed.style.pitch_mm for embossed in reader.lab.arrays)
     mosaic = None if before is None else before.mosaic
-    certain = (
-        believed is not None and position_sd_mm(believed.covariance) <= UNCERTAIN_PITCHES * pitch
-    )
-    if mosaic is None and certain and believed is not None:
-        pose, covariance = believed.pose[None], believed.covariance[None]
-        if before is None:
-            return TouchPoses(pose, covariance, None)
-        poses = np.concatenate([before.poses, pose])
-        return TouchPoses(poses, np.concatenate([before.covariances, covariance]), None)
     if mosaic is None:
+        if believed and position_sd_mm(believed.covariance) <= UNCERTAIN_PITCHES * pitch:
+            poses, covariances = believed.pose[None], believed.covariance[None]
+            if before is not None:
+                poses = np.concatenate([before.poses, poses])
+                covariances = np.concatenate([before.covariances, covariances])
+            return TouchPoses(poses, covariances, None)
         mosaic = no_touches(reader.sensor, pitch)
         for touch in touches[:-1]:
             mosaic = add_touch(mosaic, touch)

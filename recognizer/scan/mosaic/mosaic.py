@@ -112,16 +112,6 @@ class Mosaic:
         return image_of(self.canvas)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TouchPlacement:
-    """Start and constraints of a new touch."""
-
-    pose: Array  #: (3,) T_plane_touch to start from
-    constraints: tuple[Constraint, ...]
-    gain: float
-    reason: str  #: "" where decoded or registered in all directions
-
-
 def no_touches(sensor: SensorType, period_mm: float = PERIOD_MM) -> Mosaic:
     """Return an empty mosaic.
 
@@ -171,28 +161,14 @@ def add_touch(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
             fix="give all touches a decoded place, or none",
             place=f"touch {touch.seq}",
         )
-    number = len(mosaic)
-    patch = patch_of(mosaic.sensor, touch.signal)
-    place = _place_touch(mosaic, touch, patch)
-    constraints = mosaic.constraints + place.constraints
-    met = {constraint.a for constraint in place.constraints if constraint.kind == "pair"}
-    reasons = ["" if n in met and why == ALONE else why for n, why in enumerate(mosaic.reasons)]
-    grown = replace(
-        mosaic,
-        touches=(*mosaic.touches, touch),
-        patches=(*mosaic.patches, patch),
-        poses=np.concatenate([mosaic.poses, place.pose[None]]),
-        covariances=np.concatenate([mosaic.covariances, np.full((1, 3, 3), np.nan)]),
-        reasons=(*reasons, place.reason),
-        gains=np.append(mosaic.gains, place.gain),
-        entries=(*mosaic.entries, None),
-        constraints=constraints,
-    )
-    fresh = {number, *(constraint.a for constraint in place.constraints if constraint.a >= 0)}
-    return _apply_solution(grown, solve_pose_graph(constraints, grown.poses), fresh)
+    grown = _join_touch(mosaic, touch, patch_of(mosaic.sensor, touch.signal))
+    joined = (constraint.a for constraint in grown.constraints[len(mosaic.constraints) :])
+    fresh = {len(mosaic), *(a for a in joined if a != PLANE)}
+    return _apply_solution(grown, solve_pose_graph(grown.constraints, grown.poses), fresh)
 
 
-def _place_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> TouchPlacement:
+def _join_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> Mosaic:
+    """Return the mosaic with a touch at the pose to start from, and its constraints."""
     number = len(mosaic)
     given = _given_constraints(touch, number)
     predicted = _predict_pose(mosaic, touch)
@@ -226,7 +202,19 @@ def _place_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> Touch
         if constraint.a != PLANE
     ]
     pose = min(starts, key=lambda pose: _disagreement(mosaic, constraints, pose))
-    return TouchPlacement(pose, tuple(constraints), _gain(mosaic, pairs), reason)
+    met = {constraint.a for constraint in registered}
+    reasons = ["" if n in met and why == ALONE else why for n, why in enumerate(mosaic.reasons)]
+    return replace(
+        mosaic,
+        touches=(*mosaic.touches, touch),
+        patches=(*mosaic.patches, patch),
+        poses=np.concatenate([mosaic.poses, pose[None]]),
+        covariances=np.concatenate([mosaic.covariances, np.full((1, 3, 3), np.nan)]),
+        reasons=(*reasons, reason),
+        gains=np.append(mosaic.gains, _gain(mosaic, pairs)),
+        entries=(*mosaic.entries, None),
+        constraints=(*mosaic.constraints, *constraints),
+    )
 
 
 def _given_constraints(touch: PlacedTouch, number: int) -> list[Constraint]:

@@ -33,7 +33,6 @@ LEAST_WEIGHT = 1e-4  #: of a constraint that is switched off; keeps every touch 
 STEPS = 30  #: at most
 DONE_MM = 1e-4  #: of x and y: a step under both is the last one
 DONE_RAD = 1e-6  #: of turns
-AT_ONCE = 64  #: poses whose covariances are solved for together
 
 Kind = Literal["decoded", "believed", "stepped", "pair"]
 
@@ -90,16 +89,12 @@ def covariances(normal: Any, numbers: Sequence[int]) -> Array:
     """Return covariances (k, 3, 3) of some poses (mm and rad)."""
     from scipy.sparse.linalg import splu
 
-    factor, size = splu(normal.tocsc()), normal.shape[0]
-    found = np.empty((len(numbers), 3, 3))
-    for first in range(0, len(numbers), AT_ONCE):
-        some = np.asarray(numbers[first : first + AT_ONCE])
-        rows = (3 * some[:, None] + np.arange(3)).reshape(-1)
-        right = np.zeros((size, len(rows)))
-        right[rows, np.arange(len(rows))] = 1.0
-        blocks = factor.solve(right)[rows].reshape(len(some), 3, len(some), 3)
-        k = np.arange(len(some))
-        found[first : first + len(some)] = blocks[k, :, k, :]
+    count = len(numbers)
+    rows = (3 * np.asarray(numbers)[:, None] + np.arange(3)).reshape(-1)
+    right = np.zeros((normal.shape[0], 3 * count))
+    right[rows, np.arange(3 * count)] = 1.0
+    blocks = splu(normal.tocsc()).solve(right)[rows].reshape(count, 3, count, 3)
+    found: Array = blocks[np.arange(count), :, np.arange(count), :]
     return (found + found.swapaxes(1, 2)) / 2
 
 

@@ -94,28 +94,28 @@ def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> R
     """Return the template of an alphabet, as embossed and on a sensor."""
     step, (low, high) = STEP_MM, EXPONENTS
     pad = sensor.overlay.kind == "pad"
-    pressed_response = _RESPONSES[sensor.overlay.kind]
+    responses = _RESPONSES[sensor.overlay.kind]
     half = style.pitch_mm / 2 if pad else _reach_mm(alphabet, style, sensor)
     steps = math.ceil(half / step) + (0 if pad else 1)
     axis = np.asarray((np.arange(2 * steps + 1) - steps) * step, np.float64)
     usual, wide = (
-        pressed_response(alphabet, replace(style, stroke_mm=style.stroke_mm + by), sensor, axis)
+        responses(alphabet, replace(style, stroke_mm=style.stroke_mm + by), sensor, axis)
         for by in (0.0, STROKE_UNIT_MM)
     )
     rimmed = np.zeros((len(axis) + 2, len(axis) + 2, alphabet.order, 6), np.float32)
     values = rimmed[1:-1, 1:-1]
-
-    def heard(response: Array, share: float) -> Array:
-        return _with_cross_talk(response, share, sensor, step)
+    neighbours = _annulus(math.sqrt(math.prod(sensor.step_mm)), step)
 
     for label in range(alphabet.order):
-        middle = heard(usual[label], CROSS_TALK)
+        middle = _with_cross_talk(usual[label], CROSS_TALK, neighbours)
         own = values[..., label, :]
         own[..., 0] = psi(middle)
         own[..., 1] = np.gradient(own[..., 0], step, axis=1)
         own[..., 2] = np.gradient(own[..., 0], step, axis=0)
-        own[..., 3] = psi(heard(wide[label], CROSS_TALK)) - psi(middle)
-        own[..., 4] = psi(heard(usual[label], 2 * CROSS_TALK)) - psi(usual[label])
+        wider = _with_cross_talk(wide[label], CROSS_TALK, neighbours)
+        own[..., 3] = psi(wider) - psi(middle)
+        more = _with_cross_talk(usual[label], 2 * CROSS_TALK, neighbours)
+        own[..., 4] = psi(more) - psi(usual[label])
         own[..., 5] = (psi(middle**high) - psi(middle**low)) / (high - low)
     ink = float(usual.sum() * step**2 / style.pitch_mm**2) / alphabet.order
     rimmed.setflags(write=False)
@@ -130,12 +130,12 @@ def _tab_responses(
     reach = alphabet.reach * style.pitch_mm
     tip = _disc(sensor.overlay.tab_diameter_mm / 2, STEP_MM)
 
-    def pressed_response(strokes: Array) -> Array:
+    def response(strokes: Array) -> Array:
         presence = _presence(_distance(strokes * reach, x, y), style)
         cover = np.clip(_convolved(presence, tip), 0, 1)
         return np.asarray(cover * (1 + BULGE * (1 - cover)))
 
-    return np.stack([pressed_response(np.array(glyph.strokes, float)) for glyph in alphabet.glyphs])
+    return np.stack([response(np.array(glyph.strokes, float)) for glyph in alphabet.glyphs])
 
 
 def _pad_responses(
@@ -228,12 +228,13 @@ def _gel_responses(
 _RESPONSES = {"tab": _tab_responses, "pad": _pad_responses, "gel": _gel_responses}
 
 
-def _with_cross_talk(
-    pressed_response: Array, share: float, sensor: SensorType, step: float
-) -> Array:
-    """Return responses of tactels with a share of the readings one tactel away, all around."""
-    around = _convolved(pressed_response, _annulus(math.sqrt(math.prod(sensor.step_mm)), step))
-    return np.asarray(np.maximum((1 - share) * pressed_response + share * around, 0.0))
+def _with_cross_talk(response: Array, share: float, neighbours: Array) -> Array:
+    """Return responses of tactels with a share of the readings of their neighbours.
+
+    `neighbours` (k, k) are the weights of places one tactel away, all around.
+    """
+    around = _convolved(response, neighbours)
+    return np.asarray(np.maximum((1 - share) * response + share * around, 0.0))
 
 
 def _convolved(values: Array, weights: Array) -> Array:
