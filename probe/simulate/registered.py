@@ -71,9 +71,9 @@ def scene_of_face(database: str, held: RegisteredObject, face: str = "") -> Scen
     )
 
 
-def registered_part_surface(path: Path, database: str, object_name: str, face: str) -> Scene:
+def registered_part_surface(path: Path, database: str, face: str) -> Scene:
     """Return the surface of a registered part; see `target.part_surface`."""
-    held, part = _registered_part(database, path, object_name)
+    held, part = _registered_part(database, path)
     return scene_of_part(path, held, part, face)
 
 
@@ -151,20 +151,14 @@ def face_of(held: RegisteredObject, name: str = "") -> RegisteredFace:
     )
 
 
-def _registered_part(
-    database: str, path: Path, object_name: str
-) -> tuple[RegisteredObject, RegisteredPart]:
+def _registered_part(database: str, path: Path) -> tuple[RegisteredObject, RegisteredPart]:
     """Return the part that a file holds: of this path, or else of this file name."""
     stated = part_file(normal_url(database), str(path))
-    named = registered_object(database, object_name) if object_name else None
-    parts = (
-        [(named.entry.name, part) for part in named.parts] if named else registered_parts(database)
-    )
-    known = [(name, part) for name, part in parts if part.format == "stl"]
+    known = [(name, part) for name, part in registered_parts(database) if part.format == "stl"]
     same_path = [held for held in known if held[1].file == stated]
     same_name = [held for held in known if Path(held[1].file).name == path.name]
     for name, part in same_path + same_name:
-        return named or registered_object(database, name), part
+        return registered_object(database, name), part
     shown = _first_names([Path(part.file).name for _, part in known], 8)
     raise SurfaceError(
         f"{path.name} is not registered in {database}",

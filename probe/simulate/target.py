@@ -56,17 +56,13 @@ def surface_of(target: str) -> Scene:
     )
 
 
-def part_surface(
-    file: str | os.PathLike[str], *, database: str = "", object_name: str = "", face: str = ""
-) -> Scene:
+def part_surface(file: str | os.PathLike[str], *, database: str = "", face: str = "") -> Scene:
     """Return the surface of a written part (STL), in its face's frame or its own.
 
     Parameters
     ----------
     database
         Where it is registered; empty: the part as it lies, whoever it belongs to.
-    object_name
-        Whose part it is; empty: found by the file's name.
     face
         Which face lies up; empty: the face of a panel, or the first face of a whole body
         that bears symbols.
@@ -80,7 +76,7 @@ def part_surface(
     if database:
         from probe.simulate.registered import registered_part_surface  # loads the database
 
-        return registered_part_surface(path, database, object_name, face)
+        return registered_part_surface(path, database, face)
     from probe.simulate.written import part_mesh
 
     surface = part_mesh(path)

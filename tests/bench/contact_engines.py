@@ -100,7 +100,7 @@ def written_face():
         encode({"name": "Cube", "shape": {"cube": "90 mm"}, "profile": "one-touch"},
                folder=folder, database=database, formats=("stl",))  # fmt: skip
         part = next(iter(sorted(Path(folder).rglob("*-F1.stl"))))
-        scene = part_surface(part, database=database, object_name="Cube", face="F1")
+        scene = part_surface(part, database=database, face="F1")
     triangles = body_of(scene.surface)
     top = triangles[:, :, 2].max()
     return mesh(triangles - (*scene.centre_mm(), top))

@@ -116,8 +116,7 @@ def print_as_designed(part, database, folder, faces):
     """Write what the STL says, .1 mm aside, as the print of some of a part's faces."""
     keys = surface_keys(part.job, OPTIONS.plan())
     for face in part.job.faces[:faces]:
-        scene = part_surface(part.job.file, database=database, object_name=part.object_name,
-                             face=face.name)  # fmt: skip
+        scene = part_surface(part.job.file, database=database, face=face.name)
         line = np.arange(-1.0, 37.0, 0.1)
         points = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
         heights = scene.surface.heights_mm(points - np.array((0.1, 0.0)))
