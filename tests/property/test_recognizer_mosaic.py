@@ -85,11 +85,11 @@ def test_any_constraints_give_a_pose_with_a_covariance(seed, n):
     constraints = []
     for k in range(n):
         sure = np.diag(10.0 ** rng.uniform(-2, 6, 3))
-        constraints.append(Constraint(PLANE, k, rng.normal(0, [50, 50, 2]), sure, "decoded"))
+        constraints.append(Constraint(PLANE, k, rng.normal(0, [50, 50, 2]), sure))
     for _ in range(3 * n):
         a, b = rng.choice(n, 2, replace=False).tolist()
         root = rng.normal(size=(3, rng.integers(1, 4))) * 10.0 ** rng.uniform(-2, 3)
-        constraints.append(Constraint(a, b, rng.normal(0, [50, 50, 2]), root @ root.T, "pair"))
+        constraints.append(Constraint(a, b, rng.normal(0, [50, 50, 2]), root @ root.T))
     found = solve_pose_graph(constraints, rng.normal(0, 50, (n, 3)))
     assert np.isfinite(found.poses).all()
     assert ((found.weights > 0) & (found.weights <= 1)).all()

@@ -51,7 +51,6 @@ from recognizer.scan.mosaic.planar import (
 from recognizer.scan.mosaic.pose_graph import (
     PLANE,
     Constraint,
-    Kind,
     PoseGraphSolution,
     covariances,
     robust_cost,
@@ -170,7 +169,6 @@ def add_touch(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
 def _join_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> Mosaic:
     """Return the mosaic with a touch at the pose to start from, and its constraints."""
     number = len(mosaic)
-    given = _given_constraints(touch, number)
     predicted = _predict_pose(mosaic, touch)
     near = _overlapping_neighbours(mosaic, patch, predicted)
     reason, start = _search_mosaic(mosaic, patch, predicted, near)
@@ -183,18 +181,16 @@ def _join_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> Mosaic
         pair = register_patches(mosaic.patches[j], patch, believed, spread, near_start)
         pairs.append((j, pair))
     softer = 1 / INFLATION
-    constraints = given + [
-        Constraint(j, number, pair.pose, pair.information * softer, "pair")
-        for j, pair in pairs
-        if pair
+    registered = [
+        Constraint(j, number, pair.pose, pair.information * softer) for j, pair in pairs if pair
     ]
-    registered = [constraint for constraint in constraints if constraint.kind == "pair"]
     if touch.decoded is not None:
         reason = ""
     elif not reason and not registered:
         reason = pairs[0][1].reason if pairs else ALONE
     elif registered and _rank(mosaic, registered) < 3:
         reason = PARTLY
+    constraints = _given_constraints(touch, number) + registered
     starts = [predicted.pose, start]
     starts += [
         compose_poses(mosaic.poses[constraint.a], constraint.pose)
@@ -218,17 +214,14 @@ def _join_touch(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> Mosaic
 
 
 def _given_constraints(touch: PlacedTouch, number: int) -> list[Constraint]:
-    def constraint(a: int, place: PlanarBelief, kind: Kind) -> Constraint:
-        return Constraint(a, number, place.pose, np.asarray(np.linalg.inv(place.covariance)), kind)
-
-    if touch.decoded is not None:
-        return [constraint(PLANE, touch.decoded, "decoded")]
-    constraints = []
-    if touch.believed is not None:
-        constraints.append(constraint(PLANE, touch.believed, "believed"))
-    if touch.stepped is not None and number > 0:
-        constraints.append(constraint(number - 1, touch.stepped, "stepped"))
-    return constraints
+    places = [(PLANE, touch.decoded or touch.believed)]
+    if number > 0 and touch.decoded is None:
+        places.append((number - 1, touch.stepped))
+    return [
+        Constraint(a, number, place.pose, np.asarray(np.linalg.inv(place.covariance)))
+        for a, place in places
+        if place is not None
+    ]
 
 
 def _predict_pose(mosaic: Mosaic, touch: PlacedTouch) -> PlanarBelief:

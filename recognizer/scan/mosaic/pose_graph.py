@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,6 @@ STEPS = 30  #: at most
 DONE_MM = 1e-4  #: of x and y: a step under both is the last one
 DONE_RAD = 1e-6  #: of turns
 
-Kind = Literal["decoded", "believed", "stepped", "pair"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Constraint:
@@ -45,7 +43,6 @@ class Constraint:
     b: int  #: number of a touch
     pose: Array  #: (3,) T_a_b, mm and rad
     information: Array  #: (3, 3) inverse covariance, axes of a; may be singular
-    kind: Kind
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -345,8 +345,7 @@ def measured(true, near, rng=None):
     seen = [(PLANE, n, pose, BELIEVED) for n, pose in enumerate(true)]
     seen += [(a, b, relative_pose(true[a], true[b]), PAIR) for a, b in near]
     return [
-        Constraint(a, b, noisy(rng, pose, sure) if rng else pose, sure,
-                   "believed" if a == PLANE else "pair")
+        Constraint(a, b, noisy(rng, pose, sure) if rng else pose, sure)
         for a, b, pose, sure in seen
     ]  # fmt: skip
 
@@ -355,7 +354,7 @@ def test_constraints_without_errors_give_the_truth_from_afar():
     rng = np.random.default_rng(1)
     true, near = scene(rng)
     constraints = measured(true, near)
-    constraints += [Constraint(PLANE, n, true[n], DECODED_INFORMATION, "decoded") for n in (0, 7)]
+    constraints += [Constraint(PLANE, n, true[n], DECODED_INFORMATION) for n in (0, 7)]
     start = true + rng.normal(0, [2, 2, 0.02], true.shape)
     found = solve_pose_graph(constraints, start)
     assert found.poses == pytest.approx(true, abs=1e-5)
@@ -394,9 +393,9 @@ def test_covariances_are_true():
 def test_a_constraint_along_a_ridge_leaves_the_rest_to_belief():
     across_only = np.diag([500.0, 0.0, 1e5])
     constraints = [
-        Constraint(PLANE, 0, np.zeros(3), DECODED_INFORMATION, "believed"),
-        Constraint(PLANE, 1, np.array([5.0, 1.0, 0.0]), BELIEVED, "believed"),
-        Constraint(0, 1, np.array([4.0, 9.0, 0.01]), across_only, "pair"),
+        Constraint(PLANE, 0, np.zeros(3), DECODED_INFORMATION),
+        Constraint(PLANE, 1, np.array([5.0, 1.0, 0.0]), BELIEVED),
+        Constraint(0, 1, np.array([4.0, 9.0, 0.01]), across_only),
     ]
     found = solve_pose_graph(constraints, np.zeros((2, 3)))
     assert found.poses[1] == pytest.approx([4.0, 1.0, 0.01], abs=0.01)
