@@ -1,5 +1,6 @@
 """What of a frame is worth fitting: floors, contacts and dead rows worked by hand."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -182,6 +183,14 @@ def test_noise_is_that_of_tactels_that_nothing_presses():
     by_hand = np.array([0.0] * 3 + [1.0] * 13)  # mode 1, three one below it
     assert noise_of(by_hand) == pytest.approx(np.sqrt(3 / (3 + 13 / 2) + 1 / 12))
     assert Signal(by_hand, by_hand, contact=True, newtons=False).noise == 0.0  # nobody says it
+
+
+def test_noise_of_few_readings_is_worked_by_hand():
+    # the mode is that of the two closest, 10.25; one reading lies .25 below; the least step is .5
+    few = np.array([10.0, 10.5, 20.0])
+    assert noise_of(few) == pytest.approx(math.sqrt(0.25**2 + 0.5**2 / 12))
+    # what is read again and again has no step: the noise is that of rounding to .25
+    assert noise_of(np.array([0.5] * 10 + [0.75])) == pytest.approx(0.25 / math.sqrt(12))
 
 
 def test_the_background_is_what_most_free_tactels_read():
