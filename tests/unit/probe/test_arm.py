@@ -114,9 +114,6 @@ def test_over_the_base_axis():
             assert forward(ARM, q) == pytest.approx(pose, abs=1e-9)
 
 
-# --- speeds ------------------------------------------------------------------------------
-
-
 def test_the_jacobian_is_the_derivative():
     rng = np.random.default_rng(4)
     for q in rng.uniform(-3, 3, (20, 5)):
@@ -165,9 +162,6 @@ def test_speeds_do_not_jump_on_the_way_into_the_singularity():
     speeds = np.array([joint_speeds(ARM, [0.2, -0.6, bend, 0.9, 0.1], twist) for bend in bends])
     jumps = np.abs(np.diff(speeds, axis=0)).max()
     assert jumps < 0.1 * np.abs(speeds).max()
-
-
-# --- the sensor ------------------------------------------------------------------------------
 
 
 def hanging(wrist, z, x, y):

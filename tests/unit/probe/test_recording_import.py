@@ -72,9 +72,8 @@ def test_every_format_gives_the_same_frames(tmp_path, kind, axes):
 
 def test_sixteen_images_have_time_first(tmp_path):
     np.save(tmp_path / "a.npy", COUNTS[:16])
-    assert (
-        import_array(tmp_path / "a.npy", tmp_path / "out.h5").block().counts == COUNTS[:16]
-    ).all()
+    made = import_array(tmp_path / "a.npy", tmp_path / "out.h5")
+    assert (made.block().counts == COUNTS[:16]).all()
 
 
 def test_values_that_are_no_numbers_are_refused(tmp_path):

@@ -31,9 +31,6 @@ class Bench:
         return self.law(travel - self.at) if travel > self.at else 0.0
 
 
-# --- approach ---------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "law",
     [
@@ -88,9 +85,6 @@ def test_forces_and_limits_that_make_no_sense():
     ):
         with pytest.raises(ContactError, match="contradict each other"):
             guarded_approach(lambda travel: 0.0, guard)
-
-
-# --- raster -----------------------------------------------------------------------------
 
 
 def covered(places, theta, point, half=12.7):
@@ -169,9 +163,6 @@ def test_faces_and_steps_that_are_none():
             raster([SQUARE], step_tactels=step)
 
 
-# --- poses ------------------------------------------------------------------------------
-
-
 def test_tilts_are_those_of_the_contact_models():
     a, b = 0.02, -0.03
     about_x = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
@@ -192,9 +183,6 @@ def test_a_sensor_that_faces_elsewhere_is_refused():
         touch_at(upside_down, 1)
     with pytest.raises(PoseError, match="give T_surface_sensor"):
         touch_at(np.eye(3), 1)
-
-
-# --- kinesthetic ------------------------------------------------------------------------
 
 
 def scan_poses():
