@@ -350,7 +350,7 @@ class Film:
         self.pictures: list[Image.Image] = []
 
     def __call__(self, bench: Bench, counts: Array, found: Any) -> None:
-        """Take a picture of a touch that is felt."""
+        """Take a picture of a touch with contact."""
         if not counts.any():
             return
         with mujoco.Renderer(bench.model, 360, 480) as renderer:

@@ -63,7 +63,7 @@ class EncodedSolid:
 
     @property
     def places(self) -> int:
-        """How many places of it can be told apart by touch."""
+        """How many places of it can be distinguished by touch."""
         return self.made.places
 
     @property

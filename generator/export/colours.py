@@ -5,7 +5,7 @@ from __future__ import annotations
 RGB = tuple[int, int, int]
 
 BODY_RGB: RGB = (198, 205, 214)  #: a light, cool grey
-SYMBOL_RGB: RGB = (232, 119, 34)  #: orange: told apart from the body by every kind of eye
+SYMBOL_RGB: RGB = (232, 119, 34)  #: orange: distinct from the body for every kind of eye
 #: of faces of which no touch, half of them and all are answered: lightness rises with the share,
 #: so that it shows without colours too
 ANSWERED_RGB: tuple[RGB, RGB, RGB] = ((205, 124, 150), (226, 205, 150), (196, 226, 232))

@@ -29,7 +29,7 @@ class MadeObject:
     name: str
     faces: int
     symbols: int
-    places: int  #: how many places of it can be told apart by touch
+    places: int  #: how many places of it can be distinguished by touch
     parts: int
     files: tuple[Path, ...]
     warnings: tuple[str, ...]

@@ -79,7 +79,7 @@ def inside_mm(face: EncodedFace, x: float, y: float) -> float:
             dx, dy = x1 - x0, y1 - y0
             t = min(1.0, max(0.0, ((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy)))
             distance = min(distance, math.hypot(x - x0 - t * dx, y - y0 - t * dy))
-            if (y0 > y) != (y1 > y):  # the side is told from the lower end, so edges agree
+            if (y0 > y) != (y1 > y):  # the side is taken from the lower end, so edges agree
                 low, high = ((x0, y0), (x1, y1)) if y0 < y1 else ((x1, y1), (x0, y0))
                 side = (high[0] - low[0]) * (y - low[1]) - (x - low[0]) * (high[1] - low[1])
                 crossings += side > 0

@@ -33,7 +33,7 @@ PSI = 3.0  #: of log(1 + 3 y) / log 4
 # strong mismatch; `tests/bench/recognizer_times.py`).
 STEP_MM = 0.05  #: grid of the tables; positions are off by 0.025 mm at most
 BULGE = 0.59  #: F(c)/F(1) = c (1 + BULGE (1 - c)) of a tip covered by the share c
-PENETRATION_MM = 0.4  #: of the plateau into the overlay, for the felt part of a wall
+PENETRATION_MM = 0.4  #: of the plateau into the overlay, for the part of a wall that presses
 STROKE_UNIT_MM = 0.1  #: unit of the fitted stroke excess
 CROSS_TALK = 0.12  #: of a reading that neighbours get; twice that at the far end
 EXPONENTS = (0.7, 1.1)  #: between which the slope by the force law's exponent is taken
@@ -272,7 +272,7 @@ def _presence(distance: Array, style: SymbolStyle) -> Array:
 
 
 def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> float:
-    """Return the distance from its centre at which a symbol is not felt any more."""
+    """Return the distance from its centre at which a symbol does not press any more."""
     strokes = alphabet.reach * style.pitch_mm + style.stroke_mm / 2 + style.draft_mm
     overlay = sensor.overlay
     if overlay.kind == "gel":
