@@ -2,6 +2,7 @@
 
 import importlib.abc
 import importlib.machinery
+import importlib.util
 import os
 import sys
 import tempfile
@@ -27,7 +28,7 @@ class _Changed(importlib.abc.MetaPathFinder):
             def get_code(self, fullname):
                 return compile(source, file, "exec", dont_inherit=True)
 
-        return importlib.machinery.ModuleSpec(name, Loader(name, file), origin=file)
+        return importlib.util.spec_from_file_location(name, file, loader=Loader(name, file))
 
 
 def dotted(module: str) -> str:

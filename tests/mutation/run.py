@@ -186,16 +186,8 @@ def _tested(watched: Watched, source: str) -> int:
     changed.install(watched.module, source)
     os.chdir(ROOT)
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
-    options = [
-        "-x",
-        "-q",
-        "--no-header",
-        "--tb=short",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "xdist.plugin",
-    ]
+    options = ["-x", "-q", "--no-header", "--tb=short"]
+    options += ["-p", "no:cacheprovider", "-p", "xdist.plugin"]
     failed = int(pytest.main([*options, *watched.tests]))
     if failed or not watched.corpora:
         return failed

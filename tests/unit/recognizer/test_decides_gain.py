@@ -24,6 +24,7 @@ from recognizer.touch.symbols.image import (
     first_gain,
     image_of_signal,
     normalize_image,
+    pressing_of,
     tilted_gain,
 )
 from recognizer.touch.symbols.kernels import DEEPEST
@@ -45,6 +46,27 @@ def force(depth, hardens=True):
 
 def slope(depth):
     return 2 * (1 - depth) ** -3 + 1
+
+
+def test_how_an_overlay_presses_by_its_kind():
+    tab, pad = SensorType(), SensorType().with_overlay("pad")
+    pad = replace(pad, overlay=replace(pad.overlay, young_mpa=0.6))
+    law = pressing_of(tab, 0.9)
+    area = math.pi * (tab.overlay.tab_diameter_mm / 2) ** 2
+    assert law.hardens
+    assert law.scale == pytest.approx(tab.overlay.young_mpa * area / 3)
+    assert law.symbol == pytest.approx(0.9 / tab.overlay.height_mm)
+    law = pressing_of(pad, 0.9)
+    assert not law.hardens
+    assert law.scale == pytest.approx(0.6 * pad.pitch_mm * pad.pitch_mm / 3)
+    depths = np.array([-0.5, 0.1, 0.4])
+    np.testing.assert_allclose(law.force(depths), [0.0, 0.3, 1.2])
+    np.testing.assert_allclose(law.slope(depths), [0.0, 3.0, 3.0])
+    np.testing.assert_allclose(law.depth(law.force(depths[1:])), depths[1:])
+
+
+def test_a_sensor_reaches_as_far_as_its_farthest_tactel():
+    assert image(np.ones((SIDE, SIDE))).reach_mm == pytest.approx(HALF * math.sqrt(2))
 
 
 def image(forces, *, hardens=True, newtons=True, trust=None, falls=None, loaded=None, ink=0.5):
