@@ -65,7 +65,7 @@ SEARCH_MM = [(x, y) for x in (0, 28, -28) for y in (0, 28, -28)]
 
 
 @dataclass
-class Trial:
+class Result:
     """What became of one object: answer and truth in the base."""
 
     trial: int
@@ -324,9 +324,9 @@ def error_of(T: Array, truth: Array) -> Array:
 
 def compare(
     trial: int, name: str, bench: Bench, found: Any, sensor: SensorPose | None, read: int
-) -> Trial:
+) -> Result:
     """Return an answer with the simulator's truth."""
-    result = Trial(trial, name, found.object if found else "", read, bench.presses)
+    result = Result(trial, name, found.object if found else "", read, bench.presses)
     if not found or sensor is None or found.object not in OBJECTS:
         return result
     placed = object_pose(found, sensor)
@@ -393,7 +393,7 @@ def load(folder: Path) -> tuple[mujoco.MjModel, str]:
     return build(folder), f"sqlite:///{folder / 'bench.db'}"
 
 
-def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Trial]:
+def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Result]:
     """Lay out, search and read; three objects a trial."""
     (model, lab), results = make(folder), []
     for trial in range(trials):

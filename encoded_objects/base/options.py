@@ -63,21 +63,29 @@ class Option:
 
     def for_typer(self, name: str, default: object) -> Any:
         """Return the declaration that typer reads."""
-        import typer
+        from typer import Option as TyperOption
 
-        shown = default not in (None, "", inspect.Parameter.empty)
-        said: dict[str, Any] = {
+        shown = self._shown(default)
+        return TyperOption(*self.typed(name), envvar=self.variable or None, **shown)
+
+    def _shown(self, default: object) -> dict[str, Any]:
+        """Return what typer shows and checks of an option and an argument."""
+        return {
             "help": self.help, "metavar": self.metavar or "|".join(self.choices) or None,
-            "show_default": shown, "min": self.least, "max": self.most,
+            "show_default": default not in (None, "", inspect.Parameter.empty),
+            "min": self.least, "max": self.most,
         }  # fmt: skip
-        if isinstance(self, Argument):
-            return typer.Argument(**said)
-        return typer.Option(*self.typed(name), envvar=self.variable or None, **said)
 
 
 @dataclass(frozen=True, slots=True)
 class Argument(Option):
     """An argument: it is given by its position."""
+
+    def for_typer(self, name: str, default: object) -> Any:  # noqa: ARG002
+        """Return the declaration that typer reads."""
+        from typer import Argument as TyperArgument
+
+        return TyperArgument(**self._shown(default))
 
 
 class Options:
@@ -102,7 +110,7 @@ _VERSION = Option("Say which version this is.")
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class DeclaredCommand:
     """A function that is called by name."""
 
     work: Work
@@ -167,7 +175,7 @@ class Application:
         named: bool = False,
         version_of: str = "",
     ) -> None:
-        self.commands: dict[str, Command] = {}
+        self.commands: dict[str, DeclaredCommand] = {}
         self.groups: dict[str, Application] = {}
         self._page: dict[str, Any] = {"help": help, "epilog": epilog}
         self._named = named
@@ -258,7 +266,7 @@ def command(
         if version_of:
             declared = declared | {"version": (bool, _VERSION, False)}
         page = {"help": help, "epilog": epilog}
-        app.commands[name or work.__name__.replace("_", "-")] = Command(
+        app.commands[name or work.__name__.replace("_", "-")] = DeclaredCommand(
             work, declared, version_of, parts, page
         )
         return work

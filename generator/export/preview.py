@@ -60,7 +60,7 @@ _EYES = tuple(np.array([x, -1.0, z]) for z in (0.62, 0.45, 0.8) for x in (0.62, 
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class PartsShown:
     """All parts in the object frame."""
 
     vertices: Points  #: (3, N) mm
@@ -77,7 +77,7 @@ class Scene:
 class View:
     """A scene as a camera sees it."""
 
-    scene: Scene
+    scene: PartsShown
     axes: Points  #: (3, 3) rows right, up and eye, object frame
     flat: Points  #: (3, N) mm, vertices along these axes
     low: Points  #: (3,) mm, least of them
@@ -127,7 +127,7 @@ def preview_png(
 
 def _scene(
     parts: Sequence[Part], meshes: Sequence[Mesh], turned: Sequence[Points], apart: float
-) -> Scene:
+) -> PartsShown:
     """Gather all parts in the object frame; panels move out by a share of the size.
 
     Backs, which closed panels hide, are left out unless the panels move apart. `turned`: (3, n)
@@ -164,7 +164,7 @@ def _scene(
         names += [name for name, _ in faces]
         centres += [centre + shift for centre, _ in shapes]
         normals += [normal for _, normal in shapes]
-    return Scene(
+    return PartsShown(
         np.concatenate(vertices, axis=1),
         np.concatenate(triangles),
         np.concatenate(symbols),
@@ -204,7 +204,7 @@ def _centre_and_normal(vertices: Points, facet: Facet) -> tuple[Points, Points]:
     return centre, normal
 
 
-def _view_of(scene: Scene, eye: Points) -> View:
+def _view_of(scene: PartsShown, eye: Points) -> View:
     """Return what a camera sees that looks against `eye`, (3,)."""
     towards: Points = eye / np.linalg.norm(eye)
     right: Points = np.cross([0.0, 0.0, 1.0], towards)

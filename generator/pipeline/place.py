@@ -82,10 +82,11 @@ def place_in_turn(
     connection: Connection | None, plans: Sequence[ObjectPlan], *, replace: bool = False
 ) -> Iterator[PlacedObject]:
     """Yield the place of each object, on cells that those before it leave free."""
-    taken = occupancy_of(connection, plans[0]) if plans else None
+    taken: Occupancy | None = None
     for plan in plans:
+        taken = occupancy_of(connection, plan) if taken is None else taken
         placed = place_object(connection, plan, replace, taken)
-        if taken is not None and not placed.reused:
+        if not placed.reused:
             taken = occupancy_with(taken, placed.layout)
         yield placed
 

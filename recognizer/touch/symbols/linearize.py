@@ -208,9 +208,8 @@ def _log_likelihood(measured: NormalizedImage, labels: Ints, values: Array) -> A
     """Return the log-likelihoods (b,) of given labels (b, n), with their psi and slopes."""
     unit = FIRST_NOISE / np.maximum(measured.press, 1e-3)
     symbol = values[:, :, None].astype(np.float32)
-    own = log_densities(measured, symbol[..., 0], psi_deviation(measured, symbol, unit), unit)[
-        ..., 0
-    ]
+    width = psi_deviation(measured, symbol, unit)
+    own = log_densities(measured, symbol[..., 0], width, unit)[..., 0]
     return np.asarray(np.where(labels < 0, log_densities_of_none(measured, unit), own).sum(axis=1))
 
 
