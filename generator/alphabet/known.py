@@ -1,10 +1,11 @@
-"""The alphabets that ship: thesis-2, dense-4, letters-4, dense-8, and their plain values.
+"""The alphabets that ship, and their plain values.
 
 Nodes lie on {-1, 0, 1} squared, one unit = `reach` x pitch. Ends and vertices of
 thesis-2 and of the four-symbol alphabets are those of thesis figures 6.4 and 6.12;
-dense-8 has eight different counts of ends, vertices and loops. dense-4 and dense-8
-suit a joint fit of several symbols; thesis-2 and letters-4 also a skeleton, hence
-their longer and thinner strokes.
+dense-8 has eight different counts of ends, vertices and loops. dense-4, dense-8 and
+tactel-4, -8, -16 suit a joint fit of several symbols; thesis-2 and letters-4 also a
+skeleton, hence their longer and thinner strokes. tactel-4, -8, -16 come of a search
+for letters that tactels tell apart (docs/alphabets.md).
 """
 
 from __future__ import annotations
@@ -138,6 +139,42 @@ _DENSE_8 = (
     Glyph("A^6", line((-1, -1), (0, 0), (1, -1)) + line((0, 0), (-1, 1))),
 )
 
+# Letters made for tactels (docs/alphabets.md): `python tests/campaigns/alphabets.py` finds them.
+_TACTEL_4 = (
+    Glyph("0", line((-1, -1), (-1, 0), (1, 0), (1, -1))),
+    Glyph("1", line((-1, 1), (-1, -1), (1, -1))),
+    Glyph("A", line((-1, -1), (0, -1), (1, 0), (0, 1))),
+    Glyph("A^2", line((-1, -1), (-1, 0), (0, 1), (1, 1))),
+)
+_TACTEL_8 = (
+    Glyph("0", line((-1, -1), (-1, 0), (0, 1), (1, 0), (1, -1))),
+    Glyph("1", line((-1, 0), (-1, -1), (0, -1), (1, 0), (1, 1))),
+    Glyph("A", line((-1, -1), (-1, 0), (0, 0), (0, 1), (1, 1))),
+    Glyph("A^2", line((0, 1), (-1, 0), (0, -1), (1, 0))),
+    Glyph("A^3", line((-1, 0), (-1, -1), (1, -1)) + line((0, -1), (0, 0))),
+    Glyph("A^4", line((0, -1), (-1, -1), (-1, 1), (0, 1))),
+    Glyph("A^5", line((-1, -1), (-1, 1)) + line((-1, 0), (1, 0))),
+    Glyph("A^6", line((-1, -1), (0, -1), (0, 0), (-1, 1)) + line((0, 0), (1, 1))),
+)
+_TACTEL_16 = (
+    Glyph("0", line((0, -1), (-1, -1), (-1, 0), (0, 1), (1, 0))),
+    Glyph("1", line((-1, -1), (0, 0), (-1, 1)) + line((0, 0), (1, -1))),
+    Glyph("A", line((-1, -1), (0, -1), (0, 0), (1, 1))),
+    Glyph("A^2", line((-1, -1), (-1, 1)) + line((-1, 0), (0, 0), (1, 1))),
+    Glyph("A^3", line((-1, -1), (-1, 0), (1, 0)) + line((0, -1), (0, 0))),
+    Glyph("A^4", line((-1, 0), (-1, -1), (0, -1), (1, 0), (1, 1))),
+    Glyph("A^5", line((0, 1), (-1, 0), (0, -1), (1, 0))),
+    Glyph("A^6", line((0, -1), (-1, -1), (-1, 1), (0, 1))),
+    Glyph("A^7", line((-1, -1), (-1, 0), (0, 0), (1, -1)) + line((0, 0), (1, 1))),
+    Glyph("A^8", line((-1, -1), (-1, 0), (0, 1), (1, 1))),
+    Glyph("A^9", line((-1, -1), (0, -1), (1, 0), (0, 1))),
+    Glyph("A^10", line((-1, -1), (-1, 0), (0, 0), (0, 1), (-1, 1))),
+    Glyph("A^11", line((-1, -1), (0, 0), (0, 1)) + line((0, 0), (1, 0))),
+    Glyph("A^12", line((-1, -1), (0, -1), (0, 1)) + line((-1, 0), (0, 0))),
+    Glyph("A^13", line((-1, 1), (-1, -1), (0, -1), (1, 0))),
+    Glyph("A^14", line((0, 0), (-1, 0), (-1, -1), (1, -1))),
+)
+
 ALPHABETS: dict[str, Alphabet] = {
     alphabet.name: alphabet
     for alphabet in (
@@ -145,5 +182,8 @@ ALPHABETS: dict[str, Alphabet] = {
         Alphabet("dense-4", _DENSE_4, 0.26, 0.20),
         Alphabet("letters-4", _LETTERS_4, 0.29, 0.14),
         Alphabet("dense-8", _DENSE_8, 0.26, 0.20),
+        Alphabet("tactel-4", _TACTEL_4, 0.30, 0.20),
+        Alphabet("tactel-8", _TACTEL_8, 0.30, 0.20),
+        Alphabet("tactel-16", _TACTEL_16, 0.30, 0.20),
     )
 }

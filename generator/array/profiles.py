@@ -45,9 +45,13 @@ class Profile:
         return keyed_array(published, lab_key)
 
 
+def _folded(order: int, degree: int, rows: int, columns: int, **polynomial: str) -> dict[str, Any]:
+    field = {"family": "prmva", "order": order, "degree": degree}
+    return field | polynomial | {"rows": rows, "columns": columns}
+
+
 def _gf4(degree: int, polynomial: str, rows: int, columns: int) -> dict[str, Any]:
-    size = {"rows": rows, "columns": columns}
-    return {"family": "prmva", "order": 4, "degree": degree, "polynomial": polynomial} | size
+    return _folded(4, degree, rows, columns, polynomial=polynomial)
 
 
 _LARGE = _gf4(8, "x^8+x^7+A^2x^4+A^2x^3+x^2+A^2", 51, 1285)
@@ -88,6 +92,9 @@ PROFILES: Mapping[str, Profile] = MappingProxyType(
             ("product", _PRODUCT, (4, 2), "dense-8", 12.0, False),
             ("large", _LARGE, (4, 2), "dense-4", 7.0, True),  # hundreds of objects
             ("fine", _LARGE, (4, 2), "dense-4", 4.5, True),  # resin printing, small faces
+            # three and four bits a symbol, for labs of hundreds of objects
+            ("tactel-8", _folded(8, 6, 189, 1387), (3, 2), "tactel-8", 5.0, True),
+            ("tactel-16", _folded(16, 4, 51, 1285), (2, 2), "tactel-16", 5.0, True),
         )
     }
 )

@@ -64,6 +64,7 @@ _OF_ORDER = {
     2: SymbolDefaults("thesis-2", 12.0, PRINTER),
     4: SymbolDefaults("dense-4", 7.0, PRINTER),
     8: SymbolDefaults("dense-8", 8.0, PRINTER),
+    16: SymbolDefaults("tactel-16", 8.0, PRINTER),
 }
 
 

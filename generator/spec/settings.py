@@ -50,7 +50,9 @@ SUFFIXES = (".yaml", ".yml")  #: of a printer's file
 _NAME = re.compile(r"[^\W_][\w .()+-]*\Z")
 
 Family = Literal["prbs", "prmvs", "prba", "prmva", "prpa", "prmvpa"]
-ProfileName = Literal["one-touch", "thesis", "product", "large", "fine", "auto"]
+ProfileName = Literal[
+    "one-touch", "thesis", "product", "large", "fine", "tactel-8", "tactel-16", "auto"
+]
 
 
 def version(value: Any) -> Any:

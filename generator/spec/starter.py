@@ -21,7 +21,7 @@ version: 1
 name: {name}
 {shape}
 
-# profile: auto          # auto | one-touch | large | fine | thesis | product
+# profile: auto          # auto | one-touch | large | fine | tactel-8, -16 | thesis | product
 # sensor_type: fsr-16    # what will touch it: probe-sensor types lists them; or a YAML file
 # layout: auto           # auto | net (one lattice through the unfolded object) | faces
 # copies: 1              # each copy has cells of its own, so that two are told apart
@@ -32,7 +32,7 @@ name: {name}
 #   stroke: 1 mm         # width of the strokes at their top
 #   draft: 7.5 deg       # slope of their sides
 #   chamfer: 0 mm        # of their top edges
-#   alphabet: dense-4    # dense-4 | letters-4 | thesis-2 | dense-8
+#   alphabet: dense-4    # thesis-2 | letters-4 | dense-4, -8 | tactel-4, -8, -16
 
 # print:
 #   parts: panels        # panels (mitred plates, no supports) | whole (one body)

@@ -27,6 +27,7 @@ from generator.errors import AlphabetError
 from generator.plane.polygon import edges_cross, points_inside, signed_area
 from generator.printers import PRINTERS
 from generator.solid.marks import MARK_DEPTH, MARK_SIZES
+from generator.spec import read_specs
 
 BAR = [[[-1, 0], [1, 0]]]
 L, E, F, C = (2, 1), (3, 3), (3, 2), (2, 2)
@@ -46,6 +47,22 @@ def test_ends_and_vertices_are_the_thesis_ones(name, wanted):
     found = [counts(glyph) for glyph in alphabet_named(name).glyphs]
     assert [(c.ends, c.vertices) for c in found] == wanted
     assert all(c.pieces == 1 and c.loops == 0 for c in found)
+
+
+@pytest.mark.parametrize("order", [4, 8, 16])
+def test_letters_made_for_tactels_print_and_have_about_the_same_ink(order, tmp_path):
+    alphabet = alphabet_named(f"tactel-{order}")
+    assert alphabet.order == order
+    assert alphabet_from(alphabet.definition()) == alphabet  # each tells its turn
+    for pitch, printer in ((4.5, "fdm-0.4"), (5, "fdm-0.4"), (6, "fdm-0.6"), (8, "fdm-0.6")):
+        (tmp_path / "cube.yaml").write_text(
+            "name: Cube\nshape: {cube: 60 mm}\nprint: {printer: " + printer + "}\n"
+            f"symbols: {{alphabet: {alphabet.name}, pitch: {pitch} mm}}\n"
+        )
+        (spec,) = read_specs([tmp_path / "cube.yaml"])
+        check_printable(alphabet, spec.style, PRINTERS[printer])
+        tops = [sum(map(signed_area, tiers.rings[-1])) for tiers in outlines(alphabet, spec.style)]
+        assert max(tops) < 1.6 * min(tops)
 
 
 @pytest.mark.parametrize(

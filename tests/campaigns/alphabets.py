@@ -1,0 +1,266 @@
+"""Letters that tactels tell apart: sets of glyphs whose nearest two are as far apart as can be.
+
+    python tests/campaigns/alphabets.py --sensor-type fsr-16 --pitch 5 --reach 0.30 --stroke 0.20
+
+A glyph is a connected set of one to four segments between neighbours of 3 x 3 nodes; segments
+that meet make 60 degrees at least, and none cross but in a node. Its image is the share of each tip
+that its strokes cover. The distance of two glyphs is that of their images, squared, after the
+shift, turn and gain that a fit leaves open and that make them most alike, averaged over turns and
+places of the tactels. No two letters of a set are one another shifted or turned, none looks the
+same after a quarter turn, and all have about the same ink, so that force does not tell them apart.
+Printed: the least distance of each set, as a share of that of dense-4, and its strokes. `--draw
+FILE.svg` draws the sets that ship, and searches for nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations, pairwise, product
+from pathlib import Path
+
+import numpy as np
+import runner
+
+from encoded_objects.base.sensor_type_file import sensor_type_named
+from generator.alphabet import ALPHABETS
+
+TURNS, PLACES = 12, 4  #: poses of the tactels: turns, and places along x and y
+POINTS = 12  #: of a tip, along x and along y
+SHIFT_MM, TURN_RAD, GAIN = 0.2, math.radians(3.0), 0.15  #: left open by a fit, each way
+INK = 1.6  #: most ink of a letter over the least of its set
+SEGMENTS_MOST = 4  #: of a glyph
+TRIALS = 6  #: beginnings of the search for a set
+
+NODES = list(product((-1, 0, 1), repeat=2))
+SEGMENTS = [
+    (a, b) for a, b in combinations(NODES, 2) if max(abs(a[0] - b[0]), abs(a[1] - b[1])) == 1
+]
+NUMBER = {segment: number for number, segment in enumerate(SEGMENTS)}
+COVERED = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(1).astype(np.float32)
+
+
+def segment(a, b):
+    """Return the number of the segment between two nodes."""
+    return NUMBER[min(a, b), max(a, b)]
+
+
+def is_glyph(numbers):
+    """Whether segments are connected, meet under 60 degrees at least and do not cross."""
+    left, reached = set(numbers), set(SEGMENTS[numbers[0]])
+    while joined := [k for k in left if reached & set(SEGMENTS[k])]:
+        left -= set(joined)
+        reached |= {node for k in joined for node in SEGMENTS[k]}
+    if left:
+        return False
+    out = {}
+    for k in numbers:
+        for one, other in (SEGMENTS[k], SEGMENTS[k][::-1]):
+            out.setdefault(one, []).append(np.subtract(other, one))
+    for ways in out.values():
+        for u, v in combinations(ways, 2):
+            if u @ v > 0.5 * math.hypot(*u) * math.hypot(*v) + 1e-9:
+                return False
+    middles = [np.add(*SEGMENTS[k]).tolist() for k in numbers]
+    return all(one != other for one, other in combinations(middles, 2))
+
+
+def turned(numbers):
+    """Return the glyph turned by a quarter."""
+    return [segment((-ay, ax), (-by, bx)) for (ax, ay), (bx, by) in (SEGMENTS[k] for k in numbers)]
+
+
+def shape(numbers):
+    """Return what all glyphs have in common that are this one shifted."""
+    points = np.array([SEGMENTS[k] for k in numbers])
+    moved = (points - points.min(axis=(0, 1))).tolist()
+    return tuple(sorted(tuple(sorted(map(tuple, one))) for one in moved))
+
+
+def glyphs():
+    """Return the glyphs, one of those that are one another turned, and their shapes."""
+    found = {}
+    for count in range(1, SEGMENTS_MOST + 1):
+        for numbers in combinations(range(len(SEGMENTS)), count):
+            if is_glyph(numbers):
+                orbit = [list(numbers)]
+                for _ in range(3):
+                    orbit.append(turned(orbit[-1]))
+                if len({shape(one) for one in orbit}) == 4:
+                    found[min(tuple(sorted(one)) for one in orbit)] = min(map(shape, orbit))
+    return list(found), list(found.values())
+
+
+def tip_points(sensor, reach_mm):
+    """Return points (tactels, points, 2) of the tips that a symbol can reach, mm."""
+    line = (np.arange(POINTS) + 0.5) / POINTS - 0.5
+    x, y = np.meshgrid(line, line)
+    inside = x * x + y * y <= 0.25
+    tip = np.stack([x[inside], y[inside]], axis=-1) * sensor.overlay.tab_diameter_mm
+    axes = [
+        step * np.arange(-(around := math.ceil((reach_mm + SHIFT_MM) / step)), around + 1)
+        for step in sensor.step_mm
+    ]
+    return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 1, 2) + tip
+
+
+def images(letters, points, pitch, reach, stroke, pose):
+    """Return the share (letters, tactels) of each tip that strokes cover at x, y, turn."""
+    x, y, turn = pose
+    at = (points.reshape(-1, 2) - (x, y)) / pitch
+    c, s = math.cos(turn), math.sin(turn)
+    at = at @ np.array([[c, -s], [s, c]])
+    a, b = (reach * np.array(SEGMENTS, float)).transpose(1, 0, 2)
+    along = ((at[None] - a[:, None]) * (b - a)[:, None]).sum(2) / ((b - a) ** 2).sum(1)[:, None]
+    foot = a[:, None] + along.clip(0, 1)[..., None] * (b - a)[:, None]
+    on = np.hypot(*np.moveaxis(at[None] - foot, 2, 0)) <= stroke / 2
+    packed = np.packbits(on.reshape(len(SEGMENTS), *points.shape[:2]), axis=2)
+    covered = [np.bitwise_or.reduce(packed[list(one)], axis=0) for one in letters]
+    return COVERED[np.array(covered)].sum(-1) / points.shape[1]
+
+
+def distances(letters, sensor, pitch, reach, stroke):
+    """Return distances (n, n) of letters and their ink (n,), mean over turns and places."""
+    points = tip_points(sensor, (reach * math.sqrt(2) + stroke / 2) * pitch)
+    total, ink = np.zeros((len(letters), len(letters))), np.zeros(len(letters))
+    shifts, turns = (-SHIFT_MM, 0.0, SHIFT_MM), (-TURN_RAD, 0.0, TURN_RAD)
+    steps = (np.arange(PLACES) + 0.5) / PLACES - 0.5
+    poses = list(product(*(step * steps for step in sensor.step_mm), range(TURNS)))
+    for x, y, number in poses:
+        pose = np.array([x, y, math.tau * number / TURNS])
+        base = images(letters, points, pitch, reach, stroke, pose)
+        own, best = (base * base).sum(1), np.inf
+        for open_ in product(shifts, shifts, turns):
+            moved = images(letters, points, pitch, reach, stroke, pose + open_)
+            both, other = moved @ base.T, (moved * moved).sum(1)[:, None]
+            gain = np.clip(both / np.maximum(other, 1e-9), math.exp(-GAIN), math.exp(GAIN))
+            best = np.minimum(best, gain * gain * other - 2 * gain * both + own)
+        total += np.minimum(best, best.T)
+        ink += base.sum(1)
+    return total / len(poses), ink / len(poses)
+
+
+def least(apart):
+    """Return the least distance of a set, and between which two."""
+    shown = apart + np.diag(np.full(len(apart), np.inf))
+    return float(shown.min()), np.unravel_index(int(shown.argmin()), shown.shape)
+
+
+def far_set(apart, size, rng):
+    """Return a set of letters, each exchanged while the nearest two come farther apart."""
+    best = (0.0, [])
+    for _ in range(TRIALS):
+        chosen = [int(rng.integers(len(apart)))]
+        while len(chosen) < size:
+            chosen.append(int(apart[chosen].min(0).argmax()))
+        better = True
+        while better:
+            near, pair = least(apart[np.ix_(chosen, chosen)])
+            better = False
+            for out in pair:
+                rest = chosen[:out] + chosen[out + 1 :]
+                other = [*rest, int(apart[rest].min(0).argmax())]
+                if least(apart[np.ix_(other, other)])[0] > near + 1e-9:
+                    chosen, better = other, True
+                    break
+        best = max(best, (near, chosen))
+    return best
+
+
+def best_set(apart, ink, size):
+    """Return the best set of letters of about the same ink; none: (0.0, [])."""
+    best = (0.0, [])
+    for low in np.unique(ink.round(2)):
+        alike = np.flatnonzero((ink >= low - 1e-6) & (ink <= low * INK))
+        if len(alike) >= size:
+            near, chosen = far_set(apart[np.ix_(alike, alike)], size, np.random.default_rng(0))
+            best = max(best, (near, alike[chosen].tolist()))
+    return best
+
+
+def lines(numbers):
+    """Return a glyph as broken lines through nodes, as `known.py` writes them."""
+    left, found = [SEGMENTS[k] for k in numbers], []
+    while left:
+        ends = [node for one in left for node in one]
+        odd = [node for node in sorted(ends) if ends.count(node) % 2]
+        line = [(odd or sorted(ends))[0]]
+        while nexts := [one for one in left if line[-1] in one]:
+            ways = {one[one[0] == line[-1]]: one for one in nexts}
+            ahead = (
+                tuple(2 * now - before for now, before in zip(line[-1], line[-2], strict=True))
+                if line[1:]
+                else None
+            )
+            node = ahead if ahead in ways else min(ways)
+            left.remove(ways[node])
+            line.append(node)
+        kept = [b for a, b, c in zip(line, line[1:], line[2:], strict=False)
+                if np.subtract(b, a).tolist() != np.subtract(c, b).tolist()]  # fmt: skip
+        found.append(", ".join(map(str, [line[0], *kept, line[-1]])))
+    return " + ".join(f"line({one})" for one in found)
+
+
+def shipped(name):
+    """Return the letters of an alphabet as sets of segments."""
+    found = []
+    for glyph in ALPHABETS[name].glyphs:
+        parts = []
+        for a, b in glyph.strokes:
+            count = max(abs(b[0] - a[0]), abs(b[1] - a[1]))
+            nodes = [tuple(a[k] + (b[k] - a[k]) * n // count for k in (0, 1))
+                     for n in range(count + 1)]  # fmt: skip
+            parts += [segment(*pair) for pair in pairwise(nodes)]
+        found.append(parts)
+    return found
+
+
+def drawing(names):
+    """Return alphabets as SVG, one a line."""
+    parts, widest = [], max(ALPHABETS[name].order for name in names)
+    for line, name in enumerate(names):
+        alphabet = ALPHABETS[name]
+        unit = 50 * alphabet.reach
+        parts.append(f'<text x="8" y="{50 * line + 30}">{name}</text>')
+        for column, glyph in enumerate(alphabet.glyphs):
+            x, y = 50 * column + 125, 50 * line + 25
+            way = " ".join(
+                f"M{x + unit * a[0]:g} {y - unit * a[1]:g}L{x + unit * b[0]:g} {y - unit * b[1]:g}"
+                for a, b in glyph.strokes
+            )
+            parts.append(f'<path d="{way}" stroke-width="{50 * alphabet.stroke_ratio:g}"/>')
+    size = f"{50 * widest + 110} {50 * len(names)}"
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" font-family="sans-serif" '
+        'font-size="15" fill="none" stroke="#234" stroke-linecap="round" stroke-linejoin="round">'
+        "<style>text{fill:#234;stroke:none}</style>" + "".join(parts) + "</svg>\n"
+    )
+
+
+def main() -> None:
+    """Print the best sets of a sensor type, a pitch, a reach and a stroke."""
+    asked = runner.asked(
+        __doc__, sensor_type="fsr-16", pitch=5.0, reach=0.30, stroke=0.20, letters=[4, 8, 16, 32],
+        draw="",
+    )  # fmt: skip
+    if asked.draw:
+        names = ("dense-4", "dense-8", "tactel-4", "tactel-8", "tactel-16")
+        Path(asked.draw).write_text(drawing(names))
+        return
+    sensor, known = sensor_type_named(asked.sensor_type), ALPHABETS["dense-4"]
+    usual = distances(shipped("dense-4"), sensor, asked.pitch, known.reach, known.stroke_ratio)
+    unit = least(usual[0])[0]
+    letters, shapes = glyphs()
+    apart, ink = distances(letters, sensor, asked.pitch, asked.reach, asked.stroke)
+    apart[[[one == other for other in shapes] for one in shapes]] = 0.0
+    sets = []
+    runner.table(("letters", "nearest two, of dense-4", "ink, most of least"))
+    for size in asked.letters:
+        near, chosen = best_set(apart, ink, size)
+        if chosen:
+            runner.row(size, near / unit, float(ink[chosen].max() / ink[chosen].min()))
+            sets += [f"\n{size} letters", *(lines(letters[k]) for k in chosen)]
+    print("\n".join(sets))
+
+
+if __name__ == "__main__":
+    main()
