@@ -18,6 +18,8 @@ no such answer is, and makes 42 touches right of the 50 that it can.
 
 from __future__ import annotations
 
+import math
+
 from recognizer.touch.evidence import VerifiedHypothesis, symbols_to_name
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.prepare import PreparedLab
@@ -34,6 +36,7 @@ WEAK = 0.35  #: share of that below which a tactel lies over a gap
 #: (seeds 11 and 12).
 GAPS = 0.285
 FINEST, COARSEST = 3.1, 5.0  #: tactels, pitches between which gaps were measured
+LEAST_BORDERS = 1 / 16  #: share of places that a border of two lines leaves (`chance.LEAST_SHARE`)
 INK = 0.44  #: share of a cell's tactels that its symbol presses, and some around it
 SURE_RATIO = 20.0  #: nats from which a place's symbols are there beyond doubt
 DOUBT = 1e-3  #: of an answer that a better fit may bring below the limit
@@ -110,6 +113,7 @@ def _pressed_from(signal: Signal) -> float:
 
 
 def _tactels_to_name(reader: PreparedLab, embossed: EmbossedArray) -> float:
-    """Return how many tactels the symbols press that can name one of the registered cells."""
+    """Return how many tactels the symbols press that name one of the registered cells surely."""
+    matches = len(embossed.keys) / reader.options.doubt * LEAST_BORDERS
     cell = (embossed.style.pitch_mm / reader.sensor.pitch_mm) ** 2
-    return INK * cell * symbols_to_name(embossed)
+    return INK * cell * math.log(max(matches, 1.0), embossed.array.order)
