@@ -53,66 +53,69 @@ def check_printable(alphabet: Alphabet, style: SymbolStyle, printer: Printer) ->
 
     It names the number that is out of range, the printer's limit, and a stroke or pitch that works.
     """
-    place = f"alphabet {alphabet.name}"
-    if style.stroke_mm < printer.stroke_min_mm:
+    found = _fault(alphabet, style, printer)
+    if found is not None:
+        cause, fix = found
         raise AlphabetError(
-            f"stroke {style.stroke_mm:g} mm, but {printer.name} prints no stroke under "
-            f"{printer.stroke_min_mm:g} mm",
-            fix=f"set stroke to {printer.stroke_min_mm:g} mm or more, or choose a finer printer",
-            place=place,
+            cause,
+            fix=fix or _ways_out(alphabet, style, printer),
+            place=f"alphabet {alphabet.name}",
+        )
+
+
+def is_printable(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> bool:
+    """Return whether `check_printable` lets symbols pass."""
+    try:
+        return _fault(alphabet, style, printer) is None
+    except AlphabetError:  # of the footprint
+        return False
+
+
+def _fault(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> tuple[str, str] | None:
+    """Return what the printer would lose, and what to do: empty where that takes a search."""
+    if style.stroke_mm < printer.stroke_min_mm:
+        least = f"{printer.stroke_min_mm:g} mm"
+        return (
+            f"stroke {style.stroke_mm:g} mm, but {printer.name} prints no stroke under {least}",
+            f"set stroke to {least} or more, or choose a finer printer",
         )
     if style.height_mm < printer.height_min_mm:
-        raise AlphabetError(
-            f"height {style.height_mm:g} mm, but under {printer.height_min_mm:g} mm a symbol "
-            f"printed by {printer.name} cannot be felt",
-            fix=f"set height to {printer.height_min_mm:g} mm or more",
-            place=place,
+        least = f"{printer.height_min_mm:g} mm"
+        cause = (
+            f"height {style.height_mm:g} mm, but under {least} a symbol printed by {printer.name} "
+            "cannot be felt"
         )
+        return cause, f"set height to {least} or more"
     top = style.stroke_mm - 2 * style.chamfer_mm * (1 - math.tan(style.draft_rad))
     if top < printer.stroke_min_mm / 2:
         most = (style.stroke_mm - printer.stroke_min_mm / 2) / 2
-        raise AlphabetError(
+        cause = (
             f"a chamfer of {style.chamfer_mm:g} mm leaves {top:.2g} mm of the stroke's top, but "
-            f"{printer.name} needs {printer.stroke_min_mm / 2:g} mm",
-            fix=f"set chamfer to {math.floor(100 * most) / 100:g} mm or less",
-            place=place,
+            f"{printer.name} needs {printer.stroke_min_mm / 2:g} mm"
         )
+        return cause, f"set chamfer to {math.floor(100 * most) / 100:g} mm or less"
     footprint_half_mm(alphabet, style)
     between = gap_between_mm(alphabet, style)
     if between < printer.gap_min_mm:
-        raise AlphabetError(
+        cause = (
             f"{between:.2g} mm between the feet of neighbouring symbols, but {printer.name} keeps "
-            f"no gap under {printer.gap_min_mm:g} mm open",
-            fix=_ways_out(alphabet, style, printer),
-            place=place,
+            f"no gap under {printer.gap_min_mm:g} mm open"
         )
-    least = printer.gap_inside_mm
+        return cause, ""
+    open_mm = printer.gap_inside_mm
     for glyph, tiers in zip(alphabet.glyphs, outlines(alphabet, style), strict=True):
         inside = gap_inside_mm(tiers)
-        if inside < least * (1 - 1e-9):
-            raise AlphabetError(
+        if inside < open_mm * (1 - 1e-9):
+            cause = (
                 f"{inside:.2g} mm between two strokes of symbol '{glyph.name}', but "
-                f"{printer.name} keeps no gap under {least:g} mm open inside a symbol",
-                fix=_ways_out(alphabet, style, printer),
-                place=place,
+                f"{printer.name} keeps no gap under {open_mm:g} mm open inside a symbol"
             )
+            return cause, ""
+    return None
 
 
 def _ways_out(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> str:
     """Return the nearest strokes and pitches that pass, as an instruction."""
-
-    def passes(trial: SymbolStyle) -> bool:
-        if trial.stroke_mm < printer.stroke_min_mm:
-            return False
-        try:
-            footprint_half_mm(alphabet, trial)
-        except AlphabetError:
-            return False
-        return gap_between_mm(alphabet, trial) >= printer.gap_min_mm and all(
-            gap_inside_mm(tiers) >= printer.gap_inside_mm * (1 - 1e-9)
-            for tiers in outlines(alphabet, trial)
-        )
-
     ways = []
     for name, direction in (("stroke", -1), ("stroke", 1), ("pitch", 1)):
         field = f"{name}_mm"
@@ -121,7 +124,7 @@ def _ways_out(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> str:
             value = round(given + direction * steps * 0.05 * given, 2)
             if value <= 0:
                 break
-            if passes(replace(style, **{field: value})):
+            if is_printable(alphabet, replace(style, **{field: value}), printer):
                 ways.append(f"{name} to {value:g} mm")
                 break
     return "set " + ", or ".join(ways) if ways else "set draft or height to less, or pitch to more"

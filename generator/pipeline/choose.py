@@ -1,10 +1,11 @@
 """The lab that objects are made in, and the array of a run.
 
 The array is the lab's own of the profile. `auto` takes the smallest array of its symbols in which
-the objects fit together with what the database holds, an empty one with room for more: `large`, and
-its next sizes. Registered objects keep their array and pitch, those that came from another lab keep
-that lab's array, and a lab goes on with the arrays that it has. Finer symbols are taken where the
-printer makes them and they show places on faces that would stay blank.
+the objects fit together with what the database holds, an empty one with room for more: `tactel-8`
+or `large`, by the sensor type, and the next sizes. Registered objects keep their array and pitch,
+those that came from another lab keep that lab's array, and a lab goes on with the arrays that it
+has. Finer symbols are taken where the printer makes them and they show places on faces that would
+stay blank.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from generator.polyhedron import Polyhedron
 from generator.spec import ObjectSpec
 from generator.spec.problem import error_location
 from generator.spec.read import with_profile
-from generator.spec.resolved import AUTO, SMALLEST
+from generator.spec.resolved import AUTO, SMALLEST, family_of
 
 LARGER = 4  # sizes tried beyond `large`
 FINER_SHARES = (0.9, 0.8)
@@ -135,7 +136,8 @@ def choose_array(
         ]
         return ArrayChoice(plan_objects(found, solid))
     short: list[str] = []  # why each smaller array does not do
-    for candidate in _candidates():
+    smallest = _smallest(specs, lab)
+    for candidate in _candidates(smallest):
         array = lab.of_profile(candidate)
         made = array.definition(), lab.key_of(candidate)
         plans = plan_objects(
@@ -149,7 +151,7 @@ def choose_array(
         elif (needed := _cells(alone)) > room:
             short.append(f"{needed} cells are needed, and {size} has room for {room}")
         else:
-            windows = ["x".join(map(str, w)) for w in (array.window, PROFILES[SMALLEST].window)]
+            windows = ["x".join(map(str, w)) for w in (array.window, smallest.window)]
             window = f"window {windows[0]} in place of {windows[1]}"
             notes = tuple(
                 f"profile {candidate.name} is taken ({window}): {why}" for why in short[-1:]
@@ -188,8 +190,20 @@ def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> A
     return found
 
 
-def _candidates() -> Iterator[Profile]:
-    larger = PROFILES[SMALLEST]
+def _smallest(specs: Sequence[ObjectSpec], lab: LabArrays) -> Profile:
+    """Return the smallest array of the letters that all objects can bear, or that the lab has."""
+    orders = [PROFILES[name].array().order for name in SMALLEST]
+    made = {family_of(name) for name in lab.made}
+    for name, order in zip(SMALLEST[:-1], orders, strict=False):
+        if all(one.encoding["order"] >= order for one in specs) and (
+            name in made or not made.intersection(SMALLEST)
+        ):
+            return PROFILES[name]
+    return PROFILES[SMALLEST[-1]]
+
+
+def _candidates(smallest: Profile) -> Iterator[Profile]:
+    larger = smallest
     yield larger
     for _ in range(LARGER):
         try:
@@ -197,7 +211,7 @@ def _candidates() -> Iterator[Profile]:
         except ArrayError:
             return
         rows, columns = larger.encoding["rows"], larger.encoding["columns"]
-        yield replace(larger, name=f"large-{rows}x{columns}")
+        yield replace(larger, name=f"{smallest.name}-{rows}x{columns}")
 
 
 def _registered(
@@ -237,7 +251,7 @@ def _array_kept(lab: LabArrays, known: Mapping[str, ObjectEntry]) -> RegisteredA
 
 def _of_candidate(profile: str) -> bool:
     """Whether `auto` gave objects arrays under a profile's name, in this version or before it."""
-    return profile in (DEFAULT_PROFILE, "fine") or profile.partition("-")[0] == SMALLEST
+    return profile in (DEFAULT_PROFILE, "fine") or family_of(profile) in SMALLEST
 
 
 def _share_mm(share: float, spec: ObjectSpec) -> float:

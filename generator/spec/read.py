@@ -17,10 +17,11 @@ from pydantic import ValidationError
 
 from encoded_objects.base.document import Problem
 from encoded_objects.base.yaml_tree import Place, Tree, read_tree, tree_of
+from generator.array.profiles import PROFILES
 from generator.spec.explain import explain_errors
 from generator.spec.problem import SPEC, SpecError, mark_of
 from generator.spec.resolve import folder_name, resolve
-from generator.spec.resolved import AUTO, ObjectSpec, ShapeSpec
+from generator.spec.resolved import AUTO, ObjectSpec, ShapeSpec, family_of
 from generator.spec.settings import Defaults, NamedSettings, ObjectSettings, SharedSettings
 
 OBJECTS_MAX = 10_000
@@ -148,7 +149,8 @@ def with_profile(
     array_key
         Lab key that it was made from; empty for a published one.
     pitch_mm
-        Where the spec says none, in place of that of `defaults`.
+        Where the spec says none, in place of that of `defaults`. Letters of `auto` are those of
+        the array's profile.
 
     Raises
     ------
@@ -156,9 +158,12 @@ def with_profile(
         The spec's own settings do not go with those of the profile.
     """
     value = {key: inner for key, inner in spec.source.value.items() if key != "shape"}
-    if pitch_mm is not None:
-        given = {k: v for k, v in (value.get("symbols") or {}).items() if v is not None}
-        value["symbols"] = {"pitch": pitch_mm, **given}
+    symbols: dict[str, Any] = {} if pitch_mm is None else {"pitch": pitch_mm}
+    if defaults == AUTO and (family := PROFILES.get(family_of(name))):
+        symbols["alphabet"] = family.alphabet
+    given = {k: v for k, v in (value.get("symbols") or {}).items() if v is not None}
+    if symbols:
+        value["symbols"] = symbols | given
     read = NamedSettings.model_validate({**value, "profile": defaults, "copies": 1})
     (made,) = resolve(read, spec.source, spec.shape)
     return replace(

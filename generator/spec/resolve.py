@@ -22,7 +22,7 @@ from encoded_objects.base.sensor_type import SENSOR_FILES, USUAL_SENSOR, SensorT
 from encoded_objects.base.yaml_tree import Tree, read_tree
 from generator.alphabet.known import ALPHABETS, Alphabet
 from generator.alphabet.outline import SymbolStyle
-from generator.alphabet.printable import check_printable
+from generator.alphabet.printable import check_printable, is_printable
 from generator.array.definition import array_from
 from generator.array.profiles import PROFILES
 from generator.errors import AlphabetError, ArrayError
@@ -44,6 +44,7 @@ WALL_STROKES = 2  # least wall, in narrowest strokes of the printer
 FORMATS = ("step", "stl", "3mf")
 DATABASE = "sqlite:///lab.db"
 PRINTER = "fdm-0.4"
+LEAST_TACTELS = 3.1  #: to a symbol, from which letters made for tactels were measured
 COARSER_MM = (3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 12.0)
 """`auto` takes the pitch that the sensor type proposes, for `fsr-16` the 5 mm that touches are read
 best at, on nozzles of 0.4 and 0.6 mm and CAD surfaces alike (docs/pitches.md); and the first of
@@ -96,7 +97,7 @@ def resolve(
     if isinstance(settings, ObjectSettings):
         shape = _shape(settings.shape, tree, refuse)
     sensor = _sensor(settings, tree, problems)
-    encoding, order = _array(settings, refuse)
+    encoding, order = _array(settings, sensor, refuse)
     defaults = _defaults(settings, order, sensor)
     printer = _printer(settings, defaults, tree, problems)
     style = _style(settings, defaults, printer)
@@ -165,9 +166,10 @@ def _defaults(settings: NamedSettings, order: int | None, sensor: SensorType) ->
     if settings.encoding is None and settings.profile in (None, AUTO):
         pitch = sensor.symbol_pitch_mm
         coarser = tuple(more for more in COARSER_MM if more > pitch)
-        return SymbolDefaults(PROFILES[SMALLEST].alphabet, pitch, PRINTER, coarser)
+        alphabet = PROFILES[smallest_profile(settings, sensor)].alphabet
+        return SymbolDefaults(alphabet, pitch, PRINTER, coarser)
     if settings.encoding is None or order is None:
-        name = _array_profile(settings)
+        name = _array_profile(settings, sensor)
         profile = PROFILES[name]
         printer = "resin" if name == "fine" else PRINTER  # `fine` is meant for resin
         return SymbolDefaults(profile.alphabet, profile.pitch_mm, printer)
@@ -275,15 +277,12 @@ def _printable(
     The error is that of the steepest sides, where no style prints.
     """
     trials = [replace(style, draft_rad=draft) for draft in DRAFTS_RAD] if steeper else [style]
-    refused = None
-    for trial in trials:
-        try:
-            check_printable(alphabet, trial, printer)
-            return trial
-        except AlphabetError as error:
-            refused = error
-    assert refused is not None
-    return refused
+    found = next((trial for trial in trials if is_printable(alphabet, trial, printer)), trials[-1])
+    try:
+        check_printable(alphabet, found, printer)
+    except AlphabetError as error:
+        return error
+    return found
 
 
 def _refuse_style(error: AlphabetError, refuse: Refuse) -> None:
@@ -303,15 +302,35 @@ def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
     refuse("symbols.alphabet, encoding, profile", cause, fix)
 
 
-def _array_profile(settings: NamedSettings) -> str:
+def _array_profile(settings: NamedSettings, sensor: SensorType) -> str:
     """Return the profile whose array is taken as long as none is chosen for `auto`."""
-    return SMALLEST if settings.profile in (None, AUTO) else settings.profile
+    if settings.profile in (None, AUTO):
+        return smallest_profile(settings, sensor)
+    return settings.profile
 
 
-def _array(settings: NamedSettings, refuse: Refuse) -> tuple[dict[str, Any], int | None]:
+def smallest_profile(settings: NamedSettings, sensor: SensorType) -> str:
+    """Return the profile of the smallest array that `auto` takes for a sensor type's letters."""
+    tactel, usual = SMALLEST
+    named = ALPHABETS.get(settings.symbols.alphabet or "")
+    letters = PROFILES[tactel].array().order
+    if (named is not None and named.order < letters) or not reads_letters(sensor):
+        return usual
+    return tactel
+
+
+def reads_letters(sensor: SensorType) -> bool:
+    """Return whether a sensor type tells letters made for tactels apart, as was measured."""
+    tactels = sensor.symbol_pitch_mm / max(sensor.step_mm)
+    return sensor.overlay.kind == "tab" and tactels >= LEAST_TACTELS
+
+
+def _array(
+    settings: NamedSettings, sensor: SensorType, refuse: Refuse
+) -> tuple[dict[str, Any], int | None]:
     """Return the complete definition of the array, and its number of symbols."""
     if settings.encoding is None:
-        return _profile_definition(_array_profile(settings))
+        return _profile_definition(_array_profile(settings, sensor))
     if settings.profile is not None:
         refuse(
             "encoding",
