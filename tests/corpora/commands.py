@@ -108,8 +108,11 @@ class Commands:
 
 @contextmanager
 def started_commands() -> Iterator[Commands]:
-    """Yield what starts commands in an empty folder; home and cache are another one."""
-    with tempfile.TemporaryDirectory() as name:
+    """Yield what starts commands in an empty folder; home and cache are another one.
+
+    It is in /tmp whatever TMPDIR says: a table is as wide as the paths in it.
+    """
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
         work, home = (Path(name).resolve() / one for one in ("work", "home"))
         work.mkdir()
         home.mkdir()
