@@ -166,21 +166,20 @@ def _misuse(
     """Return what is wrong with an option, with the option's name and the command's."""
     from encoded_objects.base.errors import EncodedObjectsError
 
-    called = getattr(getattr(error, "ctx", None), "command_path", "")
-    if not called:
-        words, inner = [name], app
-        for word in arguments:
-            if inner is None or not (inner.is_group and word in inner.commands | inner.groups):
-                break
-            words.append(word)
-            inner = inner.groups.get(word)
-        called = " ".join(words)
+    words, inner, meant = [name], app, None
+    for word in arguments:
+        if inner is None or not (inner.is_group and word in inner.commands | inner.groups):
+            break
+        words.append(word)
+        meant, inner = inner.commands.get(word), inner.groups.get(word)
+    called = getattr(getattr(error, "ctx", None), "command_path", "") or " ".join(words)
     if getattr(error, "param", None) is None:  # a message of our own, which names it
         cause = str(getattr(error, "message", getattr(error, "cause", error)))
     else:
         message = str(getattr(error, "format_message", error.__str__)())
         cause = message.replace("Invalid value for ", "").removesuffix(".")
-    return EncodedObjectsError(cause, fix=f"see {called} --help")
+    instead = meant.instead.get(getattr(error, "option_name", "")) if meant else None
+    return EncodedObjectsError(cause, fix=instead or f"see {called} --help")
 
 
 def _end(number: int, _frame: FrameType | None) -> NoReturn:

@@ -118,6 +118,7 @@ class DeclaredCommand:
     version_of: str  #: name of the command, which then has the option `--version`
     parts: Callable[[], Mapping[str, str]]  #: what the version says besides
     page: dict[str, Any]  #: help and epilog, in place of the docstring
+    instead: Mapping[str, str]  #: option that it does not have -> what to do instead
 
     def read(self, **given: Any) -> Callable[[], int]:
         """Return the action of a command line, from the values of its options."""
@@ -246,6 +247,7 @@ def command(
     epilog: str | None = None,
     version_of: str = "",
     parts: Callable[[], Mapping[str, str]] = dict,
+    instead: Mapping[str, str] | None = None,
 ) -> Callable[[Work], Work]:
     """Make a function a command of an application.
 
@@ -259,6 +261,8 @@ def command(
         Name of the command: it gets the option `--version`.
     parts
         Returns what the version says besides, as which kernels are in use.
+    instead
+        Options that other commands have and this one does not: what to do instead.
     """
 
     def register(work: Work) -> Work:
@@ -267,7 +271,7 @@ def command(
             declared = declared | {"version": (bool, _VERSION, False)}
         page = {"help": help, "epilog": epilog}
         app.commands[name or work.__name__.replace("_", "-")] = DeclaredCommand(
-            work, declared, version_of, parts, page
+            work, declared, version_of, parts, page, instead or {}
         )
         return work
 

@@ -214,7 +214,10 @@ def port(options: GuideOptions) -> int:
     return guide_loads(options)
 
 
-@command(app)
+@command(
+    app,
+    instead={"--database": "name a registered part in TARGET: lab.db#Roof/F3, or part.stl@lab.db"},
+)
 def simulate(options: SimulateOptions) -> int:
     """Touch a part in simulation: a recording as the probe would give it, and a picture."""
     from probe.command.simulated import simulate_touches

@@ -47,6 +47,7 @@ from recognizer.touch import verdict
 from recognizer.touch.chance import expected_matches
 from recognizer.touch.evidence import (
     VerifiedHypothesis,
+    bits_of,
     null_log_likelihood,
     unworn_labels_at,
     weigh_cells,
@@ -316,7 +317,7 @@ def _pose_last_touch(
     """Return a place with the pose of the last touch, and whether that touch agrees with it."""
     if best.evidence.agreement.chosen[-1] >= 0:
         finer = refine_last_pose(reader, image, best)
-        least = least_explained(len(best.fit.cells))
+        least = least_explained(bits_of(best.embossed, len(best.fit.cells)))
         if finer.explained >= least and is_definite(finer.fit.covariance):
             return finer, True
     return replace(best, fit=predicted_fit(best.evidence, touch_poses)), False
@@ -435,7 +436,7 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
         margin = min(margin, path.margin)
     by_hand = path is not None and best.evidence.agreement.touches > 1
     reason = verdict.reject_reason(
-        _verdict_evidence(best), margin, reader.options,
+        _verdict_evidence(best), margin, reader.options.margin,
         least_ratio=RATIO_BY_HAND if by_hand else verdict.RATIO, wrong_share=WRONG,
     )  # fmt: skip
     answer = answer_at(
@@ -455,10 +456,11 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
 def _verdict_evidence(best: ScanHypothesis) -> verdict.Evidence:
     fit, agreement = best.fit, best.evidence.agreement
     cells = weigh_cells(best.embossed, fit, best.hypothesis)
-    chance = null_log_likelihood(best.embossed, fit)
+    chance, inliers = null_log_likelihood(best.embossed, fit), int(cells.agree.sum())
     return verdict.Evidence(
         log_likelihood_ratio=best.score - chance,
-        inliers=int(cells.agree.sum()),
+        inliers=inliers,
+        bits=bits_of(best.embossed, inliers),
         contradictions=int((cells.against > verdict.CONTRADICTION).sum()),
         best_ratio=fit.value - chance,
         touches=1 if best.path is None else len(agreement.chosen),

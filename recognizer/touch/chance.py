@@ -80,17 +80,12 @@ PARALLEL_RAD = 0.2  #: by which parallel lines differ at most
 
 
 def expected_matches(
-    arrays: Iterable[EmbossedArray],
-    embossed: EmbossedArray,
-    fit: Fit,
-    hypothesis: Hypothesis,
-    *,
-    borders: bool = True,
+    arrays: Iterable[EmbossedArray], embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis
 ) -> float:
     """Return how many registered places random symbols would match as well as a hypothesis.
 
-    Only arrays of the same alphabet and style count; with `borders` only places whose own borders
-    agree with the bare cells.
+    Only arrays of the same alphabet and style count, and places whose own borders agree with the
+    bare cells.
     """
     scores = bounded_scores(fit)
     held = labels_of(embossed, hypothesis, fit.cells)
@@ -104,7 +99,7 @@ def expected_matches(
     cells = (fit.cells - fit.cells[_anchor(fit, shown)])[dear]
     return chance * sum(
         count_places(one, cells, price[dear], slack)
-        if borders and len(one.keys) <= LARGE_LAB
+        if len(one.keys) <= LARGE_LAB
         else len(one.keys)
         for one in _embossed_alike(arrays, embossed)
     )

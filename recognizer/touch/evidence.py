@@ -54,9 +54,11 @@ class VerifiedHypothesis(PlaceHypothesis):
         """Evidence for the place, and against it."""
         fit, cells = self.fit, self.cells
         against = cells.seen & (cells.against > CONTRADICTION)
+        inliers = int(cells.agree.sum())
         return Evidence(
             log_likelihood_ratio=self.score - null_log_likelihood(self.embossed, fit),
-            inliers=int(cells.agree.sum()),
+            inliers=inliers,
+            bits=bits_of(self.embossed, inliers),
             contradictions=int(against.sum()),
             strong_contradictions=int((against & (cells.against > STRONG_CONTRADICTION)).sum()),
             worn=int((cells.worn & cells.seen).sum()),
@@ -100,6 +102,11 @@ def unworn_labels_at(embossed: EmbossedArray, hypothesis: Hypothesis, worn: Ints
         return np.where(gone | (found == embossed.array.order), -1, found)
 
     return labels
+
+
+def bits_of(embossed: EmbossedArray, symbols: int) -> float:
+    """Return how many bits so many symbols say."""
+    return symbols * math.log2(embossed.array.order)
 
 
 def symbols_to_name(embossed: EmbossedArray) -> int:

@@ -24,6 +24,7 @@ class Effort:
     steps: int = 2  #: of damped least squares, of all of them
     finalists: int = 1  #: lattices that are refined to the end
     final_steps: int = 2
+    again: int = 0  #: of the best lattices, under whose gains the image is searched again
     crossed: int = 0  #: gains that are tried on all lattices, and these turned by quarters
 
 
@@ -32,8 +33,7 @@ class ReaderOptions:
     """How a touch is read, and when an answer is given."""
 
     margin: float = 10.0 - TIE_NATS  #: nats over the best other place
-    margin_by_few: float = 14.0 - TIE_NATS  #: where fewer than 11 cells agree with the place
-    least_inliers: int = 4  #: cells in view whose registered symbol is read
+    margin_by_few: float = 14.0 - TIE_NATS  #: where agreeing symbols say less than 22 bits
     #: registered places that a foreign surface may match as well by chance: of 395 right answers
     #: among 20,880 places of 5 mm it refuses 5, all at edges (`tests/campaigns/other_labs.py`)
     doubt: float = 1e-4
@@ -45,7 +45,7 @@ class ReaderOptions:
     first: Effort = Effort()  #: of the first search
     #: of the second, of touches that the first does not answer or of which few cells agree: seven
     #: times the work (`docs/recognizer.md`)
-    thorough: Effort = Effort(12, 4, 6, 6, crossed=3)
+    thorough: Effort = Effort(12, 4, 6, 6, again=2)
 
 
 DEFAULTS = ReaderOptions()

@@ -41,7 +41,12 @@ from recognizer.touch.search_gate import is_nearly_chance, may_find_more
 from recognizer.touch.signal import Signal, mean_of_strongest, swap_halves
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import STROKE_UNIT_MM
-from recognizer.touch.verdict import may_count_border, reject_chance, reject_few, reject_reason
+from recognizer.touch.verdict import (
+    least_margin,
+    may_count_border,
+    reject_chance,
+    reject_reason,
+)
 from recognizer.touch.verify import TouchImages, verify_hypotheses
 
 #: Doubt up to which a wide search confirms an answer that chance nearly allows. A wrong soft one of
@@ -149,7 +154,8 @@ def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: i
     nearest = margin
     if adjacent is not None and best.score - adjacent.score < options.margin_by_few:
         nearest = min(margin, best.score - adjacent.score)
-    reason = reject_reason(best.evidence, nearest, options)
+    evidence = best.evidence
+    reason = reject_reason(evidence, nearest, least_margin(evidence.bits, options))
     if reason in ("", AMBIGUOUS):
         margin = nearest
     return answer_at(
@@ -161,17 +167,12 @@ def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: i
 def _judge(
     reader: PreparedLab, found: list[VerifiedHypothesis], answer: Recognition
 ) -> Recognition:
-    """Return an answer with its doubt, or its refusal for few symbols or for chance."""
+    """Return an answer with its doubt, or its refusal for chance."""
     if not answer:
         return answer
-    options, best, doubt, margin = reader.options, found[0], None, _margin_of(answer)
-    matches = expected_matches(
-        reader.lab.arrays, best.embossed, best.fit, best.hypothesis, borders=False
-    )
-    reason = reject_few(best.evidence, margin, matches, options)
-    if not reason:
-        doubt = _doubt_of(reader, best, margin)
-        reason = reject_chance(doubt, options.doubt)
+    margin = _margin_of(answer)
+    doubt = _doubt_of(reader, found[0], margin)
+    reason = reject_chance(doubt, reader.options.doubt)
     if not reason:
         return replace(answer, doubt=doubt)
     return refusal(answer.seq, reason, margin=margin, runner_up=answer.runner_up, doubt=doubt)

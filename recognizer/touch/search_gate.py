@@ -18,13 +18,14 @@ no such answer is, and makes 42 touches right of the 50 that it can.
 
 from __future__ import annotations
 
+import math
+
 from recognizer.touch.evidence import VerifiedHypothesis, symbols_to_name
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.options import TIE_NATS
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, TOO_FEW, Recognition
 from recognizer.touch.signal import Signal, mean_of_strongest, quantile, sorted_around
-from recognizer.touch.verdict import MANY_INLIERS, RATIO, Evidence
+from recognizer.touch.verdict import Evidence
 
 PRESSED = 0.15  #: share of the strongest readings from which a tactel is pressed
 AROUND = 5  #: tactels, side of a square in which strokes and gaps lie
@@ -35,14 +36,10 @@ WEAK = 0.35  #: share of that below which a tactel lies over a gap
 #: (seeds 11 and 12).
 GAPS = 0.285
 FINEST, COARSEST = 3.1, 5.0  #: tactels, pitches between which gaps were measured
+LEAST_BORDERS = 1 / 16  #: share of places that a border of two lines leaves (`chance.LEAST_SHARE`)
 INK = 0.44  #: share of a cell's tactels that its symbol presses, and some around it
-#: Inliers, with fewer of which a wide search finds no place: of 49 touches that it made right (own
-#: engine, MuJoCo, forty and small objects; seeds 1401-1408) none.
-AGREED = 3
-SURE_RATIO = 20.0  #: nats from which a place's symbols are there beyond doubt, and then ...
-EXPLAINED = 0.6  #: ... the share of the image that they explain
-DOUBT = 1e-3  #: of an answer by few symbols that a better fit may bring below the limit
-MARGIN = 12.0 - TIE_NATS  #: nats that such an answer leaves other places behind
+SURE_RATIO = 20.0  #: nats from which a place's symbols are there beyond doubt
+DOUBT = 1e-3  #: of an answer that a better fit may bring below the limit
 NEARLY_CHANCE = 1e-5  #: doubt above which an answer by less than `SURE_RATIO` is confirmed
 
 
@@ -60,18 +57,17 @@ def may_find_more(
     """
     if best is None:
         return True
-    evidence, arrays = best.evidence, reader.lab.arrays
-    if answer and evidence.inliers >= MANY_INLIERS:
-        return False
-    if reader.sensor.overlay.kind != "tab" or any(each.radii_mm for each in arrays):
-        return True  # few symbols need confirmation; a round face presses few tactels
+    if reader.sensor.overlay.kind != "tab" or any(each.radii_mm for each in reader.lab.arrays):
+        # a round face presses few tactels; an answer that chance nearly allows needs confirmation
+        return not judged or judged.doubt is None or judged.doubt > NEARLY_CHANCE
     if answer:
-        return not judged and _is_nearly_sure(judged)
-    if answer.reason == AMBIGUOUS and evidence.inliers < symbols_to_name(best.embossed):
+        return judged.reason == BY_CHANCE and judged.doubt is not None and judged.doubt <= DOUBT
+    inliers = best.evidence.inliers
+    if answer.reason == AMBIGUOUS and inliers < symbols_to_name(best.embossed):
         return False  # the image is explained, and it shows no more
     if answer.reason == TOO_FEW:
         return False
-    return _is_unexplained(reader, signal, evidence)
+    return _may_show_symbols(reader, signal)
 
 
 def is_nearly_chance(judged: Recognition, evidence: Evidence) -> bool:
@@ -106,25 +102,10 @@ def pressed_tactels(signal: Signal) -> int:
     return int((signal.forces * signal.trust > _pressed_from(signal)).sum())
 
 
-def _is_nearly_sure(judged: Recognition) -> bool:
-    """Return whether the answer of few symbols misses its limit by little."""
-    if judged.reason == BY_CHANCE:
-        return judged.doubt is not None and judged.doubt <= DOUBT
-    if judged.reason == AMBIGUOUS:
-        return judged.margin is not None and judged.margin >= MARGIN
-    return False
-
-
-def _is_unexplained(reader: PreparedLab, signal: Signal, evidence: Evidence) -> bool:
-    """Return whether the image shows symbols of a place, perhaps under another fit."""
-    if evidence.inliers < AGREED or evidence.log_likelihood_ratio < RATIO:
-        return False
-    if not shows_strokes(reader, signal):
-        return False
+def _may_show_symbols(reader: PreparedLab, signal: Signal) -> bool:
+    """Return whether strokes show, and as many tactels are pressed as symbols that name a place."""
     least = min(_tactels_to_name(reader, each) for each in reader.lab.arrays)
-    if pressed_tactels(signal) < least:
-        return False
-    return evidence.log_likelihood_ratio < SURE_RATIO or evidence.explained >= EXPLAINED
+    return shows_strokes(reader, signal) and pressed_tactels(signal) >= least
 
 
 def _pressed_from(signal: Signal) -> float:
@@ -132,6 +113,7 @@ def _pressed_from(signal: Signal) -> float:
 
 
 def _tactels_to_name(reader: PreparedLab, embossed: EmbossedArray) -> float:
-    """Return how many tactels the symbols press that can name one of the registered cells."""
+    """Return how many tactels the symbols press that name one of the registered cells surely."""
+    matches = len(embossed.keys) / reader.options.doubt * LEAST_BORDERS
     cell = (embossed.style.pitch_mm / reader.sensor.pitch_mm) ** 2
-    return INK * cell * symbols_to_name(embossed)
+    return INK * cell * math.log(max(matches, 1.0), embossed.array.order)

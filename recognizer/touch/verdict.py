@@ -4,11 +4,11 @@ Evidence (nats, counts of cells) and expected false matches -> a reason of `reco
 the place. One touch (`recognise`) and a scan (`recognizer.scan`) are judged alike:
 
 1. `reject_reason` where symbols of no registered place explain the touch as well, where cells
-   contradict the place, where too few cells agree, or where another place comes near.
-2. `reject_few` where few cells agree: they have to name one place of the whole database, and leave
-   other places farther behind. Bare cells then weigh as much as symbols, and a cell is bare beyond
-   an edge, between two edges, or where its symbol is worn.
-3. `reject_chance` where a surface of another lab would match a registered place as well (`chance`).
+   contradict the place, or where another place comes near.
+2. `reject_chance` where a surface of another lab would match a registered place as well (`chance`).
+
+All limits are of likelihoods and of expected matches, none of numbers of symbols: a letter of a
+large alphabet says more than one of a small one.
 
 Log-likelihoods in nats; 10 nats are odds of 22,000.
 """
@@ -30,14 +30,11 @@ SURE_RATIO = 7.0  #: nats below which `WELL_EXPLAINED` of the image must be expl
 STROKE_EXCESS = 0.9  #: tenths of a mm by which strokes are hardly printed wider; the same holds
 WELL_EXPLAINED = 0.8
 EXPLAINED = 0.72  #: share of the image's variance
-EXPLAINED_BY_MANY = 0.58  #: where `MANY_INLIERS` agree
-MANY_INLIERS = 11
+EXPLAINED_BY_MANY = 0.58  #: where agreeing symbols say `MANY_BITS`
+MANY_BITS = 22.0  #: of eleven letters of four
 CONTRADICTIONS = 1  #: cells that may contradict a place; none strongly
 CONTRADICTION = 8.0  #: nats by which a cell shows another symbol
 STRONG_CONTRADICTION = 16.0
-#: registered places, whatever their borders, that random symbols match as well: with more of them
-#: the symbols of a touch, partly seen ones counted by what they show, name no place
-NAMED = 1.0
 MOST_POSITION_SD_MM = 0.6  #: standard deviation of the place of several touches
 WORN_WITH_BORDER = 1  #: symbols in view and not felt, with more of which borders do not count
 
@@ -50,7 +47,8 @@ class Evidence:
     """Evidence for a place, and against it."""
 
     log_likelihood_ratio: float  #: nats over symbols of no registered place
-    inliers: int  #: cells in view whose registered symbol is read
+    inliers: int  #: cells in view whose registered symbol is read, ...
+    bits: float  #: ... and what these symbols say
     contradictions: int  #: cells in view that show another symbol, by `CONTRADICTION`
     strong_contradictions: int = 0  #: by `STRONG_CONTRADICTION`
     worn: int = 0  #: cells in view whose registered symbol is not felt
@@ -64,7 +62,7 @@ class Evidence:
 def reject_reason(
     evidence: Evidence,
     margin: float,
-    options: ReaderOptions,
+    least_margin: float,
     *,
     least_ratio: float = RATIO,
     wrong_share: float = 0.0,
@@ -80,9 +78,9 @@ def reject_reason(
         return NOT_ENCODED
     if evidence.touches > 1 and 2 * evidence.agreeing <= evidence.touches:
         return TOO_FEW  # few of many touches agree on some place by chance
-    if evidence.log_likelihood_ratio < least_ratio or evidence.inliers < options.least_inliers:
+    if evidence.log_likelihood_ratio < least_ratio:
         return TOO_FEW
-    return reject_margin(margin, options.margin)
+    return reject_margin(margin, least_margin)
 
 
 def is_encoded(evidence: Evidence, contradictions: float = CONTRADICTIONS) -> bool:
@@ -91,27 +89,24 @@ def is_encoded(evidence: Evidence, contradictions: float = CONTRADICTIONS) -> bo
     return (
         evidence.log_likelihood_ratio >= RATIO
         and (evidence.explained >= WELL_EXPLAINED or not doubtful)
-        and evidence.explained >= least_explained(evidence.inliers)
+        and evidence.explained >= least_explained(evidence.bits)
         and evidence.contradictions <= contradictions
         and evidence.strong_contradictions == 0
     )
 
 
-def least_explained(cells: int) -> float:
-    """Return the share of the image's variance that so many agreeing cells must explain."""
-    return EXPLAINED if cells < MANY_INLIERS else EXPLAINED_BY_MANY
+def least_explained(bits: float) -> float:
+    """Return the share of the image's variance that symbols that say so much must explain."""
+    return EXPLAINED if bits < MANY_BITS else EXPLAINED_BY_MANY
 
 
-def reject_few(evidence: Evidence, margin: float, matches: float, options: ReaderOptions) -> str:
-    """Return why a place of few agreeing cells is no answer; "" where they are many or enough.
+def least_margin(bits: float, options: ReaderOptions) -> float:
+    """Return the nats by which symbols that say so much must leave other places behind.
 
-    `matches` are the registered places that random symbols match as well, whatever their borders.
+    Bare cells weigh as much as few symbols, and a cell is bare beyond an edge, between two edges,
+    or where its symbol is worn.
     """
-    if evidence.inliers >= MANY_INLIERS:
-        return ""
-    if matches > NAMED:
-        return TOO_FEW
-    return reject_margin(margin, options.margin_by_few)
+    return options.margin_by_few if bits < MANY_BITS else options.margin
 
 
 def reject_margin(margin: float, least: float) -> str:
@@ -136,7 +131,12 @@ def reject_joined(
 
 
 def reject_chance(doubt: float, most: float) -> str:
-    """Return `BY_CHANCE` where more than so many places would match a foreign surface as well."""
+    """Return `BY_CHANCE` where more than so many places would match a foreign surface as well.
+
+    `TOO_FEW` where more than one would: the symbols name no place then.
+    """
+    if doubt > max(most, 1.0):
+        return TOO_FEW
     return BY_CHANCE if doubt > most else ""
 
 

@@ -1,6 +1,7 @@
 """Parts of other labs, made with the same profile, read against the database of one lab.
 
     python tests/campaigns/other_labs.py -o out/labs --touches 20000     # 40 min of CPU
+    python tests/campaigns/other_labs.py -o out/large --touches 20000 --profile large
     python tests/campaigns/other_labs.py -o out/labs --own 2000          # its own parts: 4 min
     python tests/campaigns/other_labs.py -o out/labs --touches 0 --own 0  # the table
 
@@ -35,7 +36,7 @@ from recognizer.validation.trial import judge
 
 LABS, OBJECTS, SIZES_MM = 8, 40, (35.0, 75.0)
 KINDS = (("face", 0.5), ("edge", 0.35), ("corner", 0.15))  # nearly as touches fall on such faces
-STYLE = {"profile": "large", "symbols": {"pitch": "5 mm"}}  # what `auto` gives such a set
+PITCH = {"symbols": {"pitch": "5 mm"}}  # what `auto` gives such a set
 OWN = (
     ("Cube", {"cube": "60 mm"}),
     ("Prism", {"triangular_prism": {"side": "60 mm", "height": "50 mm"}}),
@@ -47,8 +48,8 @@ LIMITS = (math.inf, 1e-2, 1e-3, 1e-4)
 
 def main() -> None:
     """Touch what is not touched yet, and print the tables."""
-    asked = runner.asked(__doc__, output=True, touches=0, own=0, seed=18)
-    own, others = make_labs(asked.output, asked.seed)
+    asked = runner.asked(__doc__, output=True, touches=0, own=0, seed=18, profile="tactel-8")
+    own, others = make_labs(asked.output, asked.seed, asked.profile)
     reader = Reader(open_lab(own), options=ReaderOptions(doubt=math.inf))
     for name, labs, number in (("touches", others, asked.touches), ("own", [own], asked.own)):
         work = touch_labs(reader, labs, asked.seed, registered=name == "own")
@@ -57,27 +58,27 @@ def main() -> None:
         table(rows)
 
 
-def make_labs(folder: Path, seed: int) -> tuple[str, list[str]]:
+def make_labs(folder: Path, seed: int, profile: str) -> tuple[str, list[str]]:
     """Make the databases that are not there yet, and return their names."""
     folder.mkdir(parents=True, exist_ok=True)
     own = folder / "own.db"
     if not own.exists():
         specs = [{"name": name, "shape": shape, "copies": 10} for name, shape in OWN]
-        _make(own, specs)
+        _make(own, profile, specs)
     others = []
     for number in range(LABS):
         lab = folder / f"lab-{number + 1}.db"
         if not lab.exists():
-            _make(lab, list(_random_objects(np.random.default_rng([seed, number, 5]))))
+            _make(lab, profile, list(_random_objects(np.random.default_rng([seed, number, 5]))))
         others.append(str(lab))
     return str(own), others
 
 
-def _make(database: Path, specs: list[dict[str, Any]]) -> None:
+def _make(database: Path, profile: str, specs: list[dict[str, Any]]) -> None:
     """Make a lab with a key of its own, as a new database draws it; whole or not at all."""
     unfinished = database.with_suffix(".part")
     unfinished.unlink(missing_ok=True)
-    objects = [STYLE | one for one in specs]
+    objects = [PITCH | {"profile": profile} | one for one in specs]
     key = np.random.default_rng(list(database.stem.encode())).bytes(16)
     whole = {"version": 1, "objects": objects, "output": {"lab_key": lab_key_of(key)}}
     encode(whole, database=str(unfinished), formats=())

@@ -110,8 +110,11 @@ class Commands:
 
 @contextmanager
 def started_commands() -> Iterator[Commands]:
-    """Yield what starts commands in an empty folder."""
-    with tempfile.TemporaryDirectory() as name:
+    """Yield what starts commands in an empty folder.
+
+    It is in /tmp whatever TMPDIR says: a table is as wide as the paths in it.
+    """
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
         work = Path(name).resolve() / "work"
         work.mkdir()
         yield Commands(work, _server())

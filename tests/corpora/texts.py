@@ -193,6 +193,7 @@ probe-sensor simulate washer --theta inf
 probe-sensor simulate washer --truth a.txt
 probe-sensor simulate washer --force -1 [twice]
 probe-sensor simulate washer --nope
+probe-sensor simulate broken.stl --database lab.db [twice]
 probe-sensor simulate washer --overlay wool [twice]
 probe-sensor simulate washer --noise loud
 probe-sensor {simulate,fly}

@@ -139,12 +139,14 @@ def fit_lattices(
     """
     if searches is None:
         searches = search_image(image, bank)
-    starts = [one.scores.best(bank, effort.candidates) for one in searches]
-    if sum(len(start) for start in starts) == 0:
+    lattices = _refine_candidates(image, bank, effort, searches)
+    if not len(lattices.pose):
         return ()
-    pose = np.concatenate(starts)
-    gain = np.repeat([one.gain for one in searches], [len(start) for start in starts], axis=0)
-    lattices = refine_lattices(image, pose, gain, steps=effort.steps, with_normal=False)
+    if effort.again:
+        best = _distinct_lattices(image, lattices)[: effort.again]
+        gains = [lattices.gain[b] for b in best]
+        more = _refine_candidates(image, bank, effort, search_image(image, bank, gains))
+        lattices = _joined(lattices, more)
     if effort.crossed:
         lattices = _cross_gains(image, lattices, effort.crossed)
     best = _distinct_lattices(image, lattices)[: effort.finalists]
@@ -154,6 +156,22 @@ def fit_lattices(
     )  # fmt: skip
     found = score_cells(image, lattices, with_covariance=with_covariance)
     return tuple(found[b] for b in _distinct_lattices(image, lattices))
+
+
+def _refine_candidates(
+    image: Image, bank: Bank, effort: Effort, searches: Sequence[CoarseSearch]
+) -> Lattices:
+    """Return the best lattices of coarse searches, each refined from its own gain."""
+    starts = [one.scores.best(bank, effort.candidates) for one in searches]
+    pose = np.concatenate([np.empty((0, 3)), *starts])
+    gain = np.repeat([one.gain for one in searches], [len(start) for start in starts], axis=0)
+    return refine_lattices(image, pose, gain, steps=effort.steps, with_normal=False)
+
+
+def _joined(*found: Lattices) -> Lattices:
+    return Lattices(
+        *(np.concatenate([getattr(one, item.name) for one in found]) for item in fields(Lattices))
+    )
 
 
 def _distinct_lattices(image: Image, found: Lattices) -> list[int]:

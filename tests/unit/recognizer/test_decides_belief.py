@@ -29,16 +29,16 @@ from recognizer.touch.verdict import (
     Evidence,
     is_encoded,
     least_explained,
+    least_margin,
     may_count_border,
     reject_chance,
-    reject_few,
     reject_joined,
     reject_margin,
     reject_reason,
 )
 
 LIMITS = ReaderOptions()
-GOOD = Evidence(log_likelihood_ratio=20.0, explained=0.9, inliers=12, contradictions=0)
+GOOD = Evidence(20.0, inliers=12, bits=24.0, contradictions=0, explained=0.9)
 #: Limits of margins, nats: 10 and 14 but for rounding.
 TEN, FOURTEEN = LIMITS.margin, LIMITS.margin_by_few
 
@@ -60,12 +60,12 @@ TEN, FOURTEEN = LIMITS.margin, LIMITS.margin_by_few
         ({"stroke_excess": 0.91, "explained": 0.799}, False),
         ({"stroke_excess": 0.91, "explained": 0.8}, True),
         ({"stroke_excess": -1.2, "explained": 0.799}, True),
-        # 72 % where fewer than 11 cells agree, 58 % where more do
-        ({"inliers": 10, "explained": 0.72}, True),
-        ({"inliers": 10, "explained": 0.719}, False),
-        ({"inliers": 11, "explained": 0.58}, True),
-        ({"inliers": 11, "explained": 0.579}, False),
-        ({"inliers": 0, "explained": 0.72}, True),  # too few symbols is another reason
+        # 72 % where symbols say less than 22 bits, 58 % where they say more
+        ({"bits": 21.9, "explained": 0.72}, True),
+        ({"bits": 21.9, "explained": 0.719}, False),
+        ({"bits": 22.0, "explained": 0.58}, True),
+        ({"bits": 22.0, "explained": 0.579}, False),
+        ({"bits": 0.0, "explained": 0.72}, True),  # chance is another reason
         # one cell may speak clearly for another symbol, none plainly
         ({"contradictions": 1}, True),
         ({"contradictions": 2}, False),
@@ -79,28 +79,23 @@ def test_each_bound_of_belief_from_both_sides(changed, believed):
 @pytest.mark.parametrize(
     ("changed", "margin", "reason"),
     [
-        ({}, TEN, ""), ({}, 9.99, AMBIGUOUS), ({}, math.inf, ""),
-        ({"inliers": 4}, TEN, ""), ({"inliers": 3}, TEN, TOO_FEW),
+        ({}, 13.0, ""), ({}, 12.9, AMBIGUOUS), ({}, math.inf, ""),
         # the first condition that fails is the reason
         ({"log_likelihood_ratio": 2.99}, 9.0, NOT_ENCODED),
-        ({"log_likelihood_ratio": 2.99, "inliers": 2}, 9.0, NOT_ENCODED),
-        ({"inliers": 3}, 9.0, TOO_FEW),
         # of a scan: half of the touches are too few
-        ({"touches": 4, "agreeing": 3}, TEN, ""), ({"touches": 4, "agreeing": 2}, TEN, TOO_FEW),
-        ({"touches": 4, "agreeing": 2, "contradictions": 2}, TEN, NOT_ENCODED),
+        ({"touches": 4, "agreeing": 3}, FOURTEEN, ""),
+        ({"touches": 4, "agreeing": 2}, FOURTEEN, TOO_FEW),
+        ({"touches": 4, "agreeing": 2, "contradictions": 2}, FOURTEEN, NOT_ENCODED),
     ],
 )  # fmt: skip
 def test_each_reason_in_its_order(changed, margin, reason):
-    assert reject_reason(replace(GOOD, **changed), margin, LIMITS) == reason
+    assert reject_reason(replace(GOOD, **changed), margin, 13.0) == reason
 
 
 def test_the_bounds_are_those_that_are_given():
-    strict = ReaderOptions(margin=12.0, margin_by_few=16.0, least_inliers=6)
-    few = replace(GOOD, inliers=6)
-    assert [reject_reason(few, margin, strict) for margin in (12.0, 11.9)] == ["", AMBIGUOUS]
-    assert reject_reason(replace(few, inliers=5), 12.0, strict) == TOO_FEW
-    assert [reject_few(few, margin, 1.0, strict) for margin in (16.0, 15.9)] == ["", AMBIGUOUS]
-    assert [may_count_border(few, margin, strict) for margin in (16.0, 15.9)] == [True, False]
+    strict = ReaderOptions(margin=12.0, margin_by_few=16.0)
+    assert [least_margin(bits, strict) for bits in (21.9, 22.0)] == [16.0, 12.0]
+    assert [may_count_border(GOOD, margin, strict) for margin in (16.0, 15.9)] == [True, False]
 
 
 @pytest.mark.parametrize(
@@ -109,25 +104,14 @@ def test_the_bounds_are_those_that_are_given():
 )
 def test_more_nats_may_be_asked_for(ratio, best, reason):
     found = replace(GOOD, log_likelihood_ratio=ratio, best_ratio=best)
-    assert reject_reason(found, TEN, LIMITS, least_ratio=8.0) == reason
+    assert reject_reason(found, FOURTEEN, TEN, least_ratio=8.0) == reason
 
 
 @pytest.mark.parametrize(("wrong", "reason"), [(3, ""), (4, NOT_ENCODED)])
 def test_of_many_cells_a_share_may_contradict(wrong, reason):
     found = replace(GOOD, inliers=60, contradictions=wrong)
-    assert reject_reason(found, TEN, LIMITS, wrong_share=0.05) == reason
-    assert reject_reason(found, TEN, LIMITS) == NOT_ENCODED
-
-
-@pytest.mark.parametrize(
-    ("inliers", "margin", "matches", "reason"),
-    [
-        (10, FOURTEEN, 1.0, ""), (10, 13.99, 1.0, AMBIGUOUS), (10, FOURTEEN, 1.01, TOO_FEW),
-        (10, 13.99, 1.01, TOO_FEW), (11, 10.0, 1.01, ""),
-    ],
-)  # fmt: skip
-def test_few_symbols_name_a_place_and_leave_others_behind(inliers, margin, matches, reason):
-    assert reject_few(replace(GOOD, inliers=inliers), margin, matches, LIMITS) == reason
+    assert reject_reason(found, FOURTEEN, TEN, wrong_share=0.05) == reason
+    assert reject_reason(found, FOURTEEN, TEN) == NOT_ENCODED
 
 
 CUBE = ("Cube", "F1")
@@ -153,21 +137,25 @@ def test_limits_of_margins_are_reached_but_for_rounding():
 
 def test_one_touch_alone_is_one_that_agrees():
     few = replace(GOOD, touches=2)
-    assert reject_reason(few, TEN, LIMITS) == TOO_FEW  # one of two: no more than half
-    assert reject_reason(replace(few, agreeing=2), TEN, LIMITS) == ""
-    assert reject_reason(replace(GOOD, agreeing=0), TEN, LIMITS) == ""
+    assert reject_reason(few, FOURTEEN, TEN) == TOO_FEW  # one of two: no more than half
+    assert reject_reason(replace(few, agreeing=2), FOURTEEN, TEN) == ""
+    assert reject_reason(replace(GOOD, agreeing=0), FOURTEEN, TEN) == ""
     assert [reject_margin(margin, 3.0) for margin in (3.0, 2.99)] == ["", AMBIGUOUS]
 
 
 def test_evidence_of_cells_alone_is_that_of_an_image_without_fault():
     """As a scan has it; cells contradict by 8 nats, strongly by 16."""
-    assert Evidence(20.0, 12, 0) == Evidence(20.0, 12, 0, 0, 0, 1.0, 0.0, math.inf, 1, 1)
+    assert Evidence(20.0, 12, 24.0, 0) == Evidence(
+        20.0, 12, 24.0, 0, 0, 0, 1.0, 0.0, math.inf, 1, 1
+    )
     assert (CONTRADICTION, STRONG_CONTRADICTION) == (8.0, 16.0)
 
 
 def test_chance_and_what_an_image_must_explain():
-    assert (reject_chance(1e-4, 1e-4), reject_chance(1.01e-4, 1e-4)) == ("", BY_CHANCE)
-    assert (least_explained(10), least_explained(11)) == (0.72, 0.58)
+    found = [reject_chance(doubt, 1e-4) for doubt in (1e-4, 1.01e-4, 1.0, 1.01)]
+    assert found == ["", BY_CHANCE, BY_CHANCE, TOO_FEW]
+    assert [reject_chance(doubt, 3.0) for doubt in (3.0, 3.01)] == ["", TOO_FEW]
+    assert (least_explained(21.9), least_explained(22.0)) == (0.72, 0.58)
 
 
 @pytest.mark.parametrize(
@@ -324,7 +312,10 @@ def test_what_speaks_for_a_place(small, monkeypatch):
     assert found.explained == 0.77
     assert found.contradictions == 4  # 8.1, 15.9, 16.0 and 16.1
     assert found.strong_contradictions == 1  # 16.1
-    assert found.inliers == 7  # of sixteen: one is worn, seven speak otherwise, one is hardly seen
+    assert (found.inliers, found.bits) == (
+        7,
+        14.0,
+    )  # of sixteen: one is worn, seven speak otherwise, one is hardly seen
     assert found.worn == 1
     assert found.stroke_excess == 0.7
     each = np.log(np.exp(scores).sum(axis=1) / 5)

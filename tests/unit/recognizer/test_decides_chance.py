@@ -108,13 +108,13 @@ def test_random_labs_match_as_often_as_it_says(small):
     assert 0.9 * as_well <= doubt <= 2.5 * as_well
 
 
-def doubt_of(small, lab, row=4, column=4, arrays=None, borders=True, **changed):
+def doubt_of(small, lab, row=4, column=4, arrays=None, **changed):
     """Of a touch that shows beyond doubt what a place of the first face of a lab holds."""
     labels = lab.shows(row, column, 0, SEEN)
     fit = small.fit_of(SEEN, small.sure_of(labels, lab.order), **changed)
     arrays = [lab.embossed] if arrays is None else arrays
     place = Hypothesis(0, row, column, 0, 0.0)
-    return expected_matches(arrays, lab.embossed, fit, place, borders=borders)
+    return expected_matches(arrays, lab.embossed, fit, place)
 
 
 def square(small, side, order=4, **changed):
@@ -153,8 +153,6 @@ def test_at_an_edge_the_places_count_whose_border_agrees(small, monkeypatch):
     assert doubt_of(small, lab, column=7) == pytest.approx(6 / 4**3 + 2 / 4**3)
     # in the corner one cell is held, and one place is such a corner
     assert doubt_of(small, lab, row=0, column=7) == pytest.approx(1 / 4)
-    # all of them, where borders are not asked
-    assert doubt_of(small, lab, column=7, borders=False) == pytest.approx(64 / 4**3)
     # a large lab is not gone through
     monkeypatch.setattr(recognizer.touch.chance, "LARGE_LAB", 63)
     assert doubt_of(small, lab, column=7) == pytest.approx(64 / 4**3)

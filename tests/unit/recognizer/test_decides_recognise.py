@@ -27,7 +27,7 @@ from recognizer.touch.recognition import (
     RunnerUp,
 )
 from recognizer.touch.signal import Signal
-from recognizer.touch.verdict import MANY_INLIERS, Evidence
+from recognizer.touch.verdict import Evidence
 
 TOUCHED = SimpleNamespace(contact=True, state=None)
 READER = SimpleNamespace(
@@ -39,6 +39,7 @@ SURE = Evidence(
     log_likelihood_ratio=19.9,
     explained=0.95,
     inliers=16,
+    bits=32.0,
     contradictions=0,
     strong_contradictions=0,
     stroke_excess=0.0,
@@ -97,7 +98,7 @@ def wide_unless_sure(reader, signal, answer, judged, best):
     """Ask for the second try as under a pad: `test_search_gate` has when it is asked for."""
     assert reader is READER
     assert answer or judged is answer
-    return not (answer and best.evidence.inliers >= MANY_INLIERS)
+    return not judged or best.evidence.inliers < 11
 
 
 @pytest.fixture
@@ -108,16 +109,16 @@ def reads(small, lab, monkeypatch):
         covariance=np.diag([1.0, 2.0, 3.0]),
     )  # fmt: skip
 
-    def read(first, second=None, signal=TOUCHED, doubt=1e-5, named=0.5, by_border=math.inf):
+    def read(first, second=None, signal=TOUCHED, doubt=1e-5, by_border=math.inf):
         tries = []
         doubts = doubt if isinstance(doubt, tuple) else (doubt, doubt)  # of the two tries
 
-        def matches(arrays, embossed, fit, hypothesis, *, borders=True):
+        def matches(arrays, embossed, fit, hypothesis):
             assert arrays == READER.lab.arrays
             judged = first if len(tries) == 1 else second
             best = judged[0]
             assert (embossed, fit, hypothesis) == (best.embossed, best.fit, best.hypothesis)
-            return doubts[len(tries) - 1] if borders else named
+            return doubts[len(tries) - 1]
 
         def matches_by_border(arrays, best, tip_mm):
             assert arrays == READER.lab.arrays
@@ -233,27 +234,25 @@ def test_if_the_second_try_says_another_place_neither_is_believed(reads, inliers
 
 
 @pytest.mark.parametrize(
-    ("inliers", "margin", "named", "reason"),
+    ("bits", "margin", "reason"),
     [
-        # ten nats before the best other place, fourteen where fewer than eleven cells speak
-        (16, TEN, 0.5, ""), (16, 9.99, 0.5, AMBIGUOUS), (11, TEN, 0.5, ""), (11, 13.99, 0.5, ""),
-        (10, FOURTEEN, 0.5, ""), (10, 13.99, 0.5, AMBIGUOUS),
-        # so few must name a place
-        (10, 40.0, 1.0, ""), (10, 40.0, 1.01, TOO_FEW), (11, 40.0, 1.01, ""),
+        # ten nats before the best other place, fourteen where symbols say less than 22 bits
+        (32.0, TEN, ""), (32.0, 9.99, AMBIGUOUS), (22.0, TEN, ""),
+        (21.9, FOURTEEN, ""), (21.9, 13.99, AMBIGUOUS),
     ],
 )  # fmt: skip
-def test_how_far_before_others_the_best_place_is(reads, inliers, margin, named, reason):
+def test_how_far_before_others_the_best_place_is(reads, bits, margin, reason):
     found = [
-        reads.one(inliers=inliers),
+        reads.one(bits=bits),
         reads.one(score=-1.0),  # the same place again
         reads.one("rival", -margin, face=1, index=(9, 12)),
         reads.one("other", -margin - 1.0),
     ]
-    answer, judged, tries = reads.read(found, found, named=named)
+    answer, judged, tries = reads.read(found, found)
     assert answer.reason == reason
     assert answer.margin == pytest.approx(margin)
     assert judged is found[0]
-    assert tries == (2 if reason or inliers < MANY_INLIERS else 1)
+    assert tries == (2 if reason else 1)
     runner_up = answer.runner_up
     assert (runner_up.object, runner_up.face, runner_up.index) == ("Thing", "F2", (9, 12))
 
@@ -286,7 +285,7 @@ def test_what_many_places_match_by_chance_is_refused(reads, doubt, reason, inlie
     assert (answer.reason, answer.doubt, bool(answer)) == (reason, doubt, not reason)
     assert (answer.margin, answer.runner_up.face) == (40.0, "F2")
     assert judged is found[0]
-    assert tries == (1 if inliers == 16 and doubt != 1e-4 else 2)
+    assert tries == (1 if inliers == 16 and doubt == 0.0 else 2)
 
 
 @pytest.mark.parametrize(("first", "tries"), [(1e-5, 1), (1.01e-5, 2), (1e-4, 2)])
@@ -372,11 +371,11 @@ def exchanged(reads, monkeypatch):
 def test_what_is_read_better_with_halves_exchanged_is_no_answer(reads, exchanged):
     better = [reads.one("there", -99.9), reads.one("rival", -150.0)]
     worse = [reads.one("there", -100.0), reads.one("rival", -150.0)]
-    few = [reads.one("there", -50.0, inliers=2)]
+    other = [reads.one("there", -50.0, explained=0.1)]
     assert exchanged(([], better)) == (False, [0, 1])
     assert exchanged((better, [])) == (False, [0])
     assert exchanged((worse, worse)) == (True, [0, 1])
-    assert exchanged((few, few)) == (True, [0, 1])
+    assert exchanged((other, other)) == (True, [0, 1])
 
 
 def test_halves_are_exchanged_only_where_that_may_be(reads, exchanged, monkeypatch):
@@ -388,8 +387,8 @@ def test_halves_are_exchanged_only_where_that_may_be(reads, exchanged, monkeypat
 
 
 def test_only_what_is_refused_has_a_cause(reads, monkeypatch):
-    few = [reads.one(inliers=2)]
-    for found, cause in (([reads.one()], None), (few, "its cause")):
+    other = [reads.one(explained=0.1)]
+    for found, cause in (([reads.one()], None), (other, "its cause")):
         reads.read(found, found, doubt=0.0)
         monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: "its cause")
         monkeypatch.setattr(
@@ -459,8 +458,8 @@ def test_an_answer_is_where_its_last_fit_lies_and_a_refusal_needs_none(reads):
     assert answer.x_mm == pytest.approx(17.02)
     np.testing.assert_allclose(answer.covariance, found.last.covariance)
     found.last = "not asked for"
-    found.speaks = replace(SURE, inliers=2)
-    assert reads.read([found], [found])[0].reason == TOO_FEW
+    found.speaks = replace(SURE, explained=0.1)
+    assert reads.read([found], [found])[0].reason == NOT_ENCODED
 
 
 def test_what_is_refused_for_another_reason_has_no_doubt(reads):
@@ -469,7 +468,7 @@ def test_what_is_refused_for_another_reason_has_no_doubt(reads):
 
 
 def refused(reads):
-    found = [reads.one(inliers=2)]
+    found = [reads.one(explained=0.1)]
     return reads.read(found, found)[0]
 
 

@@ -11,7 +11,7 @@ from recognizer.touch.recognise import has_residual
 from recognizer.touch.signal import swap_halves
 from recognizer.touch.verdict import Evidence
 
-PLAIN = Evidence(log_likelihood_ratio=40.0, explained=0.95, inliers=16, contradictions=0)
+PLAIN = Evidence(log_likelihood_ratio=40.0, explained=0.95, inliers=16, bits=32.0, contradictions=0)
 SQUARE = polygon([np.array([(0, 0), (40, 0), (40, 40), (0, 40)], float)])
 
 
