@@ -114,9 +114,9 @@ def check_distinguishable(alphabet: str, glyphs: tuple[Glyph, ...]) -> None:
     for one, other in combinations(glyphs, 2):
         for quarters in range(4):
             if same_shape(one, turn_glyph(other, quarters)):
+                turn = f"turned by {90 * quarters} degrees" if quarters else "once more"
                 raise AlphabetError(
-                    f"symbol '{one.name}' is symbol '{other.name}' turned by {90 * quarters} "
-                    "degrees",
+                    f"symbol '{one.name}' is symbol '{other.name}' {turn}",
                     fix="change one of the two",
                     place=place,
                 )

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from generator.alphabet.known import Alphabet, alphabet_named
+from generator.alphabet.known import Alphabet
 from generator.alphabet.outline import Tiers, footprint_half_mm, outlines
 from generator.alphabet.printable import check_printable
 from generator.array import SymbolArray, array_from
@@ -107,8 +107,7 @@ def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan
     spec = _as_one_part(spec, polyhedron)
     with error_location(source, "encoding, profile"):
         array = array_from(spec.encoding)
-    with error_location(source, "symbols.alphabet, encoding.alphabet, profile"):
-        alphabet = alphabet_named(spec.alphabet)
+    alphabet = spec.alphabet
     with error_location(source, "symbols.pitch, symbols, profile"):
         check_printable(alphabet, spec.style, printer)
         shapes = outlines(alphabet, spec.style)

@@ -12,15 +12,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from encoded_objects.base.document import DocumentError, Problem
 from encoded_objects.base.sensor_type import SENSOR_FILES, USUAL_SENSOR, SensorType
 from encoded_objects.base.yaml_tree import Tree, read_tree
-from generator.alphabet.known import ALPHABETS, Alphabet
+from generator.alphabet.known import ALPHABETS, Alphabet, alphabet_from
 from generator.alphabet.outline import SymbolStyle
 from generator.alphabet.printable import check_printable
 from generator.array.definition import array_from
@@ -30,7 +31,13 @@ from generator.printers import Printer, printer_named, printer_of_nozzle
 from generator.spec.explain import explain_errors
 from generator.spec.problem import SPEC, SpecError, mark_of
 from generator.spec.resolved import AUTO, EXPLICIT, GAP_MM, SMALLEST, ObjectSpec, ShapeSpec
-from generator.spec.settings import Encoding, NamedSettings, ObjectSettings, PrinterSettings
+from generator.spec.settings import (
+    AlphabetSettings,
+    Encoding,
+    NamedSettings,
+    ObjectSettings,
+    PrinterSettings,
+)
 from generator.spec.shape import EXAMPLES, KINDS, Shape
 
 Refuse = Callable[[str, str, str], None]
@@ -99,8 +106,8 @@ def resolve(
     encoding, order = _array(settings, refuse)
     defaults = _defaults(settings, order, sensor)
     printer = _printer(settings, defaults, tree, problems)
-    style = _style(settings, defaults, printer)
-    alphabet = ALPHABETS[settings.symbols.alphabet or defaults.alphabet]
+    alphabet = _alphabet(settings, defaults, tree, problems)
+    style = _style(settings, defaults, alphabet, printer)
     if order is not None and alphabet.order < order:
         _refuse_order(alphabet, order, refuse)
     elif order is not None:
@@ -133,7 +140,7 @@ def resolve(
         shape=shape,
         profile=EXPLICIT if settings.encoding else settings.profile or AUTO,
         encoding=encoding,
-        alphabet=alphabet.name,
+        alphabet=alphabet,
         style=style,
         layout=settings.layout,
         parts=settings.print.parts,
@@ -205,16 +212,72 @@ def _printer(
     return printer_named(defaults.printer)
 
 
+def _alphabet(
+    settings: NamedSettings, defaults: SymbolDefaults, tree: Tree, problems: list[Problem]
+) -> Alphabet:
+    """Return the alphabet; add problems of its glyphs and its file."""
+    if settings.symbols.alphabet is not None:
+        try:
+            return _described_alphabet(settings.symbols.alphabet, tree)
+        except SpecError as error:
+            problems += error.problems
+    return ALPHABETS[defaults.alphabet]
+
+
+def _described_alphabet(given: AlphabetSettings, tree: Tree) -> Alphabet:
+    """Return the alphabet that settings name or describe; raises `SpecError`."""
+    settings, tree = _from_file(given, tree)
+    block = "symbols.alphabet" if given.file is None else ""
+    name = settings.name or "own"
+    known = ALPHABETS.get(name)
+    if known is not None and settings.model_fields_set == {"name"}:
+        return known
+    if settings.glyphs is None:
+        fix = f"add glyphs: [[[[-1, 1], [-1, -1], [1, -1]]], ...], or take {', '.join(ALPHABETS)}"
+        raise SpecError(
+            [Problem(f"no glyphs are given for alphabet {name}", fix, mark_of(tree, block))]
+        )
+    glyphs = [
+        {"name": str(number), "strokes": [pair for line in lines for pair in pairwise(line)]}
+        for number, lines in enumerate(settings.glyphs)
+    ]
+    definition = settings.model_dump(include={"reach", "stroke_ratio"})
+    try:
+        own = alphabet_from({"name": name, "glyphs": glyphs, **definition})
+    except AlphabetError as error:
+        key = "reach" if error.cause.startswith("reach") else "glyphs"
+        symbols = re.findall(r"symbol '(\d+)'", error.cause)
+        path = ".".join(filter(None, (block, key, *symbols[-1:])))
+        raise SpecError([Problem(error.cause, error.fix, mark_of(tree, path))]) from None
+    if known is None:
+        return own
+    numbered = tuple(replace(glyph, name=str(k)) for k, glyph in enumerate(known.glyphs))
+    if own != replace(known, glyphs=numbered):
+        cause = f"alphabet {name} ships with other glyphs, reach or stroke ratio"
+        mark = mark_of(tree, f"{block}.name" if block else "name")
+        raise SpecError([Problem(cause, "give it a name of its own", mark)])
+    return known
+
+
+_Block = TypeVar("_Block", PrinterSettings, AlphabetSettings)
+
+
+def _from_file(settings: _Block, tree: Tree) -> tuple[_Block, Tree]:
+    """Return the block that stands in a file, and its places there; raises `SpecError`."""
+    if settings.file is None:
+        return settings, tree
+    own = read_tree(tree.folder / settings.file, SPEC)
+    if own.problems:
+        raise SpecError(own.problems)
+    try:
+        return _from_file(type(settings).model_validate(own.value), own)
+    except ValidationError as error:
+        raise SpecError(explain_errors(error, own, type(settings))) from None
+
+
 def _described_printer(settings: PrinterSettings, tree: Tree) -> Printer:
     """Return the printer that settings name or describe; raises `SpecError` for its file."""
-    if settings.file is not None:
-        own = read_tree(tree.folder / settings.file, SPEC)
-        if own.problems:
-            raise SpecError(own.problems)
-        try:
-            return _described_printer(PrinterSettings.model_validate(own.value), own)
-        except ValidationError as error:
-            raise SpecError(explain_errors(error, own, PrinterSettings)) from None
+    settings, _ = _from_file(settings, tree)
     base = printer_named(settings.like)
     own_limits: dict[str, Any] = {
         "bed_mm": settings.bed, "layer_mm": settings.layer, "stroke_min_mm": settings.stroke,
@@ -246,22 +309,23 @@ def _coarser(
 ) -> SymbolStyle | None:
     """Return the finest style that prints at one of the coarser pitches of the defaults."""
     for pitch in defaults.coarser_mm:
-        style = _style(settings, replace(defaults, pitch_mm=pitch), printer)
+        style = _style(settings, replace(defaults, pitch_mm=pitch), alphabet, printer)
         found = _printable(alphabet, style, printer, settings.symbols.draft is None)
         if isinstance(found, SymbolStyle):
             return found
     return None
 
 
-def _style(settings: NamedSettings, defaults: SymbolDefaults, printer: Printer) -> SymbolStyle:
+def _style(
+    settings: NamedSettings, defaults: SymbolDefaults, alphabet: Alphabet, printer: Printer
+) -> SymbolStyle:
     """Return how symbols are embossed; the stroke follows the pitch and the alphabet."""
     symbols = settings.symbols
     pitch = symbols.pitch or defaults.pitch_mm
-    ratio = ALPHABETS[symbols.alphabet or defaults.alphabet].stroke_ratio
     return SymbolStyle(
         pitch_mm=pitch,
         height_mm=symbols.height or _whole_layers_mm(HEIGHT_MM, printer),
-        stroke_mm=symbols.stroke or round(ratio * pitch, 2),
+        stroke_mm=symbols.stroke or round(alphabet.stroke_ratio * pitch, 2),
         draft_rad=DRAFTS_RAD[0] if symbols.draft is None else symbols.draft,
         chamfer_mm=symbols.chamfer or 0.0,
     )
@@ -298,7 +362,11 @@ def _refuse_style(error: AlphabetError, refuse: Refuse) -> None:
 def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
     enough = [name for name, other in ALPHABETS.items() if other.order >= order]
     most = max(other.order for other in ALPHABETS.values())
-    fix = f"set alphabet to {' or '.join(enough)}" if enough else f"take an order of {most} or less"
+    fix = f"set alphabet to {' or '.join(enough)}"
+    if not enough:
+        fix = f"take an order of {most} or less, or an alphabet of your own with {order} glyphs"
+    elif alphabet.name not in ALPHABETS:
+        fix = f"add {order - alphabet.order} glyphs, or {fix}"
     cause = f"the array has {order} symbols, but the alphabet {alphabet.name} has {alphabet.order}"
     refuse("symbols.alphabet, encoding, profile", cause, fix)
 

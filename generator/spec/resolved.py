@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
 from encoded_objects.base.yaml_tree import Tree
+from generator.alphabet.known import ALPHABETS, Alphabet
 from generator.alphabet.outline import SymbolStyle
 from generator.errors import GeneratorError
 from generator.printers import Printer, printer_named
@@ -59,7 +60,7 @@ class ObjectSpec:
     shape: ShapeSpec
     profile: str  #: name of the array's profile; "explicit" where the encoding is written out
     encoding: Mapping[str, Any]  #: the array, complete: what `array.definition()` returns
-    alphabet: str
+    alphabet: Alphabet
     style: SymbolStyle
     layout: Literal["auto", "net", "faces"]
     parts: Literal["panels", "whole"]
@@ -87,11 +88,12 @@ class ObjectSpec:
         as if it had been written; a file counts by its content.
         """
         gap = {} if self.gap_mm == GAP_MM else {"gap_mm": self.gap_mm}  # older specs had none
+        alphabet, name = self.alphabet, self.alphabet.name
         style = {name: round(value, 9) for name, value in asdict(self.style).items()}
         return {
             "shape": {"kind": self.shape.kind, **self.shape.parameters},
             "array": dict(self.encoding),
-            "alphabet": self.alphabet,
+            "alphabet": name if ALPHABETS.get(name) == alphabet else alphabet.definition(),
             "style": style,
             "layout": self.layout,
             "parts": self.parts,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from encoded_objects.base.document import did_you_mean
+from encoded_objects.base.document import did_you_mean, suggest
 from encoded_objects.base.settings import (
     Angle,
     Block,
@@ -46,7 +46,7 @@ CELLS_MAX = 2**64
 ORDER_MAX = 64  # larger fields have no alphabet in sight
 POLYNOMIAL_LENGTH_MAX = 1000
 SCHEMES = ("sqlite", "postgresql", "postgres", "postgresql+psycopg")  #: of databases
-SUFFIXES = (".yaml", ".yml")  #: of a printer's file
+SUFFIXES = (".yaml", ".yml")  #: of the file of a printer or an alphabet
 _NAME = re.compile(r"[^\W_][\w .()+-]*\Z")
 
 Family = Literal["prbs", "prmvs", "prba", "prmva", "prpa", "prmvpa"]
@@ -172,6 +172,32 @@ def printer_block(value: Any) -> Any:
     return value
 
 
+def alphabet_block(value: Any) -> Any:
+    """Return the block that a name or a file stands for."""
+    if isinstance(value, str) and value.endswith(SUFFIXES):
+        return {"file": value}
+    if isinstance(value, str) and value not in ALPHABETS:
+        fix = suggest(value, ALPHABETS, f"choose one of {', '.join(ALPHABETS)}")
+        raise refuse(f"unknown alphabet '{value[:60]}'", fix)
+    if not isinstance(value, str | dict):
+        fix = "write alphabet: dense-4, the name of a .yaml file, or {name: own, glyphs: [...]}"
+        raise refuse("an alphabet is a name, a file or a block of settings", fix)
+    return {"name": value} if isinstance(value, str) else value
+
+
+def broken_line(value: Any) -> Any:
+    """Return the nodes of a broken line; refuse one that is none, or leaves the lattice."""
+    nodes = value if isinstance(value, list) else []
+    if len(nodes) < 2 or not all(isinstance(node, list) and len(node) == 2 for node in nodes):
+        fix = "write, for example, [[-1, 1], [-1, -1], [1, -1]]"
+        raise refuse("a line of a glyph has two nodes or more, each x and y", fix)
+    for node in nodes:
+        if not all(type(x) is int and -1 <= x <= 1 for x in node):
+            cause = f"node [{node[0]}, {node[1]}] is off the lattice of 3 x 3 nodes"
+            raise refuse(cause, "write -1, 0 or 1 for x and for y")
+    return nodes
+
+
 def known_name(value: Any) -> str:
     """Return the name of a known printer."""
     try:
@@ -223,6 +249,25 @@ Polynomial = Annotated[
 ]
 Window = Annotated[
     tuple[Side, Side], BeforeValidator(window, json_schema_input_type=tuple[Side, Side] | str)
+]
+BrokenLine = Annotated[
+    list[tuple[int, int]],
+    BeforeValidator(broken_line),
+    WithJsonSchema(
+        {
+            "type": "array",
+            "minItems": 2,
+            "items": {
+                "type": "array",
+                "items": {"type": "integer", "minimum": -1, "maximum": 1},
+                "minItems": 2,
+                "maxItems": 2,
+            },
+        }
+    ),
+]
+Share = Annotated[
+    float, WithJsonSchema({"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1})
 ]
 
 
@@ -306,6 +351,28 @@ PrinterChoice = Annotated[
 ]
 
 
+class AlphabetSettings(Block):
+    """An alphabet of one's own, or a known one by its name."""
+
+    name: ObjectName | None = None
+    """What it is called in lists and messages; own if left out."""
+    file: PathText | None = None
+    """A YAML file with such a block."""
+    reach: Share = 0.30
+    """Distance of neighbouring nodes over the pitch."""
+    stroke_ratio: Share = 0.20
+    """Width of the strokes over the pitch, where stroke is left out."""
+    glyphs: list[list[BrokenLine]] | None = None
+    """The symbols 0, 1, ... of the array: broken lines through nodes [x, y] of a lattice of 3 x 3,
+    x to the right and y up, each -1, 0 or 1: [[[-1, 1], [-1, -1], [1, -1]]] is an L."""
+
+
+AlphabetChoice = Annotated[
+    AlphabetSettings,
+    BeforeValidator(alphabet_block, json_schema_input_type=AlphabetSettings | AlphabetName | str),
+]
+
+
 class Symbols(Block):
     """How the symbols are embossed; what is left out follows from the profile."""
 
@@ -319,8 +386,8 @@ class Symbols(Block):
     """Slope of the strokes' sides from the vertical; 10 deg, or less where there is no room."""
     chamfer: LengthOrZero | None = None
     """Chamfer of the strokes' top edges; 0 for none."""
-    alphabet: AlphabetName | None = None
-    """The symbols themselves."""
+    alphabet: AlphabetChoice | None = None
+    """The symbols themselves: a name, a YAML file, or a block of one's own."""
 
 
 class Print(Block):

@@ -128,7 +128,8 @@ def distances(letters, sensor, pitch, reach, stroke):
     for x, y, number in poses:
         pose = np.array([x, y, math.tau * number / TURNS])
         base = images(letters, points, pitch, reach, stroke, pose)
-        own, best = (base * base).sum(1), np.inf
+        own = (base * base).sum(1)
+        best = np.full((len(base), len(base)), np.inf)
         for open_ in product(shifts, shifts, turns):
             moved = images(letters, points, pitch, reach, stroke, pose + open_)
             both, other = moved @ base.T, (moved * moved).sum(1)[:, None]

@@ -4,18 +4,29 @@ import numpy as np
 import pytest
 
 from encoded_objects import Reader, encode, open_lab, simulate
+from generator.alphabet import alphabet_named
+
+MIRRORED = [
+    [[[-x, y] for x, y in stroke] for stroke in glyph.strokes]
+    for glyph in alphabet_named("tactel-8").glyphs
+]
+OWN = {"alphabet": {"name": "mirrored", "reach": 0.28, "glyphs": MIRRORED}}
 
 
-@pytest.mark.parametrize(("profile", "order", "shape"), [
-    ("tactel-8", 8, (189, 1387)), ("tactel-16", 16, (51, 1285)),
+@pytest.mark.parametrize(("profile", "symbols", "order", "shape"), [
+    ("tactel-8", {}, 8, (189, 1387)),
+    ("tactel-16", {}, 16, (51, 1285)),
+    ("tactel-8", OWN, 8, (189, 1387)),
 ])  # fmt: skip
-def test_touches_of_a_cube_are_read(tmp_path, profile, order, shape):
+def test_touches_of_a_cube_are_read(tmp_path, profile, symbols, order, shape):
     url = str(tmp_path / "lab.db")
-    cube = {"name": "Cube", "shape": {"cube": "60 mm"}, "profile": profile}
+    cube = {"name": "Cube", "shape": {"cube": "60 mm"}, "profile": profile, "symbols": symbols}
     encode(cube, database=url, folder=tmp_path / "out", formats=())
     reader = Reader(open_lab(url))
-    (array,) = (one.array for one in reader.lab.arrays)
+    (embossed,) = reader.lab.arrays
+    array = embossed.array
     assert (array.order, array.rows, array.columns) == (order, *shape)
+    assert embossed.alphabet.name == (symbols["alphabet"]["name"] if symbols else profile)
     rng = np.random.default_rng(12)
     for face in ("F1", "F3", "F6"):
         for _ in range(3):

@@ -86,9 +86,24 @@ def test_marks_of_keys_and_values():
 def test_defaults_of_every_profile_print(profile):
     made = spec(CUBE + f"profile: {profile}\n")
     assert made.encoding == PROFILES[profile].array().definition()
-    assert made.alphabet == PROFILES[profile].alphabet
+    assert made.alphabet.name == PROFILES[profile].alphabet
     assert made.style.pitch_mm == PROFILES[profile].pitch_mm
-    check_printable(ALPHABETS[made.alphabet], made.style, made.printer)
+    check_printable(made.alphabet, made.style, made.printer)
+
+
+def test_glyphs_of_a_file_are_those_of_the_spec(tmp_path):
+    glyphs = "[[[[-1, 1], [-1, -1], [1, -1]]], [[[0, 1], [0, 0], [-1, -1]]]]"
+    letters = f"{{name: mine, reach: 0.28, glyphs: {glyphs}}}"
+    (tmp_path / "letters.yaml").write_text(letters)
+    two = CUBE + "profile: thesis\nsymbols: {alphabet: "
+    written, filed = (spec(f"{two}{one}}}") for one in (letters, tmp_path / "letters.yaml"))
+    assert written == filed
+    assert written.meaning["alphabet"] == written.alphabet.definition()
+    assert written.alphabet.glyphs[1].strokes == (((0, 1), (0, 0)), ((0, 0), (-1, -1)))
+    ships = ALPHABETS["thesis-2"].definition()
+    glyphs = [glyph["strokes"] for glyph in ships["glyphs"]]
+    again = {**ships, "glyphs": glyphs}  # the letters that ship, given once more
+    assert spec(f"{two}{again}}}".replace("'", "")).meaning == spec(f"{two}thesis-2}}").meaning
 
 
 @pytest.mark.parametrize(
@@ -130,7 +145,7 @@ def test_auto_takes_the_pitch_that_reads_best_of_those_that_print(settings, pitc
     made = spec(CUBE + settings)
     assert made.profile == "auto"
     assert made.style.pitch_mm == pitch_mm
-    check_printable(ALPHABETS[made.alphabet], made.style, made.printer)
+    check_printable(made.alphabet, made.style, made.printer)
 
 
 def test_a_sensor_file_stands_beside_the_spec_and_an_option_comes_first():
