@@ -49,7 +49,7 @@ def decode(
         Rows apart by spaces, ? where no symbol is seen: "01 11 0? 01"; or labels
         (rows, columns), -1 where none is seen.
     profile
-        thesis, one-touch, product, large, fine; one-touch if nothing is said.
+        A profile's name; one-touch if nothing is said.
     array
         In place of a profile: an array, or its definition, as {"family": "prba", ...}.
     database

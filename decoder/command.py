@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 HELP = """Find the place of a window on its array.
 
 ROWS are the symbols, rows apart by spaces, ? where none is seen: [bold]decode-window "01 11 \
-01 01 00 01" --profile thesis[/]. Symbols of GF(q) are 0, 1, 2 (=A), 3 (=A^2), ...
+01 01 00 01" --profile thesis[/]. Symbols of GF(q) are 0, 1, 2 (=A), 3 (=A^2), ...; \
+above 9 with commas between, 0,11 3,?.
 """
 EPILOG = "Exit codes: 0 decoded, 1 not decoded, 2 bad input, 4 database, 130 interrupted."
 NAME = "decode-window"
@@ -49,7 +50,7 @@ def run(arguments: list[str]) -> int:
 def decode(
     rows: Annotated[list[str], Argument("The window.", "ROWS")],
     profile: Annotated[
-        str, Option("thesis, one-touch, product, large, fine; one-touch by default.")
+        str, Option("A profile's name, as one-touch (by default), thesis, large, tactel-16.")
     ] = "",
     array: Annotated[
         str,

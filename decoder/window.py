@@ -24,17 +24,21 @@ LARGEST_SCORE = 1e6  #: nats; beyond it single precision loses single cells
 def parse_window(text: str, order: int) -> Labels:
     """Return the (rows, columns) labels of a text; labels above 9 apart by commas: "10,3 0,?".
 
+    A row of one label above 9 ends with a comma: "10, 3, ?,".
+
     Raises `WindowError` with the row if a symbol is unknown or the rows differ in length.
     """
     rows = []
     for number, row in enumerate(text.split(), 1):
-        cells = row.split(",") if "," in row else list(row)
+        cells = row.removesuffix(",").split(",") if "," in row else list(row)
         for cell in cells:
             if cell != "?" and not (cell.isascii() and cell.isdigit() and int(cell) < order):
                 raise WindowError(
                     f"row {number} '{row}': '{cell}' is no symbol of this array, which has 0 to "
                     f"{order - 1}, or ? for one that is not seen",
-                    fix="write one digit per symbol, rows apart by spaces, as '01 11 0?'",
+                    fix="write one digit per symbol, rows apart by spaces, as '01 11 0?'"
+                    if order <= 10
+                    else "write commas between symbols, rows apart by spaces, as '0,11 ?,3'",
                 )
         rows.append([ERASED if cell == "?" else int(cell) for cell in cells])
     if not rows:

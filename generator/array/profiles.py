@@ -56,12 +56,24 @@ def _gf4(degree: int, polynomial: str, rows: int, columns: int) -> dict[str, Any
 
 _LARGE = _gf4(8, "x^8+x^7+A^2x^4+A^2x^3+x^2+A^2", 51, 1285)
 
-#: Above `large`, by degree; beyond them the most square folds (`generator.array.definition`).
+#: Next sizes by order and degree; beyond them the most square folds (`generator.array.definition`).
 _LARGER = {
-    9: _gf4(9, "x^9+A^2x^6+x^2+A", 511, 513),
-    10: _gf4(10, "x^10+Ax^9+Ax^8+Ax^7+x^6+A^2x^5+A^2x^4+Ax^3+A^2x^2+Ax+A", 825, 1271),
-    11: _gf4(11, "x^11+A^2x^9+Ax^8+x^7+A^2x^6+Ax^5+Ax^4+x^3+A^2x^2+Ax+A^2", 2047, 2049),
-    12: _gf4(12, "x^12+A^2x^11+A^2x^10+x^9+Ax^7+x^6+x^5+A^2x^4+Ax^3+A^2x^2+A", 3133, 5355),
+    (order, degree): _folded(order, degree, rows, columns, polynomial=polynomial)
+    for order, degree, polynomial, rows, columns in (
+        (4, 9, "x^9+A^2x^6+x^2+A", 511, 513),
+        (4, 10, "x^10+Ax^9+Ax^8+Ax^7+x^6+A^2x^5+A^2x^4+Ax^3+A^2x^2+Ax+A", 825, 1271),
+        (4, 11, "x^11+A^2x^9+Ax^8+x^7+A^2x^6+Ax^5+Ax^4+x^3+A^2x^2+Ax+A^2", 2047, 2049),
+        (4, 12, "x^12+A^2x^11+A^2x^10+x^9+Ax^7+x^6+x^5+A^2x^4+Ax^3+A^2x^2+A", 3133, 5355),
+        (8, 7, "x^7+A^4x^6+A^3x^4+Ax+A^3", 337, 6223),
+        (8, 8, "x^8+A^6x^7+A^4x^6+A^5x^5+A^3x^4+A^5x^3+x+A^2", 3133, 5355),
+        (8, 10, "x^10+Ax^2+x+A^2", 25487, 42129),
+        (16, 5, "x^5+A^9x^4+A^4x^3+A^2x^2+A^13x+A", 775, 1353),
+        (16, 6, "x^6+A^3x^5+A^7x^4+A^9x^3+A^10x^2+A^6x+A^2", 2169, 7735),
+        (16, 7, "x^7+A^7x^6+A^5x^5+A^4x^4+A^6x^3+A^5x+A^11", 14351, 18705),
+        (32, 4, "x^4+A^22x^3+Ax^2+A^5x+A^21", 825, 1271),
+        (32, 5, "x^5+x^2+A^7", 1801, 18631),
+        (32, 6, "x^6+A^17x^5+A^7x^4+A^29x^3+A^23x^2+A^23x+A^26", 25487, 42129),
+    )
 }
 
 _THESIS = {"family": "prba", "polynomial": "0x1099", "rows": 63, "columns": 65}
@@ -113,7 +125,8 @@ def profile(name: str = DEFAULT_PROFILE) -> Profile:
 def next_larger(smaller: Profile) -> Profile:
     """Return the profile on the next larger array of the same field, its window the smallest one.
 
-    Over GF(4) 511x513, 825x1271, 2047x2049 and 3133x5355, then the most square folds. Raises
+    Over GF(4) 511x513, 825x1271, 2047x2049 and 3133x5355, over GF(8) 337x6223, 3133x5355 and
+    25487x42129, over GF(16) 775x1353, 2169x7735 and 14351x18705, then the most square folds. Raises
     `ArrayError` for a product array, or if no larger one decodes.
     """
     array = smaller.array()
@@ -136,8 +149,8 @@ def _next_encoding(order: int, degree: int) -> dict[str, Any] | None:
     """Return the array of the next degree that decodes on a fold that is no long strip."""
     while above := [size for size in nearest_sizes(order, degree) if size[0] > degree]:
         degree, (rows, columns) = above[0]
-        if order == 4 and degree in _LARGER:
-            return _LARGER[degree]
+        if (order, degree) in _LARGER:
+            return _LARGER[order, degree]
         if columns <= 2 * rows:
             return {"order": order, "degree": degree, "rows": rows, "columns": columns}
     return None

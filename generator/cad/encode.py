@@ -141,7 +141,8 @@ def encode(
         `lab.db`, `sqlite:///lab.db` or `postgresql://host/name`, in place of the spec's own;
         `lab.db` if neither says one.
     profile
-        As in a spec: auto (if left out), one-touch, large, fine, thesis, product.
+        As in a spec: auto (if left out), one-touch, large, fine, tactel-8, tactel-16, thesis,
+        product.
     folder
         For the files; the spec's own or `out/NAME` if left out.
     formats

@@ -14,6 +14,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,15 +84,26 @@ def has_room(
 def closer_than(one: TextBox, other: TextBox, clear: float) -> bool:
     """Whether two turned rectangles are closer than `clear`, by separating axes."""
     between = other.centre - one.centre
-    for angle in (one.angle, other.angle):
-        axes = turn(angle)
-        for axis in axes.T:
-            reach = clear
-            for box in (one, other):
-                reach += float(np.abs(axis @ turn(box.angle)) @ np.array(box.half))
-            if abs(float(axis @ between)) >= reach:
-                return False
-    return True
+    axes = _separating_axes(one.angle, one.half, other.angle, other.half, clear)
+    return all(abs(float(axis @ between)) < reach for axis, reach in axes)
+
+
+@lru_cache(maxsize=1024)
+def _separating_axes(
+    angle: float,
+    half: tuple[float, float],
+    other_angle: float,
+    other_half: tuple[float, float],
+    clear: float,
+) -> list[tuple[Ring, float]]:
+    """Return the axes of two turned rectangles, and the distance of centres that parts them."""
+    found = []
+    for axis in (*turn(angle).T, *turn(other_angle).T):
+        reach = clear
+        for box_angle, box_half in ((angle, half), (other_angle, other_half)):
+            reach += float(np.abs(axis @ turn(box_angle)) @ np.array(box_half))
+        found.append((axis, reach))
+    return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,9 +30,9 @@ name: {name}
 #   pitch: 5 mm          # distance between neighbouring symbols
 #   height: 1 mm         # best a multiple of the layer height
 #   stroke: 1 mm         # width of the strokes at their top
-#   draft: 7.5 deg       # slope of their sides
+#   draft: 5 deg         # slope of their sides
 #   chamfer: 0 mm        # of their top edges
-#   alphabet: dense-4    # thesis-2 | letters-4 | dense-4, -8 | tactel-4, -8, -16 | letters.yaml
+#   alphabet: tactel-8   # thesis-2 | letters-4 | dense-4, -8 | tactel-4, -8, -16 | letters.yaml
 
 # print:
 #   parts: panels        # panels (mitred plates, no supports) | whole (one body)

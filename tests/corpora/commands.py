@@ -15,6 +15,7 @@ import io
 import json
 import os
 import re
+import runpy
 import signal
 import subprocess
 import sys
@@ -22,8 +23,9 @@ import tempfile
 import tomllib
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -78,7 +80,7 @@ class Commands:
     server: subprocess.Popen[str]  #: they are forked from it
 
     def run(self, *arguments: object) -> Outcome:
-        """Run `arguments`, of which the first is the command's name."""
+        """Run `arguments`: a command's name, or "python" and a script, and its arguments."""
         assert self.server.stdin is not None
         assert self.server.stdout is not None
         asked = {"arguments": list(map(str, arguments)), "cwd": str(self.folder)}
@@ -108,14 +110,29 @@ class Commands:
 
 @contextmanager
 def started_commands() -> Iterator[Commands]:
-    """Yield what starts commands in an empty folder; home and cache are another one.
+    """Yield what starts commands in an empty folder.
 
     It is in /tmp whatever TMPDIR says: a table is as wide as the paths in it.
     """
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
-        work, home = (Path(name).resolve() / one for one in ("work", "home"))
+        work = Path(name).resolve() / "work"
         work.mkdir()
-        home.mkdir()
+        yield Commands(work, _server())
+
+
+@cache
+def _server() -> subprocess.Popen[str]:
+    """Return the process from which all commands of this one are forked."""
+    closing = ExitStack()
+    atexit.register(closing.close)
+    return closing.enter_context(started_server())
+
+
+@contextmanager
+def started_server() -> Iterator[subprocess.Popen[str]]:
+    """Yield a process from which commands are forked; home and cache are empty at its start."""
+    with tempfile.TemporaryDirectory() as name:
+        home = Path(name).resolve()
         environment = {
             "COLUMNS": "100",
             "HOME": str(home),
@@ -131,7 +148,7 @@ def started_commands() -> Iterator[Commands]:
         } | {name: os.environ[name] for name in KEPT if name in os.environ}
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
         with subprocess.Popen([sys.executable, __file__], env=environment, **pipes) as server:
-            yield Commands(work, server)
+            yield server
 
 
 def normal_text(text: str, folder: Path) -> str:
@@ -228,9 +245,13 @@ def _become(
         sys.stderr = _text(io.BufferedWriter(io.FileIO(2, "w", closefd=False)))
         os.chdir(asked["cwd"])
         name, *arguments = asked["arguments"]
-        sys.argv = [name, *arguments]
-        module, function = scripts[name].split(":")
-        getattr(importlib.import_module(module), function)()
+        if name == "python":
+            sys.argv = arguments
+            runpy.run_path(arguments[0], run_name="__main__")
+        else:
+            sys.argv = [name, *arguments]
+            module, function = scripts[name].split(":")
+            getattr(importlib.import_module(module), function)()
         code = 0
     except SystemExit as leaving:
         code = 0 if leaving.code is None else leaving.code

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from encoded_objects import Reader, encode, open_lab, simulate
+from encoded_objects import Reader, Scan, encode, open_lab, simulate
 from generator.alphabet import alphabet_named
 
 MIRRORED = [
@@ -37,3 +37,8 @@ def test_touches_of_a_cube_are_read(tmp_path, profile, symbols, order, shape):
             assert np.hypot(*(answer.T_face_probe[:2, 3] - (x, y))) < 0.15
             turn = np.degrees(np.arctan2(*answer.T_face_probe[[1, 0], 0])) - theta
             assert abs((turn + 180) % 360 - 180) < 1.0
+    scan = Scan(reader)
+    for x in (9, 15):  # over an edge
+        touch = simulate(f"{url}#Cube/F2", x=x, y=31, theta=20, force=60)
+        answer = scan.add(touch.counts)
+    assert (scan.touches, answer.object, answer.face) == (2, "Cube", "F2")

@@ -35,6 +35,7 @@ def box(folder):
         {
             "name": "Box",
             "shape": {"box": ["70 mm", "55 mm", "45 mm"]},
+            "symbols": {"alphabet": "dense-4"},  # as the touches of MuJoCo are stored
             "output": {"lab_key": "FMJ7-TFFE-Q560-Y90B"},
         },
         database=f"sqlite:///{folder}/lab.db", folder=folder, formats=("stl",),

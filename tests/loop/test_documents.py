@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from corpora.commands import Commands, started_server
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "docs" / "examples"
@@ -68,17 +69,23 @@ def test_the_glossary_points_to_modules_that_are_there():
     assert [place for place in places if not (ROOT / place).is_file()] == []
 
 
-def said_by(script: str, folder: Path) -> str:
-    command = [sys.executable, str(EXAMPLES / f"{script}.py")]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+@pytest.fixture(scope="module")
+def said_by():
+    """Return a function: script, folder -> what it prints, in a process of its own, there."""
+    with started_server() as server:
+
+        def said_by(script, folder):
+            code, said, error = Commands(folder, server).run("python", EXAMPLES / f"{script}.py")
+            assert code == 0, error
+            return said
+
+        yield said_by
 
 
 # What scripts say, where that is soon said.
 SAID = {
     "decode_windows": r"row 1, column 61 \(t = 2206\)\n.*\n2206\n.*Cube/F1\n",
-    "encode_set": r"Cube:.*\nBox-1:.*\nBox-2:(?s:.*)\n\d+ of 65535 cells in use\n(?s:.*)",
+    "encode_set": r"Cube:.*\nBox-1:.*\nBox-2:(?s:.*)\n\d+ of 262143 cells in use\n(?s:.*)",
     "follow_port": r"(?s:.*)Cube/F1(?s:.*)",
     "report": r"40 touches: \d+ right, 0 wrong, (?s:.*)True\n",
     "scan": r"(?s:.*)touches: Plate\n",
@@ -86,11 +93,11 @@ SAID = {
 
 
 @pytest.mark.parametrize("script", SAID)
-def test_example(script, tmp_path):
+def test_example(script, tmp_path, said_by):
     assert re.fullmatch(SAID[script], said_by(script, tmp_path))
 
 
-def test_build123d_bracket(tmp_path):
+def test_build123d_bracket(tmp_path, said_by):
     said = said_by("build123d_bracket", tmp_path)
     before, after = map(int, re.findall(r"(?:volume|drilled) (\d+)", said))
     assert 60 * 30 * 12 + 12 * 30 * 24 < before < 1.15 * (60 * 30 * 12 + 12 * 30 * 24)
@@ -101,7 +108,7 @@ def test_build123d_bracket(tmp_path):
     }  # fmt: skip
 
 
-def test_cadquery_wedge(tmp_path):
+def test_cadquery_wedge(tmp_path, said_by):
     said = said_by("cadquery_wedge", tmp_path)
     assert " on 6 panels" in said
     extents = [float(n) for n in re.findall(r"([\d.]+) x ([\d.]+) x ([\d.]+) mm", said)[0]]
@@ -111,38 +118,38 @@ def test_cadquery_wedge(tmp_path):
     assert 40.0 < extents[2] < 41.6
 
 
-def test_simulate_and_read(tmp_path):
+def test_simulate_and_read(tmp_path, said_by):
     said = said_by("simulate_and_read", tmp_path)
     assert "Cube/F3" in said.splitlines()[1]
     assert float(re.findall(r"off by ([\d.]+) mm", said)[0]) < 0.1
 
 
-def test_read_recording(tmp_path):
+def test_read_recording(tmp_path, said_by):
     said = said_by("read_recording", tmp_path).splitlines()
     assert said[0] == "touches.h5: 40 frames, by simulated/tab"
     assert len(said) == 6
     assert sum("Cube/F2" in line for line in said) >= 3
 
 
-def test_ros2_node(tmp_path):
+def test_ros2_node(tmp_path, said_by):
     said = said_by("ros2_node", tmp_path)
     x, y, z = (float(n) for n in re.findall(r"'[xyz]': ([-\d.e]+)", said))
     assert said.startswith("Cube ")
     assert (x**2 + y**2 + z**2) ** 0.5 < 0.02  # the origin is the middle of the face, in metres
 
 
-def test_own_sensor_data(tmp_path):
+def test_own_sensor_data(tmp_path, said_by):
     said = said_by("own_sensor_data", tmp_path).splitlines()
     assert said[0].startswith("mine.h5: 2 frames")
     assert ["Cube/F4" in line for line in said[1:]] == [True, True], said
 
 
-def test_trimesh_part(tmp_path):
+def test_trimesh_part(tmp_path, said_by):
     (symbols,) = re.findall(r"^Block: 6 faces, (\d+) symbols", said_by("trimesh_part", tmp_path))
     assert 320 < int(symbols) < 350  # of 5 mm; how faces are laid out depends on the lab's array
 
 
-def test_mujoco_bench(tmp_path):
+def test_mujoco_bench(tmp_path, said_by):
     """Three objects on a table, found by touch alone; poses as the simulator has them."""
     told = [json.loads(line) for line in said_by("mujoco_bench", tmp_path).splitlines()]
     assert [one["answer"] for one in told] == [one["object"] for one in told]

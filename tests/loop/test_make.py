@@ -104,5 +104,5 @@ def test_placements_map_cells_to_symbol_centres(tmp_path):
         columns = np.rint(u[:, 0] / p - 0.5).astype(int)
         rows = np.rint(-u[:, 1] / p - 0.5).astype(int)
         assert np.abs(u[:, 0] - (columns + 0.5) * p).max() < 1e-9
-        assert ((rows + place.row) % 51 == face.rows).all()
-        assert ((columns + place.column) % 1285 == face.columns).all()
+        assert ((rows + place.row) % 189 == face.rows).all()
+        assert ((columns + place.column) % 1387 == face.columns).all()

@@ -97,7 +97,7 @@ def test_what_is_promised_colours_the_faces_and_is_said(page, bench):
     )
     told = httpx.get(f"{bench}api/promise/Cube").json()["faces"]
     assert len(told) == 6
-    expect(faces).to_contain_text(f"F1: {100 * told['F1']['at_once']:.0f} %")
+    expect(faces).to_contain_text(f"F1: {math.floor(100 * told['F1']['at_once'] + 0.5)} %")
     until_redrawn(page.get_by_test_id("part"), plain)
     shown(page, "Cylinder")
     expect(faces).to_contain_text("F2: nothing is promised of single touches", timeout=PATIENCE_MS)

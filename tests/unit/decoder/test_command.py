@@ -62,7 +62,7 @@ def test_database_gives_array_prior_object_and_face(tmp_path, monkeypatch, capsy
     from generator.spec import read_specs
 
     monkeypatch.chdir(tmp_path)
-    Path("c.yaml").write_text("name: Small\nshape: {cube: 40 mm}\n")
+    Path("c.yaml").write_text("name: Small\nshape: {cube: 40 mm}\nsymbols: {alphabet: dense-4}\n")
     encode(read_specs(["c.yaml"]), formats=(), database="lab.db")
     with read_transaction(open_database("lab.db", writable=False)) as connection:
         small = read_object(connection, "Small")

@@ -529,6 +529,10 @@ def test_labels_are_symbols_of_the_array_or_unseen(labels, said):
         else:
             with pytest.raises(WindowError, match=f"row 1 '{text}'"):
                 parse_window(text, 4)
+    assert parse_window("10, ?, 3,", 32).tolist() == [[10], [-1], [3]]
+    with pytest.raises(WindowError, match="'f' is no symbol") as caught:
+        parse_window("0f", 16)
+    assert "commas" in caught.value.fix
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,8 @@ METHODS = ("table", "serial", "milestones", "logarithm")
     ("name", "method"),
     [
         *itertools.product(["thesis", "one-touch", "product"], METHODS),
-        *itertools.product(["large"], ["table", "milestones", "logarithm"]),
+        *itertools.product(["large", "tactel-16"], ["table", "milestones", "logarithm"]),
+        ("tactel-8", "logarithm"),
     ],
 )
 def test_every_window_of_a_profile_decodes_to_itself(name, method):
@@ -34,8 +35,8 @@ def test_every_window_of_a_profile_decodes_to_itself(name, method):
 
 
 SIZES = [
-    (2, 32), (2, 53), (2, 63), (2, 64), (4, 32), (8, 21), (16, 16), (3, 1), (3, 40), (9, 20),
-    (5, 27), (7, 20), (11, 18), (25, 12), (27, 12), (251, 3), (1021, 2),
+    (2, 32), (2, 53), (2, 63), (2, 64), (4, 32), (8, 21), (16, 16), (32, 10), (3, 1), (3, 40),
+    (9, 20), (5, 27), (7, 20), (11, 18), (25, 12), (27, 12), (251, 3), (1021, 2),
 ]  # fmt: skip
 
 

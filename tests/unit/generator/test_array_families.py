@@ -131,7 +131,7 @@ def test_a_fold_has_sides_without_a_common_factor_that_may_be_given_by_one():
         ({"family": "prbs", "degree": 12, "rows": 63}, "prbs has one row, not 63; take prba"),
         ({"family": "prmva", "order": 4, "degree": 6, "field": [1, 0, 1]}, "not a primitive"),
         ({"family": "prmva", "order": 4, "degree": 6, "field": "x"}, "no minimal polynomial"),
-        ({"family": "prmva", "order": 32, "degree": 9}, "is on file"),
+        ({"family": "prmva", "order": 32, "degree": 11}, "is on file"),
         ({"family": "prpa"}, "factors: does not give them"),
         (product("prpa", {}, 3), "rows: has no degree"),
         (product("prpa", {"degree": 4}, 3), "is no sequence"),

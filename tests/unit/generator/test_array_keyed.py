@@ -10,7 +10,9 @@ import pytest
 from reference.polynomials import windows_are_unique
 from reference.rivals import rival_shares, serves
 from reference.visible import PoseGrid, VisibleSet, visible_sets
+from reference.windows import windows_at
 
+from decoder import decode_exact
 from generator.array import FoldedArray, Sequence, array_from, next_larger, profile
 from generator.array.contract import touches_needed
 from generator.array.field import field_of_order
@@ -25,7 +27,7 @@ from generator.array.lab_key import (
     read_lab_key,
 )
 from generator.array.polynomial import is_primitive, primitive_polynomial
-from generator.array.profiles import PROFILES
+from generator.array.profiles import PROFILES, Profile
 from generator.database.cells import array_key
 from generator.errors import ArrayError, LabKeyError
 
@@ -43,39 +45,56 @@ def test_the_array_of_a_key_stays_what_it_is():
     }  # fmt: skip
 
 
-def test_keys_give_arrays_of_their_own():
-    published = profile("large").array()
+ORDER_32 = Profile(
+    "order-32", {"family": "prmva", "order": 32, "degree": 3, "rows": 151, "columns": 217}, (3, 1),
+    "own", 5.0, keyed=True,
+)  # fmt: skip
+SMALLEST = (profile("large"), profile("tactel-8"), profile("tactel-16"), ORDER_32)
+by_order = pytest.mark.parametrize("smallest", SMALLEST, ids=lambda one: one.name)
+
+
+@by_order
+def test_keys_give_arrays_of_their_own(smallest):
+    published = smallest.array()
     arrays = [keyed_array(published, key) for key in KEYS]
     assert len({array_key(array) for array in (published, *arrays)}) == len(KEYS) + 1
     assert len({array.first for array in arrays}) == len(KEYS)
-    assert {tuple(array.permutation.tolist()) for array in arrays} == {
-        translation(field_of_order(4), label) for label in range(4)
-    }
+    order = published.order
+    shown = {tuple(array.permutation.tolist()) for array in arrays}
+    every = {translation(field_of_order(order), label) for label in range(order)}
+    assert shown <= every
+    assert len(shown) >= 4
     assert {array.window for array in arrays} == {published.window}
 
 
-@pytest.mark.parametrize("name", ["one-touch", "large"])
-def test_windows_are_unique_on_every_one(name):
+@pytest.mark.parametrize("one", [profile("one-touch"), *SMALLEST], ids=lambda one: one.name)
+def test_windows_are_unique_on_every_one(one):
     for key in KEYS[:4]:
-        array = keyed_array(profile(name).array(), key)
+        array = one.array_of_lab(key)
         assert windows_are_unique(array, array.window)
 
 
-def test_a_touch_has_as_few_rivals_as_on_the_published_array():
+@by_order
+def test_a_touch_has_as_few_rivals_as_on_the_published_array(smallest):
     sets = visible_sets(6.0, (12.7, 12.7), 2.16, PoseGrid(places=6, turns=15))
-    published = profile("large").array()
+    published = smallest.array()
     worst = max(rival_shares(keyed_array(published, key), sets).poses[0] for key in KEYS[:6])
     assert worst <= rival_shares(published, sets).poses[0] + 0.06
 
 
-def test_larger_sizes_have_keys_too():
-    size = profile("large")
+@by_order
+def test_larger_sizes_have_keys_too(smallest):
+    size = smallest
     for _ in range(3):
         size = next_larger(size)
         array = size.array_of_lab(KEYS[0])
+        places = [[0, 5, array.rows - 1], [1, 0, array.columns - 1]]
+        found = decode_exact(array, windows_at(array, *places, array.window))
+        assert [[one.row for one in found], [one.column for one in found]] == places
         assert (array.rows, array.columns) == (size.encoding["rows"], size.encoding["columns"])
         assert array.window == size.window
         assert array.definition() != size.array().definition()
+    assert array.rows * array.columns > 1e6 * 12**2 or array.order == 4  # faces of 60 mm
 
 
 def test_published_profiles_have_none():
@@ -88,7 +107,8 @@ def test_published_profiles_have_none():
 
 
 @pytest.mark.parametrize(
-    ("order", "degree", "number"), [(2, 6, 6), (3, 3, 4), (4, 3, 12), (5, 2, 4)]
+    ("order", "degree", "number"),
+    [(2, 6, 6), (3, 3, 4), (4, 3, 12), (5, 2, 4), (8, 2, 18), (16, 2, 64), (32, 2, 300)],
 )
 def test_decimation_gives_every_primitive_polynomial(order, degree, number):
     """phi(N) / n of them (MacWilliams and Sloane, chapter 4)."""
@@ -236,6 +256,8 @@ SMALL = [
     {"family": "prmva", "order": 4, "rows": 15, "columns": 17},
     {"family": "prmva", "order": 5, "rows": 4, "columns": 31},
     {"family": "prmva", "order": 8, "rows": 7, "columns": 9},
+    {"family": "prmva", "order": 16, "rows": 15, "columns": 17},
+    {"family": "prmva", "order": 32, "rows": 31, "columns": 33},
 ]
 
 
@@ -279,13 +301,14 @@ def test_symbols_seen_whole_by_pitch(pitch_mm, cells):
 
 
 def test_profiles_serve_a_sensor_at_their_pitch():
-    for name in ("one-touch", "large", "fine"):
+    for name in ("one-touch", "large", "fine", "tactel-8", "tactel-16"):
         one = profile(name)
         assert serves(one.array(), one.pitch_mm, SENSOR, 0.36 * one.pitch_mm), name
-    larger = profile("large")
-    for _ in range(4):
-        larger = next_larger(larger)
-        assert serves(larger.array(), 5.5, SENSOR, 0.36 * 5.5), larger.encoding
+    for smallest, sizes, reach in zip(SMALLEST, (4, 3, 3, 3), (0.36, 0.4, 0.4, 0.4), strict=True):
+        larger = smallest
+        for _ in range(sizes):
+            larger = next_larger(larger)
+            assert serves(larger.array(), 5.5, SENSOR, reach * 5.5), larger.encoding
 
 
 def test_the_guide_says_how_many_rivals_the_profiles_have():

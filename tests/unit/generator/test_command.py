@@ -163,7 +163,7 @@ def test_a_new_lab_draws_a_key_and_keeps_it(capsys, monkeypatch):
     assert b["lab_key"] == lab_key_of(b"other" * 4)
     assert held("a.db").array == held("a.db", "Second").array
     assert held("a.db").array.lab_key == a["lab_key"]
-    own = profile("large").array_of_lab(a["lab_key"])
+    own = profile("tactel-8").array_of_lab(a["lab_key"])
     assert held("a.db").array.definition == own.definition()
     assert held("a.db").layout.faces[0].placement.row == own.first[0]
     assert files("a.db")["Cube-F1.stl"] != files("b.db")["Cube-F1.stl"]
@@ -243,7 +243,7 @@ def test_another_program_may_make_the_database_meanwhile(monkeypatch):
     make("Cube", "a.db")
     with read_transaction(open_database("a.db")) as connection:
         assert lab_key(connection) == OTHER
-        assert lab_arrays(connection).made["large"].lab_key == OTHER
+        assert lab_arrays(connection).made["tactel-8"].lab_key == OTHER
     assert held("a.db").array.lab_key == OTHER
 
 

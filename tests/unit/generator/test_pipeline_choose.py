@@ -27,6 +27,9 @@ def dry(folder: Path, text: str, **options):
                   **({"dry_run": True} | options))  # fmt: skip
 
 
+DENSE = "symbols: {alphabet: dense-4}\n"  #: on the smaller arrays
+
+
 def choice(folder: Path, text: str):
     file = folder / "spec.yaml"
     file.write_text(text)
@@ -40,8 +43,37 @@ def profiles(found) -> set[str]:
     return {one.spec.profile for one in found.plans}
 
 
+def test_auto_takes_letters_that_the_sensor_tells_apart(tmp_path):
+    text = "name: {}\nshape: {{cube: 60 mm}}\n{}"
+    for settings, profile, alphabet in (
+        ("", "tactel-8", "tactel-8"),
+        ("symbols: {alphabet: tactel-16}\n", "tactel-8", "tactel-16"),
+        (DENSE, "large", "dense-4"),
+        ("sensor_type: fsr-8x8\n", "large", "dense-4"),
+        ("sensor_type: gel-24x32\nprint: {printer: resin}\n", "large", "dense-4"),
+    ):
+        (plan,) = choice(tmp_path, text.format("A", settings)).plans
+        assert (plan.spec.profile, plan.spec.alphabet.name) == (profile, alphabet)
+        assert plan.array.order <= plan.spec.alphabet.order
+    both = "objects:\n- {{name: A, shape: {{cube: 60}}}}\n- {{name: B, shape: {{cube: 60}}, {}}}\n"
+    found = choice(tmp_path, both.format(DENSE.strip()))
+    assert [one.spec.alphabet.name for one in found.plans] == ["dense-4", "dense-4"]
+    assert profiles(found) == {"large"}
+
+
+def test_a_lab_goes_on_with_its_letters(tmp_path):
+    text = "name: {}\nshape: {{cube: 40 mm}}\n{}"
+    dry(tmp_path, text.format("Old", "profile: large\n"), dry_run=False, formats=())
+    (new,) = choice(tmp_path, text.format("New", "")).plans
+    assert (new.spec.profile, new.spec.alphabet.name) == ("large", "dense-4")
+    assert (new.spec.style.pitch_mm, new.array.rows) == (5.0, 51)
+    dry(tmp_path, text.format("Letters", "profile: tactel-8\n"), dry_run=False, formats=())
+    (new,) = choice(tmp_path, text.format("New", "")).plans
+    assert (new.spec.profile, new.spec.alphabet.name) == ("tactel-8", "tactel-8")
+
+
 def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
-    text = "name: A\nprofile: auto\nshape: {cube: 60 mm}\ncopies: "
+    text = f"name: A\nprofile: auto\nshape: {{cube: 60 mm}}\n{DENSE}copies: "
     smallest = choice(tmp_path, text + "36")
     assert (profiles(smallest), smallest.notes) == ({"large"}, ())
     assert {one.spec.style.pitch_mm for one in smallest.plans} == {5.0}
@@ -73,7 +105,8 @@ def test_a_run_opens_the_database_once(tmp_path, monkeypatch, copies):
 
 
 def test_auto_goes_on_where_the_database_is_full(tmp_path):
-    text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole}}\ncopies: {}\n"
+    text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole}}\n"
+    text += "symbols: {{alphabet: dense-4}}\ncopies: {}\n"
     first = dry(tmp_path, text.format("A", 2), dry_run=False, formats=())
     assert (first.rows, first.columns) == (51, 1285)
     assert profiles(choice(tmp_path, text.format("B", 2))) == {"large"}  # which is there for it
@@ -109,16 +142,17 @@ def test_a_database_goes_on_with_the_arrays_that_it_has(tmp_path):
 
 def test_auto_takes_finer_symbols_on_a_printer_that_makes_them(tmp_path):
     text = "name: A\nshape: {box: [60, 15, 15]}\n"
-    found = choice(tmp_path, text)
+    found = choice(tmp_path, text + DENSE)
     assert profiles(found) == {"large"}
     assert found.plans[0].spec.style.pitch_mm == 4.5
     (note,) = found.notes
     assert note.startswith("pitch 4.5 mm is taken: it shows places on 2 of the 2 faces")
     for box, settings, pitch in (
-        ("[60, 14, 14]", "", 4.0),
-        ("[60, 14, 14]", "print: {printer: fdm-0.6}\n", 5.0),  # makes 4.5 mm, which show no more
-        ("[60, 15, 15]", "symbols: {pitch: 5 mm}\n", 5.0),
-        ("[60, 17, 17]", "", 5.0),
+        ("[60, 14, 14]", DENSE, 4.0),
+        # makes 4.5 mm, which show no more
+        ("[60, 14, 14]", DENSE + "print: {printer: fdm-0.6}\n", 5.0),
+        ("[60, 15, 15]", "symbols: {alphabet: dense-4, pitch: 5 mm}\n", 5.0),
+        ("[60, 17, 17]", DENSE, 5.0),
     ):
         found = choice(tmp_path, f"name: A\nshape: {{box: {box}}}\n{settings}")
         assert found.plans[0].spec.style.pitch_mm == pitch

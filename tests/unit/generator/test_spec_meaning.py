@@ -24,7 +24,7 @@ from generator.spec.starter import starter, starter_named
 
 FIXTURES = Path(__file__).parents[3] / "fixtures"
 CUBE = "name: Cube\nshape: {cube: 60 mm}\n"
-LARGE = json.dumps(dict(PROFILES["large"].encoding))
+LETTERS = json.dumps(dict(PROFILES["tactel-8"].encoding))
 
 
 @pytest.fixture(autouse=True)
@@ -117,7 +117,7 @@ def test_stroke_follows_the_pitch_and_the_alphabet(settings, stroke_mm):
 
 @pytest.mark.parametrize(
     ("settings", "draft_deg"),
-    [("profile: large\n", 10), ("profile: large\nsymbols: {height: 1.2 mm}\n", 7.5), ("", 7.5),
+    [("profile: large\n", 10), ("profile: large\nsymbols: {height: 1.2 mm}\n", 7.5), ("", 5),
      ("profile: fine\n", 5)],
 )  # fmt: skip
 def test_draft_gives_way_where_strokes_need_the_room(settings, draft_deg):
@@ -129,11 +129,12 @@ def test_draft_gives_way_where_strokes_need_the_room(settings, draft_deg):
 @pytest.mark.parametrize(
     ("settings", "pitch_mm"),
     [
-        ("print: {printer: fdm-0.6}\n", 5.0),
+        ("print: {printer: fdm-0.6}\n", 5.5),
         ("print: {printer: resin}\n", 5.0),
         ("symbols: {alphabet: letters-4}\n", 6.0),  # strokes of .14 of the pitch: .8 mm wide
-        ("symbols: {draft: 10 deg}\n", 7.0),
-        ("symbols: {stroke: 1.4 mm}\n", 5.0),
+        ("symbols: {draft: 10 deg}\n", 6.0),
+        ("symbols: {stroke: 1.4 mm}\n", 6.0),
+        ("symbols: {alphabet: dense-4, stroke: 1.4 mm}\n", 5.0),
         ("symbols: {pitch: 6 mm}\n", 6.0),
         ("sensor_type: flexitac-16x32\n", 6.0),
         ("sensor_type: gel-24x32\nprint: {printer: resin}\n", 3.0),
@@ -218,12 +219,12 @@ def test_files_are_relative_to_the_spec_and_count_by_content_and_scale():
     "same",
     [
         "# a comment\nshape: {cube: 6 cm}\nname: Cube\n",
-        CUBE + "profile: auto\nsymbols: {pitch: 5, draft: 7.5 deg}\nprint: {wall: 0.3 cm}\n",
+        CUBE + "profile: auto\nsymbols: {pitch: 5, draft: 5 deg}\nprint: {wall: 0.3 cm}\n",
         CUBE + "symbols:\nprint:\ncopies: 1\nlayout:\n",
         CUBE + "output: {folder: elsewhere, formats: [glb], database: other.db}\n",
-        CUBE + "sensor_type: gel-24x32\nsymbols: {pitch: 5 mm}\n",
+        CUBE + "sensor_type: gel-24x32\nprofile: tactel-8\n",
         "name: Another\nshape: {cube: 60}\n",
-        CUBE + f"encoding: {LARGE}\nsymbols: {{pitch: 5}}\n",
+        CUBE + f"encoding: {LETTERS}\nsymbols: {{pitch: 5, alphabet: tactel-8}}\n",
     ],
 )
 def test_same_meaning_same_hash(same):
