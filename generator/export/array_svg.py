@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from generator.alphabet.outline import Tiers
 from generator.layout.placement import FaceLayout
 
-_FULL = 300  # cells a side up to which the whole array is drawn
+_FULL = 100  # cells a side up to which the whole array is drawn
 _AROUND = 3  # cells around the faces in a cropped picture
 _NAMED = 1.5  # cells: a narrower strip of a face bears no name
 _CELL_PX, _WIDE_PX = 14, 1600  # a wider picture gets smaller cells

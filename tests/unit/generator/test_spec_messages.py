@@ -27,7 +27,7 @@ REFUSED_LATER = {
     ),
     "order": (CUBE + "encoding: {family: prmva, order: 6, degree: 3}\n", "3:34", "no field has 6"),
     "height": (CUBE + "symbols:\n  height: 0.2 mm\n", "4:11", "height 0.2 mm"),
-    "chamfer": (CUBE + "symbols: {chamfer: 0.6 mm}\n", "3:20", ""),
+    "chamfer": (CUBE + "symbols: {chamfer: 0.6 mm, alphabet: dense-4}\n", "3:20", ""),
     "printer": (CUBE + "symbols: {pitch: 4.5 mm, stroke: 0.99 mm}\n", "3:34", ""),
     "shared pitch": (
         "symbols: {pitch: 3}\nobjects: [{name: A, shape: {cube: 9}}, {name: B, shape: {cube: 8}}]",
