@@ -61,7 +61,7 @@ from recognizer.touch.hypothesis import (
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.next_touch import propose_next
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import answer_at, read_touch
+from recognizer.touch.recognise import answer_at, read_touch, with_bits
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     NO_CONTACT,
@@ -449,8 +449,8 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
     if path is not None:
         doubt *= math.exp(path.ambiguity)
     if reason := verdict.reject_chance(doubt, DOUBT):
-        return refusal(seq, reason, margin=margin, runner_up=runner_up, doubt=doubt)
-    return replace(answer, doubt=doubt)
+        answer = refusal(seq, reason, margin=margin, runner_up=runner_up, doubt=doubt)
+    return with_bits(reader, replace(answer, doubt=doubt), best.embossed, doubt, DOUBT)
 
 
 def _verdict_evidence(best: ScanHypothesis) -> verdict.Evidence:

@@ -105,6 +105,17 @@ def expected_matches(
     )
 
 
+def place_bits(arrays: Iterable[EmbossedArray], embossed: EmbossedArray, doubt: float) -> float:
+    """Return what a touch says about its place, bits: doubt = places x 2^-bits.
+
+    Of random symbols a share of 2^-bits matches one place as well, so the number does not depend on
+    the size of the lab: n places are named with a doubt of d by log2(n / d) bits. The places are
+    those that the doubt counts, of the same alphabet and style.
+    """
+    places = sum(len(one.keys) for one in _embossed_alike(arrays, embossed))
+    return math.log2(places / doubt) if doubt > 0 else math.inf
+
+
 def _embossed_alike(
     arrays: Iterable[EmbossedArray], embossed: EmbossedArray
 ) -> list[EmbossedArray]:

@@ -17,7 +17,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from recognizer.touch.chance import expected_by_border, expected_matches, points_on_face
+from recognizer.touch.chance import (
+    expected_by_border,
+    expected_matches,
+    place_bits,
+    points_on_face,
+)
 from recognizer.touch.diagnose import diagnose
 from recognizer.touch.evidence import VerifiedHypothesis
 from recognizer.touch.hypothesis import Hypothesis, under_centre
@@ -135,7 +140,10 @@ def _confirm(
     reason = reject_chance(doubt, CONFIRMED_DOUBT)
     if not reason:
         return answer, first
-    return refusal(answer.seq, reason, margin=margin, runner_up=runner_up, doubt=doubt), second
+    refused = refusal(answer.seq, reason, margin=margin, runner_up=runner_up, doubt=doubt)
+    return with_bits(
+        touch.reader, refused, second[0].embossed, doubt, touch.reader.options.doubt
+    ), second
 
 
 def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: int) -> Recognition:
@@ -169,13 +177,31 @@ def _judge(
 ) -> Recognition:
     """Return an answer with its doubt, or its refusal for chance."""
     if not answer:
-        return answer
+        return _count_few(reader, found[0], answer) if found else answer
     margin = _margin_of(answer)
     doubt = _doubt_of(reader, found[0], margin)
     reason = reject_chance(doubt, reader.options.doubt)
-    if not reason:
-        return replace(answer, doubt=doubt)
-    return refusal(answer.seq, reason, margin=margin, runner_up=answer.runner_up, doubt=doubt)
+    judged = replace(answer, doubt=doubt)
+    if reason:
+        judged = refusal(answer.seq, reason, margin=margin, runner_up=answer.runner_up, doubt=doubt)
+    return with_bits(reader, judged, found[0].embossed, doubt, reader.options.doubt)
+
+
+def with_bits(
+    reader: PreparedLab, judged: Recognition, embossed: EmbossedArray, doubt: float, limit: float
+) -> Recognition:
+    """Return an answer with its bits, or a refusal with these and those that it misses."""
+    bits = place_bits(reader.lab.arrays, embossed, doubt)
+    missing = math.log2(doubt / limit) if not judged and doubt > limit else None
+    return replace(judged, bits=bits, bits_missing=missing)
+
+
+def _count_few(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> Recognition:
+    """Return a refusal for too few symbols with its bits; any other as it is."""
+    if answer.reason != TOO_FEW:
+        return answer
+    doubt = expected_matches(reader.lab.arrays, best.embossed, best.fit, best.hypothesis)
+    return with_bits(reader, answer, best.embossed, doubt, reader.options.doubt)
 
 
 def _margin_of(answer: Recognition) -> float:

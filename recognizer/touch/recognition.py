@@ -44,8 +44,7 @@ WAYS_OUT = {
     NO_CONTACT: "press the probe onto the object",
     TOO_FEW: "press harder, or where more symbols are: away from edges and holes",
     AMBIGUOUS: "touch again a few mm beside",
-    BY_CHANCE: "so few symbols match a registered place by chance as well: touch again a few mm "
-    "beside and read both as one (--scan)",
+    BY_CHANCE: "touch amid the face or press harder, or read several touches as one (--scan)",
     NOT_ENCODED: "touch again more evenly, away from edges; is the object in this database, and "
     "the overlay the right one (--overlay)?",
     OUTSIDE: "move the probe onto the face",
@@ -130,6 +129,12 @@ class Recognition:
     """Expected number of registered places that a foreign surface (other symbols than any that
     are registered) would match as well by chance; None where another reason refuses, and where the
     thesis's way is read."""
+    bits: float | None = None
+    """What symbols and outline say about the place, bits: `doubt` is 2^-bits times the number of
+    registered places on arrays of that alphabet and style. Known where `doubt` is, and for too few
+    symbols where a place was judged."""
+    bits_missing: float | None = None
+    """Bits more that the doubt would need to be at the reader's limit; None where none miss."""
     next: NextTouch | None = None  #: where it does not answer or is unsure
     cause: Cause | None = None  #: what of the touch made it fail; None where it answers
     inside_mm: float | None = None
@@ -145,8 +150,8 @@ class Recognition:
             others = ""
             if self.runner_up is not None and self.reason == AMBIGUOUS:
                 others = f", {self.runner_up.object}/{self.runner_up.face} among others"
-            if self.doubt is not None and self.reason == BY_CHANCE:
-                others = f", as {self.doubt:.1g} places would match"
+            if self.bits_missing is not None:
+                others = f", {math.ceil(self.bits_missing)} bits short of naming one place"
             said = self.reason if self.cause is None else str(self.cause)
             if self.cause is not None and self.reason not in (NO_CONTACT, TOO_FEW, NOT_ENCODED):
                 said = f"{self.reason}: {said}"
@@ -221,6 +226,8 @@ class Recognition:
             "reason_code": self.reason_code,
             "evidence": None if self.cause is None else dict(self.cause.evidence),
             "doubt": self.doubt,
+            "bits": None if self.bits is None else round(self.bits, 2),
+            "bits_missing": None if self.bits_missing is None else round(self.bits_missing, 2),
             "scale": self.scale,
             "stroke_mm": self.stroke_mm,
             "next": None if self.next is None else asdict(self.next),

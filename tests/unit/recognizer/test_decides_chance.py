@@ -21,6 +21,7 @@ from recognizer.touch.chance import (
     expected_matches,
     fitting_share,
     joint_share,
+    place_bits,
     points_on_lattice,
     share_of_borders,
     surely_pressed,
@@ -144,7 +145,11 @@ def test_all_arrays_that_are_embossed_alike_count(small):
     unlike = replace(other.embossed, style=larger)
     letters = replace(other.embossed, alphabet="letters-4")
     both = [lab.embossed, other.embossed, unlike, letters]
-    assert doubt_of(small, lab, arrays=both) == pytest.approx(164 / 4**9)
+    doubt = doubt_of(small, lab, arrays=both)
+    assert doubt == pytest.approx(164 / 4**9)
+    # nine clear symbols of four say 18 bits, however many places there are
+    assert place_bits(both, lab.embossed, doubt) == pytest.approx(18)
+    assert place_bits([lab.embossed], lab.embossed, 64 / 4**9) == pytest.approx(18)
 
 
 def test_at_an_edge_the_places_count_whose_border_agrees(small, monkeypatch):

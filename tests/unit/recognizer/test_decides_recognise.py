@@ -30,6 +30,7 @@ from recognizer.touch.signal import Signal
 from recognizer.touch.verdict import Evidence
 
 TOUCHED = SimpleNamespace(contact=True, state=None)
+BITS = 40.0
 READER = SimpleNamespace(
     sensor=SensorType(), options=ReaderOptions(), lab=SimpleNamespace(arrays=("one", "two"))
 )
@@ -139,6 +140,7 @@ def reads(small, lab, monkeypatch):
         monkeypatch.setattr(recognizer.touch.recognise, "verify_hypotheses", found)
         monkeypatch.setattr(recognizer.touch.recognise, "expected_matches", matches)
         monkeypatch.setattr(recognizer.touch.recognise, "expected_by_border", matches_by_border)
+        monkeypatch.setattr(recognizer.touch.recognise, "place_bits", lambda *_: BITS)
         monkeypatch.setattr(recognizer.touch.recognise, "propose_next", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "may_find_more", tells_more)
@@ -283,6 +285,8 @@ def test_what_many_places_match_by_chance_is_refused(reads, doubt, reason, inlie
     found = [reads.one(inliers=inliers), reads.one("rival", -40.0, face=1, index=(9, 12))]
     answer, judged, tries = reads.read(found, found, doubt=doubt)
     assert (answer.reason, answer.doubt, bool(answer)) == (reason, doubt, not reason)
+    missing = pytest.approx(math.log2(1.01)) if reason else None
+    assert (answer.bits, answer.bits_missing) == (BITS, missing)
     assert (answer.margin, answer.runner_up.face) == (40.0, "F2")
     assert judged is found[0]
     assert tries == (1 if inliers == 16 and doubt == 0.0 else 2)
@@ -343,7 +347,7 @@ def exchanged(reads, monkeypatch):
         for name, value in (
             ("verify_hypotheses", verified), ("has_residual", leaves_much),
             ("swap_halves", lambda _, axis: axis), ("expected_matches", lambda *_, **__: 1e-9),
-            ("may_find_more", lambda *_: False),
+            ("may_find_more", lambda *_: False), ("place_bits", lambda *_: BITS),
         ):  # fmt: skip
             monkeypatch.setattr(recognizer.touch.recognise, name, value)
         image = np.zeros((2, 2))
@@ -395,6 +399,7 @@ def test_only_what_is_refused_has_a_cause(reads, monkeypatch):
             recognizer.touch.recognise, "verify_hypotheses", lambda *_, found=found: found
         )
         monkeypatch.setattr(recognizer.touch.recognise, "expected_matches", lambda *_, **__: 0.0)
+        monkeypatch.setattr(recognizer.touch.recognise, "place_bits", lambda *_: BITS)
         assert recognise(READER, TOUCHED, 7).cause == cause
 
 

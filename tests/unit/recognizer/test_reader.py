@@ -184,8 +184,9 @@ def test_every_reason_has_a_way_out():
     doubt = refusal(0, AMBIGUOUS, runner_up=RunnerUp("Prism", "F2", (0, 0)))
     assert str(doubt).startswith("not recognised: ambiguous, Prism/F2 among others; ")
     chance = refusal(0, BY_CHANCE, runner_up=RunnerUp("Prism", "F2", (0, 0)), doubt=0.0312)
+    chance = replace(chance, bits=9.4, bits_missing=8.29)
     assert str(chance).startswith(
-        "not recognised: ambiguous by chance, as 0.03 places would match;"
+        "not recognised: ambiguous by chance, 9 bits short of naming one place; touch amid the face"
     )
     assert chance.as_json()["doubt"] == 0.0312
     assert math.isnan(doubt.x_mm)
