@@ -67,6 +67,14 @@ READERS: dict[str, tuple[int, int, int, int]] = {
     "more candidates": (12, 4, 4, 6),
     "most": (24, 6, 8, 10),
 }
+#: Classes of touches whose limits are shown: kind, and levels other than the campaign's.
+LIMIT_CLASSES: dict[str, tuple[str, Shares]] = {
+    "face": ("face", ()),
+    "edge": ("edge", ()),
+    "corner": ("corner", ()),
+    "light": ("face", (("light", 1.0),)),
+}
+LIMITS = "limits-"  #: series of these begin so
 EFFORT = ("candidates", "steps", "finalists", "final_steps")  #: options of a reader
 AS_IS = "as it is"  #: the reader with the settings that it has
 
@@ -88,6 +96,7 @@ class Campaign:
     sensor_per: str = "touch"  #: or `run`: how long the errors of a sensor stay the same
     policy: str = ONE  #: or `next`: touches follow until one is answered
     study: int = 0  #: touches of every reader of `READERS`; 0: no study
+    limits: int = 0  #: touches of every class of `LIMIT_CLASSES`; 0: no limit is shown
     shard: int = SHARD  #: touches in a file: at most so many are lost with a run
 
     @property
@@ -263,6 +272,9 @@ def series_of(campaign: Campaign) -> tuple[Series, ...]:
     for name in (AS_IS, *READERS) if campaign.study else ():
         label = f"reader-{name.replace(' ', '-')}"
         found.append(Series(label, campaign.study, (("face", 1.0),), levels, shard, name))
+    for name, (kind, own) in LIMIT_CLASSES.items() if campaign.limits else ():
+        kinds: Shares = ((kind, 1.0),)
+        found.append(Series(LIMITS + name, campaign.limits, kinds, own or levels, shard))
     return tuple(found)
 
 

@@ -165,6 +165,14 @@ class SetOptions(Options):
             least=0,
         ),
     ] = None
+    limits: Annotated[
+        int | None,
+        Option(
+            "Touches of each class (face, edge, corner, light) for what a touch can say at best: "
+            "bits, places it can name, least error; 100 take half a minute of CPU. 0: none.",
+            least=0,
+        ),
+    ] = None
     shard: Annotated[
         int | None,
         Option("Touches in a file, and lost at most when interrupted; 1000.", least=1),

@@ -8,19 +8,20 @@ the shard is, it is done. Other tools read them as they are.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from encoded_objects.base.files import whole_file
 from recognizer.validation.campaign import Series
 from recognizer.validation.errors import ValidationError
+from recognizer.validation.limits import COLUMNS as LIMIT_COLUMNS
 from recognizer.validation.trial import COLUMNS, Row
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-SHARDS, TIMES = "shards", "times"
+SHARDS, TIMES, LIMITS = "shards", "times", "limits"
 TIME_COLUMNS = {"number": "int", "drawing": "float", "reading": "float"}  #: CPU of a touch, s
 ADDED = ("drawn_anew", "touches")  #: columns that runs of before may lack
 GROUP = 100_000  #: rows that a file holds together
@@ -57,17 +58,20 @@ def _schema(what: str) -> pa.Schema:
     import pyarrow as pa
 
     types = {"str": pa.string(), "int": pa.int64(), "bool": pa.bool_(), "float": pa.float64()}
-    columns = COLUMNS if what == SHARDS else TIME_COLUMNS
+    columns = {SHARDS: COLUMNS, TIMES: TIME_COLUMNS, LIMITS: LIMIT_COLUMNS}[what]
     return pa.schema([(name, types[kind]) for name, kind in columns.items()])
 
 
 def write_shard(
-    folder: Path, series: str, shard: int, rows: Iterable[Row], times: Iterable[Row]
-) -> None:
-    """Write a shard and its times, in the order of the touches' numbers."""
+    folder: Path, series: str, shard: int, rows: Iterable[Row], times: Iterable[Row],
+    limits: Sequence[Row] = (),
+) -> None:  # fmt: skip
+    """Write a shard, its times, and limits if there are any, in the order of their numbers."""
     import pyarrow as pa
 
-    for what, found in ((TIMES, times), (SHARDS, rows)):
+    for what, found in ((TIMES, times), (LIMITS, limits), (SHARDS, rows)):
+        if what == LIMITS and not limits:
+            continue
         ordered = sorted(found, key=lambda row: row["number"])
         table = pa.Table.from_pylist(ordered, schema=_schema(what))
         write_table(table, shard_file(folder, series, shard, what))
@@ -94,7 +98,7 @@ def read_series(folder: Path, series: Series, what: str = SHARDS) -> pa.Table:
 
     files = [shard_file(folder, series.name, shard, what) for shard in range(series.shards)]
     table = pa.concat_tables([pq.read_table(file) for file in files]).combine_chunks()
-    if what == TIMES:
+    if what != SHARDS:
         return table
     schema = _schema(what)
     missing = [name for name in schema.names if name not in table.column_names]

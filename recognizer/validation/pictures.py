@@ -233,6 +233,38 @@ def margins(rows: dict[str, Any]) -> str:
     return picture.svg
 
 
+def limits(found: dict[str, Any]) -> str:
+    """Return what touches can say at best by class: places named, answers, and pose errors."""
+    classes = found["classes"]
+    names, at = [line["class"] for line in classes], np.arange(len(classes))
+    with svg_figure(1, 4, (13.0, 3.2)) as picture:
+        named, answers, *errors = picture.axes
+        for line in classes:
+            shares = [(each["places"], 100 * each["share"]) for each in line["named"]]
+            named.semilogx(*zip(*shares, strict=True), ".-", label=line["class"])
+        named.set_xlabel(f"registered places, at a doubt of {found['doubt']:g}")
+        named.set_ylabel("touches that can be named, %")
+        named.set_ylim(-3, 103)
+        named.legend(frameon=False)
+        pairs: list[tuple[Axes, str, str, str, str, float]] = [
+            (answers, "best", "right", "can be named, answered right, %", "share", 100.0),
+            (errors[0], "bound_mm", "rms_mm", "place, rms, mm", "", 1.0),
+            (errors[1], "bound_deg", "rms_deg", "turn, rms, degrees", "", 1.0),
+        ]
+        for axis, best, reached, label, key, scale in pairs:
+            for name, off, colour in ((best, -0.2, GREY), (reached, 0.2, GREEN)):
+                values = [line[name][key] if key else line[name] for line in classes]
+                axis.bar(at + off, [scale * (v or 0.0) for v in values], 0.38, color=colour)
+            axis.set_xticks(at, names)
+            axis.set_ylabel(label)
+        for axis, unit in zip(errors, ("mm", "deg"), strict=True):
+            for place, line in enumerate(classes):
+                if line[f"ratio_{unit}"] is not None:
+                    text = f"x {line[f'ratio_{unit}']:.1f}"
+                    axis.text(place + 0.2, line[f"rms_{unit}"], text, ha="center", va="bottom")
+    return picture.svg
+
+
 TINTS = {HOLDS: GREEN, FAILS: RED}  #: of a state; others are grey
 REFUSED_STRANGER = "#7fae9d"
 

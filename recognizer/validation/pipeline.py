@@ -135,6 +135,7 @@ def validate(
     sensor_per: str = "",
     policy: str = "",
     study: int | None = None,
+    limits: int | None = None,
     shard: int | None = None,
     seed: int | None = None,
     jobs: int = 1,
@@ -204,6 +205,7 @@ def validate(
         "sensor_per": sensor_per,
         "policy": policy,
         "study": study,
+        "limits": limits,
         "shard": shard,
     }
     known = resume and (place / RECORD).exists()

@@ -47,6 +47,7 @@ from recognizer.validation.studies import (
     contact_study,
     decoder_study,
     engine_lines,
+    limit_study,
     reader_study,
     work_avoided,
 )
@@ -84,6 +85,7 @@ def page_of(
         "pose": pictures.pose(rows),
         "against": pictures.accuracy(results),
         "margins": pictures.margins(rows),
+        "limits": pictures.limits(results["limits"]) if "limits" in results else "",
         "work": pictures.work_precision(study, times, level) if study else "",
     }
     page = environment().get_template(PAGE)
@@ -150,6 +152,8 @@ def write_results(work: Work, folder: Path) -> dict[str, Any]:
         results["left_out"] = avoided.counted
         times |= {name: study.spent for name, study in studies.items()}
         times["left_out"] = avoided.spent
+    if campaign.limits:
+        results["limits"] = limit_study(folder, campaign, reader)
     if campaign.surfaces == PRINTED:
         from recognizer.validation.printing import prints_as_results
 
@@ -222,6 +226,7 @@ def _command_of(work: Work, folder: Path) -> str:
         if value != (sensor.overlay.kind if name == "overlay" else getattr(usual, name)):
             words += [f"--{name.replace('_', '-')}", typed.get(name, value)]
     words += ["--study", str(campaign.study)]
+    words += ["--limits", str(campaign.limits)] if campaign.limits else []
     words += ["--shard", str(campaign.shard)] if campaign.shard != usual.shard else []
     return shlex.join(words)
 

@@ -5,7 +5,7 @@ Folder of a run::
     asked.json               what decides the results, and where the set is (`write_record`)
     lab.db, parts/           the set, if it was made from specs
     sensor.yaml              the sensor type that it was made for, where it is not the usual one
-    shards/, times/          a file for a thousand touches (`files`)
+    shards/, times/, limits/ a file for a thousand touches (`files`)
     trials.parquet           all touches
     results.json             what the report says, the same on every run
     times.json               CPU times of this run
@@ -222,13 +222,16 @@ def touch_all(work: Work, folder: Path, workers: Workers, progress: TouchProgres
         missing = Counter(shard_of.values())
         rows: defaultdict[int, list[Row]] = defaultdict(list)
         times: defaultdict[int, list[Row]] = defaultdict(list)
+        limits: defaultdict[int, list[Row]] = defaultdict(list)
         for result in workers(work, list(shard_of)) if shard_of else ():
             shard = shard_of[result.batch]
             rows[shard] += result.rows
             times[shard] += result.times
+            limits[shard] += result.limits
             missing[shard] -= 1
             if not missing[shard]:
-                write_shard(folder, series.name, shard, rows.pop(shard), times.pop(shard))
+                found = (each.pop(shard) for each in (rows, times, limits))
+                write_shard(folder, series.name, shard, *found)
             progress.add(result.rows)
 
 

@@ -27,9 +27,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from encoded_objects.base.errors import require
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.validation.campaign import Batch, Work, reader_with, series_of
+from recognizer.validation.campaign import LIMITS, Batch, Work, reader_with, series_of
 from recognizer.validation.encoded_set import set_digest
 from recognizer.validation.errors import WorkersError
+from recognizer.validation.limits import limit_of
 from recognizer.validation.trial import Row, trial
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class BatchResult:
     batch: Batch
     rows: tuple[Row, ...]
     times: tuple[Row, ...]  #: of `files.TIME_COLUMNS`
+    limits: tuple[Row, ...] = ()  #: of `limits.COLUMNS`, of series that show limits
 
 
 #: Takes work and batches, yields finished batches in any order.
@@ -65,7 +67,7 @@ def touch(work: Work, batch: Batch) -> BatchResult:
     """
     series = next(s for s in series_of(work.campaign) if s.name == batch.series)
     reader = reader_with(prepare_reader(work), series.reader)
-    rows, times = [], []
+    rows, times, limits = [], [], []
     for number in range(batch.first, batch.last):
         plan = work.plan(series, number)
         start = time.process_time()
@@ -74,7 +76,9 @@ def touch(work: Work, batch: Batch) -> BatchResult:
         rows.append(found.row())
         times.append({"number": number, "drawing": round(drawing, 6),
                       "reading": round(found.seconds, 6)})  # fmt: skip
-    return BatchResult(batch, tuple(rows), tuple(times))
+        if series.name.startswith(LIMITS):
+            limits.append(limit_of(plan, number, reader))
+    return BatchResult(batch, tuple(rows), tuple(times), tuple(limits))
 
 
 @lru_cache(maxsize=1)

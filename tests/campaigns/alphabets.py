@@ -3,13 +3,15 @@
     python tests/campaigns/alphabets.py --sensor-type fsr-16 --pitch 5 --reach 0.30 --stroke 0.20
 
 A glyph is a connected set of one to four segments between neighbours of 3 x 3 nodes; segments
-that meet make 60 degrees at least, and none cross but in a node. Its image is the share of each tip
-that its strokes cover. The distance of two glyphs is that of their images, squared, after the
-shift, turn and gain that a fit leaves open and that make them most alike, averaged over turns and
-places of the tactels. No two letters of a set are one another shifted or turned, none looks the
-same after a quarter turn, and all have about the same ink, so that force does not tell them apart.
-Printed: the least distance of each set, as a share of that of dense-4, and its strokes. `--draw
-FILE.svg` draws the sets that ship, and searches for nothing.
+that meet make 60 degrees at least, and none cross but in a node. Its image is what the tactels of
+a sensor type answer to it (`recognizer.touch.symbols.template`). The distance of two glyphs is that
+of their images, squared, after the shift, turn and gain that a fit leaves open and that make them
+most alike, averaged over turns and places of the tactels. No two letters of a set are one another
+shifted or turned, none looks the same after a quarter turn, and all have about the same ink, so
+that force does not tell them apart. Several pitches, reaches and strokes are tried each with each.
+`--printer` leaves out the glyphs that it does not make. Printed: the least distance of each set, as
+a share of that of dense-4 at the type's usual pitch, which sets nozzles of .4 and .6 mm make, and
+their strokes. `--draw FILE.svg` draws the sets that ship, and searches for nothing.
 """
 
 from __future__ import annotations
@@ -22,10 +24,13 @@ import numpy as np
 import runner
 
 from encoded_objects.base.sensor_type_file import sensor_type_named
-from generator.alphabet import ALPHABETS
+from generator.alphabet import ALPHABETS, Alphabet, Glyph, SymbolStyle, check_printable
+from generator.errors import AlphabetError
+from generator.printers import PRINTERS
+from generator.spec.resolve import DRAFTS_RAD
+from recognizer.touch.symbols.template import template_of
 
 TURNS, PLACES = 12, 4  #: poses of the tactels: turns, and places along x and y
-POINTS = 12  #: of a tip, along x and along y
 SHIFT_MM, TURN_RAD, GAIN = 0.2, math.radians(3.0), 0.15  #: left open by a fit, each way
 INK = 1.6  #: most ink of a letter over the least of its set
 SEGMENTS_MOST = 4  #: of a glyph
@@ -36,7 +41,8 @@ SEGMENTS = [
     (a, b) for a, b in combinations(NODES, 2) if max(abs(a[0] - b[0]), abs(a[1] - b[1])) == 1
 ]
 NUMBER = {segment: number for number, segment in enumerate(SEGMENTS)}
-COVERED = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(1).astype(np.float32)
+PRINTED = ("fdm-0.4", "fdm-0.6")  #: printers that are asked whether they make a set
+SHIPPED = ("dense-4", "dense-8", "tactel-4", "tactel-8", "tactel-16")
 
 
 def segment(a, b):
@@ -90,54 +96,62 @@ def glyphs():
     return list(found), list(found.values())
 
 
-def tip_points(sensor, reach_mm):
-    """Return points (tactels, points, 2) of the tips that a symbol can reach, mm."""
-    line = (np.arange(POINTS) + 0.5) / POINTS - 0.5
-    x, y = np.meshgrid(line, line)
-    inside = x * x + y * y <= 0.25
-    tip = np.stack([x[inside], y[inside]], axis=-1) * sensor.overlay.tab_diameter_mm
-    axes = [
-        step * np.arange(-(around := math.ceil((reach_mm + SHIFT_MM) / step)), around + 1)
-        for step in sensor.step_mm
-    ]
-    return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 1, 2) + tip
+def template(letters, sensor, pitch, reach, stroke):
+    """Return what tactels answer to letters, sets of segments."""
+    style = SymbolStyle(pitch_mm=pitch, stroke_mm=stroke * pitch)
+    return template_of(alphabet_of(letters, reach, stroke), style, sensor)
 
 
-def images(letters, points, pitch, reach, stroke, pose):
-    """Return the share (letters, tactels) of each tip that strokes cover at x, y, turn."""
-    x, y, turn = pose
-    at = (points.reshape(-1, 2) - (x, y)) / pitch
-    c, s = math.cos(turn), math.sin(turn)
-    at = at @ np.array([[c, -s], [s, c]])
-    a, b = (reach * np.array(SEGMENTS, float)).transpose(1, 0, 2)
-    along = ((at[None] - a[:, None]) * (b - a)[:, None]).sum(2) / ((b - a) ** 2).sum(1)[:, None]
-    foot = a[:, None] + along.clip(0, 1)[..., None] * (b - a)[:, None]
-    on = np.hypot(*np.moveaxis(at[None] - foot, 2, 0)) <= stroke / 2
-    packed = np.packbits(on.reshape(len(SEGMENTS), *points.shape[:2]), axis=2)
-    covered = [np.bitwise_or.reduce(packed[list(one)], axis=0) for one in letters]
-    return COVERED[np.array(covered)].sum(-1) / points.shape[1]
+def alphabet_of(letters, reach, stroke):
+    """Return letters, sets of segments, as an alphabet."""
+    glyphs = tuple(
+        Glyph(str(number), tuple(SEGMENTS[k] for k in one)) for number, one in enumerate(letters)
+    )
+    return Alphabet("found", glyphs, reach, stroke)
 
 
 def distances(letters, sensor, pitch, reach, stroke):
     """Return distances (n, n) of letters and their ink (n,), mean over turns and places."""
-    points = tip_points(sensor, (reach * math.sqrt(2) + stroke / 2) * pitch)
+    answers = template(letters, sensor, pitch, reach, stroke)
+    axes = [
+        step * np.arange(-(around := math.ceil((answers.half_mm + SHIFT_MM) / step)), around + 1)
+        for step in sensor.step_mm
+    ]
+    tactels = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+
+    def images(x, y, turn):
+        c, s = math.cos(turn), math.sin(turn)
+        return answers.at((tactels - (x, y)) @ np.array([[c, -s], [s, c]]))[..., 0].T
+
     total, ink = np.zeros((len(letters), len(letters))), np.zeros(len(letters))
     shifts, turns = (-SHIFT_MM, 0.0, SHIFT_MM), (-TURN_RAD, 0.0, TURN_RAD)
     steps = (np.arange(PLACES) + 0.5) / PLACES - 0.5
     poses = list(product(*(step * steps for step in sensor.step_mm), range(TURNS)))
     for x, y, number in poses:
         pose = np.array([x, y, math.tau * number / TURNS])
-        base = images(letters, points, pitch, reach, stroke, pose)
+        base = images(*pose)
         own = (base * base).sum(1)
         best = np.full((len(base), len(base)), np.inf)
         for open_ in product(shifts, shifts, turns):
-            moved = images(letters, points, pitch, reach, stroke, pose + open_)
+            moved = images(*(pose + open_))
             both, other = moved @ base.T, (moved * moved).sum(1)[:, None]
             gain = np.clip(both / np.maximum(other, 1e-9), math.exp(-GAIN), math.exp(GAIN))
             best = np.minimum(best, gain * gain * other - 2 * gain * both + own)
         total += np.minimum(best, best.T)
         ink += base.sum(1)
     return total / len(poses), ink / len(poses)
+
+
+def prints(letters, pitch, reach, stroke, printer):
+    """Whether a printer makes letters at one of the drafts that `auto` tries."""
+    for draft in DRAFTS_RAD:
+        style = SymbolStyle(pitch_mm=pitch, stroke_mm=stroke * pitch, draft_rad=draft)
+        try:
+            check_printable(alphabet_of(letters, reach, stroke), style, PRINTERS[printer])
+            return True
+        except AlphabetError:
+            continue
+    return False
 
 
 def least(apart):
@@ -238,28 +252,45 @@ def drawing(names):
 
 
 def main() -> None:
-    """Print the best sets of a sensor type, a pitch, a reach and a stroke."""
+    """Print the best sets of a sensor type, for pitches, reaches and strokes."""
     asked = runner.asked(
-        __doc__, sensor_type="fsr-16", pitch=5.0, reach=0.30, stroke=0.20, letters=[4, 8, 16, 32],
-        draw="",
+        __doc__, sensor_type="fsr-16", pitch=[5.0], reach=[0.30], stroke=[0.20],
+        letters=[4, 8, 16, 32], printer="", draw="",
     )  # fmt: skip
     if asked.draw:
-        names = ("dense-4", "dense-8", "tactel-4", "tactel-8", "tactel-16")
-        Path(asked.draw).write_text(drawing(names))
+        Path(asked.draw).write_text(drawing(SHIPPED))
         return
-    sensor, known = sensor_type_named(asked.sensor_type), ALPHABETS["dense-4"]
-    usual = distances(shipped("dense-4"), sensor, asked.pitch, known.reach, known.stroke_ratio)
-    unit = least(usual[0])[0]
-    letters, shapes = glyphs()
-    apart, ink = distances(letters, sensor, asked.pitch, asked.reach, asked.stroke)
-    apart[[[one == other for other in shapes] for one in shapes]] = 0.0
+    sensor = sensor_type_named(asked.sensor_type)
+
+    def near_of(name, pitch):
+        known = ALPHABETS[name]
+        return least(distances(shipped(name), sensor, pitch, known.reach, known.stroke_ratio)[0])[0]
+
+    unit = near_of("dense-4", sensor.symbol_pitch_mm)
+    every = list(zip(*glyphs(), strict=True))
     sets = []
-    runner.table(("letters", "nearest two, of dense-4", "ink, most of least"))
-    for size in asked.letters:
-        near, chosen = best_set(apart, ink, size)
-        if chosen:
-            runner.row(size, near / unit, float(ink[chosen].max() / ink[chosen].min()))
-            sets += [f"\n{size} letters", *(lines(letters[k]) for k in chosen)]
+    heads = ("pitch", "reach", "stroke", *(f"{size} letters" for size in asked.letters))
+    runner.table((*heads, *(f"{printer} makes" for printer in PRINTED)))
+    for pitch, reach, stroke in product(asked.pitch, asked.reach, asked.stroke):
+        letters, shapes = zip(*(
+            one for one in every
+            if not asked.printer or prints([one[0]], pitch, reach, stroke, asked.printer)
+        ), strict=True)  # fmt: skip
+        apart, ink = distances(letters, sensor, pitch, reach, stroke)
+        apart[[[one == other for other in shapes] for one in shapes]] = 0.0
+        found = [best_set(apart, ink, size) for size in asked.letters]
+        chosen = [[letters[k] for k in one] for _, one in found if one]
+        printed = [
+            [str(len(one)) for one in chosen if prints(one, pitch, reach, stroke, printer)]
+            for printer in PRINTED
+        ]
+        runner.row(pitch, reach, stroke, *(near / unit for near, _ in found),
+                   *(", ".join(one) or "none" for one in printed))  # fmt: skip
+        for one in chosen:
+            sets += [f"\n{len(one)} letters, {pitch:g} mm, {reach}, {stroke}", *map(lines, one)]
+    for name in SHIPPED:
+        near = (f"{near_of(name, pitch) / unit:.3g} at {pitch:g} mm" for pitch in asked.pitch)
+        print(f"{name}: {', '.join(near)}")
     print("\n".join(sets))
 
 
