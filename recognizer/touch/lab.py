@@ -202,7 +202,7 @@ def open_lab(database: str | Path) -> Lab:
     >>> lab = open_lab("lab.db")
     >>> embossed = lab.arrays[0]
     >>> embossed.alphabet.name, embossed.style.pitch_mm, embossed.face(0).object
-    ('dense-4', 5.0, 'Cube')
+    ('tactel-8', 5.0, 'Cube')
     """
     url = str(database)
     engine = open_database(url, writable=False)

@@ -89,7 +89,10 @@ def test_weak_is_told_in_newtons_where_they_are_known(reader):
 @pytest.fixture(scope="module")
 def keyed(make_lab):
     """A lab whose symbols are known, so that places can be named where the readings are even."""
-    folder = make_lab("{name: Cube, shape: {cube: 40 mm}}", lab_key="0123-4567-89AB-CDER")
+    folder = make_lab(
+        "{name: Cube, shape: {cube: 40 mm}, symbols: {alphabet: dense-4}}",
+        lab_key="0123-4567-89AB-CDER",
+    )
     return f"{folder}/lab.db"
 
 

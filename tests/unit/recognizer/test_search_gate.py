@@ -110,10 +110,11 @@ PAD, ROUND, SOME_ROUND = {"kind": "pad"}, {"radii": (20.0,)}, {"radii": (20.0,),
 @pytest.mark.parametrize(
     ("given", "wide"),
     [
-        # 0.44 of the 19.4 tactels of a cell, three times: 25.7; a round face presses a strip
-        ({"tactels": 25}, False), ({"tactels": 26}, True), ({"tactels": 25, "lab": ROUND}, True),
-        ({"tactels": 25, "lab": SOME_ROUND}, True),
-        ({"tactels": 26, "lab": {"second": 7.9}}, True),  # the smaller symbols are fewer tactels
+        # 48 cells over a doubt of 1e-4, a sixteenth by the border: 7.4 letters of four, each 0.44
+        # of the 19.4 tactels of a cell: 63.6; a round face presses a strip
+        ({"tactels": 63}, False), ({"tactels": 64}, True), ({"tactels": 63, "lab": ROUND}, True),
+        ({"tactels": 63, "lab": SOME_ROUND}, True),
+        ({"tactels": 64, "lab": {"second": 7.9}}, True),  # the smaller symbols are fewer tactels
         # no stroke shows
         ({"tactels": 160}, True), ({"tactels": 256}, False), ({"tactels": 256, "lab": PAD}, True),
         # whatever the place that a first search found
