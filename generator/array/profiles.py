@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.array.definition import array_from
 from generator.array.fold import FoldedArray, nearest_sizes
 from generator.array.lab_key import keyed_array
@@ -20,6 +21,11 @@ from generator.array.product import ProductArray
 from generator.errors import ArrayError
 
 DEFAULT_PROFILE = "one-touch"
+SMALLEST = ("tactel-8", "large")
+"""Profiles whose arrays, and larger ones, `auto` takes: room for some hundred objects. Letters of
+the first are made for tabs that lie close; the second serves other sensors and smaller alphabets
+(docs/alphabets.md)."""
+LEAST_TACTELS = 3.1  #: to a symbol, from which letters made for tactels were measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,3 +160,21 @@ def _next_encoding(order: int, degree: int) -> dict[str, Any] | None:
         if columns <= 2 * rows:
             return {"order": order, "degree": degree, "rows": rows, "columns": columns}
     return None
+
+
+def smallest_profile(sensor: SensorType) -> str:
+    """Return the profile of `SMALLEST` whose letters a sensor type tells apart."""
+    tactels = sensor.symbol_pitch_mm / max(sensor.step_mm)
+    apart = sensor.overlay.kind == "tab" and tactels >= LEAST_TACTELS
+    return SMALLEST[0] if apart else SMALLEST[-1]
+
+
+def family_of(profile: str) -> str:
+    """Return the one of `SMALLEST` of which a profile is a larger size; else the profile itself.
+
+    Examples
+    --------
+    >>> family_of("large-511x513"), family_of("tactel-8"), family_of("fine")
+    ('large', 'tactel-8', 'fine')
+    """
+    return next((one for one in SMALLEST if f"{profile}-".startswith(f"{one}-")), profile)

@@ -18,7 +18,14 @@ from sqlalchemy import Connection
 
 from generator.array.contract import SymbolArray
 from generator.array.lab_key import draw_lab_key, read_lab_key
-from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, next_larger
+from generator.array.profiles import (
+    DEFAULT_PROFILE,
+    PROFILES,
+    SMALLEST,
+    Profile,
+    family_of,
+    next_larger,
+)
 from generator.database.cells import occupancy
 from generator.database.lab import MOST_FILLED, LabArrays, lab_arrays, require_lab_key
 from generator.database.read import find_object, read_array
@@ -31,7 +38,7 @@ from generator.polyhedron import Polyhedron
 from generator.spec import ObjectSpec
 from generator.spec.problem import error_location
 from generator.spec.read import with_profile
-from generator.spec.resolved import AUTO, SMALLEST, family_of
+from generator.spec.resolved import AUTO
 
 LARGER = 4  # sizes tried beyond `large`
 FINER_SHARES = (0.9, 0.8)

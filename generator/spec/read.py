@@ -17,11 +17,11 @@ from pydantic import ValidationError
 
 from encoded_objects.base.document import Problem
 from encoded_objects.base.yaml_tree import Place, Tree, read_tree, tree_of
-from generator.array.profiles import PROFILES
+from generator.array.profiles import PROFILES, family_of
 from generator.spec.explain import explain_errors
 from generator.spec.problem import SPEC, SpecError, mark_of
 from generator.spec.resolve import folder_name, resolve
-from generator.spec.resolved import AUTO, ObjectSpec, ShapeSpec, family_of
+from generator.spec.resolved import AUTO, ObjectSpec, ShapeSpec
 from generator.spec.settings import Defaults, NamedSettings, ObjectSettings, SharedSettings
 
 OBJECTS_MAX = 10_000

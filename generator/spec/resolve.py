@@ -25,12 +25,12 @@ from generator.alphabet.known import ALPHABETS, Alphabet, alphabet_from
 from generator.alphabet.outline import SymbolStyle
 from generator.alphabet.printable import check_printable, is_printable
 from generator.array.definition import array_from
-from generator.array.profiles import PROFILES
+from generator.array.profiles import PROFILES, SMALLEST, smallest_profile
 from generator.errors import AlphabetError, ArrayError
 from generator.printers import Printer, printer_named, printer_of_nozzle
 from generator.spec.explain import explain_errors
 from generator.spec.problem import SPEC, SpecError, mark_of
-from generator.spec.resolved import AUTO, EXPLICIT, GAP_MM, SMALLEST, ObjectSpec, ShapeSpec
+from generator.spec.resolved import AUTO, EXPLICIT, GAP_MM, ObjectSpec, ShapeSpec
 from generator.spec.settings import (
     AlphabetSettings,
     Encoding,
@@ -51,7 +51,6 @@ WALL_STROKES = 2  # least wall, in narrowest strokes of the printer
 FORMATS = ("step", "stl", "3mf")
 DATABASE = "sqlite:///lab.db"
 PRINTER = "fdm-0.4"
-LEAST_TACTELS = 3.1  #: to a symbol, from which letters made for tactels were measured
 COARSER_MM = (3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 12.0)
 """`auto` takes the pitch that the sensor type proposes, for `fsr-16` the 5 mm that touches are read
 best at, on nozzles of 0.4 and 0.6 mm and CAD surfaces alike (docs/pitches.md); and the first of
@@ -378,11 +377,9 @@ def _array_profile(settings: NamedSettings, sensor: SensorType, named: Alphabet 
     """
     if settings.profile not in (None, AUTO):
         return settings.profile
-    tactel, usual = SMALLEST
-    enough = named is None or named.order >= PROFILES[tactel].array().order
-    tactels = sensor.symbol_pitch_mm / max(sensor.step_mm)
-    apart = sensor.overlay.kind == "tab" and tactels >= LEAST_TACTELS
-    return tactel if enough and apart else usual
+    smallest = smallest_profile(sensor)
+    enough = named is None or named.order >= PROFILES[smallest].array().order
+    return smallest if enough else SMALLEST[-1]
 
 
 def _array(

@@ -18,23 +18,8 @@ from generator.errors import GeneratorError
 from generator.printers import Printer, printer_named
 
 AUTO = "auto"  # profile by default: array and pitch are chosen when the objects are made
-SMALLEST = ("tactel-8", "large")
-"""Profiles whose arrays, and larger ones, `auto` takes: room for some hundred objects. Letters of
-the first are made for tabs that lie close; the second serves other sensors and smaller alphabets
-(docs/alphabets.md)."""
 EXPLICIT = "explicit"  # stands for the profile's name where an encoding is written out
 GAP_MM = 0.14  # between assembled panels
-
-
-def family_of(profile: str) -> str:
-    """Return the one of `SMALLEST` of which a profile is a larger size; else the profile itself.
-
-    Examples
-    --------
-    >>> family_of("large-511x513"), family_of("tactel-8"), family_of("fine")
-    ('large', 'tactel-8', 'fine')
-    """
-    return next((one for one in SMALLEST if f"{profile}-".startswith(f"{one}-")), profile)
 
 
 @dataclass(frozen=True, slots=True)

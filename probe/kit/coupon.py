@@ -11,6 +11,8 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
+from encoded_objects.base.sensor_type import SensorType
+from generator.array.profiles import smallest_profile
 from generator.cad.encode import encode
 from generator.solid import Part
 from probe.kit.sizes import COUPON_MM, KitSizes
@@ -30,17 +32,18 @@ class Coupon:
     printer: str
 
 
-def make_coupon(k: KitSizes, pitch_mm: float, printer: str, database: Path) -> Coupon:
-    """Register a coupon of symbols of a pitch in a database file, and return its plate."""
+def make_coupon(k: KitSizes, sensor: SensorType, printer: str, database: Path) -> Coupon:
+    """Register a coupon that a sensor type reads in a database file, and return its plate."""
     from build123d import Box
 
-    side = k.coupon_mm
+    side, pitch_mm = k.coupon_mm, sensor.symbol_pitch_mm
     made = encode(
         Box(side, side, COUPON_MM),
         name=NAME,
         database=str(database),
         folder=database.parent,
         formats=(),
+        profile=smallest_profile(sensor),
         symbols={"pitch": pitch_mm},
         print={"printer": printer},
         output={"lab_key": KEY},

@@ -84,7 +84,7 @@ def make_kit(
             meshes.append((name, mesh, resin))
         progress("coupon", len(PARTS) / (len(PARTS) + 1))
         database = Path(scratch) / DATABASE
-        coupon = make_coupon(k, pitch, RESIN if pitch < FINE_MM else FILAMENT, database)
+        coupon = make_coupon(k, sensor, RESIN if pitch < FINE_MM else FILAMENT, database)
         staging.write("coupon.step", step_chunks(coupon.part))
         staging.write("coupon.stl", stl_chunks(triangles(coupon.part)))
         staging.write(DATABASE, database.read_bytes())

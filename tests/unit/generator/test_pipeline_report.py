@@ -91,7 +91,7 @@ def test_a_can_is_as_wide_as_it_is_round(tmp_path):
 
 
 SHAPES_MADE = {
-    "Bar": {"shape": {"box": [60, 30, 12]}, "symbols": {"pitch": "7 mm"}},
+    "Bar": {"shape": {"box": [60, 30, 12]}, "symbols": {"pitch": "7 mm", "alphabet": "dense-4"}},
     "Can": {"shape": {"cylinder": {"diameter": 40, "height": 30}}},
     "Old": {"shape": {"cube": 90}, "profile": "thesis"},
 }
