@@ -25,7 +25,6 @@ class Effort:
     finalists: int = 1  #: lattices that are refined to the end
     final_steps: int = 2
     again: int = 0  #: of the best lattices, under whose gains the image is searched again
-    crossed: int = 0  #: gains that are tried on all lattices, and these turned by quarters
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +42,7 @@ class ReaderOptions:
     scale_sd: float = 0.01  #: standard deviation of a print's scale
     scale_most: float = 0.03  #: largest deviation of a print's scale that is read
     first: Effort = Effort()  #: of the first search
-    #: of the second, of touches that the first does not answer or of which few cells agree: seven
+    #: of the second, of touches that the first does not answer or of which few cells agree: five
     #: times the work (`docs/recognizer.md`)
     thorough: Effort = Effort(12, 4, 6, 6, again=2)
 

@@ -199,7 +199,7 @@ def verify_on_round_faces(touch: ArrayImage, effort: Effort) -> list[VerifiedHyp
     """Return the likeliest places on round faces."""
     image, sensor, embossed = touch.image, touch.reader.sensor, touch.prepared.embossed
     keep = CURVATURES
-    if effort.crossed:
+    if effort.again:
         keep, effort = THOROUGH_CURVATURES, EACH_CURVATURE
     fits: list[Fit] = []
     under: list[Bend] = []

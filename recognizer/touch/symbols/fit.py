@@ -147,8 +147,6 @@ def fit_lattices(
         gains = [lattices.gain[b] for b in best]
         more = _refine_candidates(image, bank, effort, search_image(image, bank, gains))
         lattices = _joined(lattices, more)
-    if effort.crossed:
-        lattices = _cross_gains(image, lattices, effort.crossed)
     best = _distinct_lattices(image, lattices)[: effort.finalists]
     lattices = refine_lattices(
         image, lattices.pose[best], lattices.gain[best],
@@ -185,34 +183,6 @@ def _distinct_lattices(image: Image, found: Lattices) -> list[int]:
         if not ((shift < SAME_SHIFT) & (turn < SAME_TURN)).any():
             kept.append(b)
     return kept
-
-
-def _cross_gains(image: Image, found: Lattices, gains: int) -> Lattices:
-    """Return lattices and these turned by quarters, each under the best of several gains.
-
-    A square lattice turned by a quarter is itself, so all four fit the image alike but for the
-    symbols; and a lattice may be stuck under a gain that another one left.
-    """
-    best = np.argsort(-found.value, kind="stable")
-    tried = []
-    pose = found.pose[best[: 2 * gains]]
-    for _ in range(4):
-        tried.append(pose)
-        pose = pose.copy()
-        pose[:, 0], pose[:, 1] = -pose[:, 1], pose[:, 0].copy()
-        pose[:, 2] += math.pi / 2
-    poses = np.concatenate([*tried, found.pose[np.sort(best[2 * gains :])]])
-    each = [
-        refine_lattices(image, poses, one, steps=1, with_normal=False)
-        for one in np.repeat(found.gain[best[:gains], None], len(poses), axis=1)
-    ]
-    kept = np.argmax([lattices.value for lattices in each], axis=0)
-    rows = np.arange(len(poses))
-    picked = {
-        item.name: np.stack([getattr(lattices, item.name) for lattices in each])[kept, rows]
-        for item in fields(Lattices)
-    }
-    return Lattices(**picked)
 
 
 def _search_under(image: Image, bank: Bank, gain: Array) -> LatticeScores:
