@@ -199,14 +199,10 @@ def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> A
 
 def _smallest(specs: Sequence[ObjectSpec], lab: LabArrays) -> Profile:
     """Return the smallest array of the letters that all objects can bear, or that the lab has."""
-    orders = [PROFILES[name].array().order for name in SMALLEST]
-    made = {family_of(name) for name in lab.made}
-    for name, order in zip(SMALLEST[:-1], orders, strict=False):
-        if all(one.encoding["order"] >= order for one in specs) and (
-            name in made or not made.intersection(SMALLEST)
-        ):
-            return PROFILES[name]
-    return PROFILES[SMALLEST[-1]]
+    made = {family_of(name) for name in lab.made}.intersection(SMALLEST)
+    letters, usual = (PROFILES[name] for name in SMALLEST)
+    bear = all(one.encoding["order"] >= letters.encoding["order"] for one in specs)
+    return letters if bear and (not made or letters.name in made) else usual
 
 
 def _candidates(smallest: Profile) -> Iterator[Profile]:

@@ -378,7 +378,7 @@ def _array_profile(settings: NamedSettings, sensor: SensorType, named: Alphabet 
     if settings.profile not in (None, AUTO):
         return settings.profile
     smallest = smallest_profile(sensor)
-    enough = named is None or named.order >= PROFILES[smallest].array().order
+    enough = named is None or named.order >= PROFILES[smallest].encoding["order"]
     return smallest if enough else SMALLEST[-1]
 
 

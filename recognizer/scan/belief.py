@@ -61,7 +61,7 @@ from recognizer.touch.hypothesis import (
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.next_touch import propose_next
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import answer_at, read_touch, with_bits
+from recognizer.touch.recognise import answer_at, judge_chance, read_touch
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     NO_CONTACT,
@@ -448,9 +448,7 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
     doubt = expected_matches(reader.lab.arrays, best.embossed, best.fit, best.hypothesis)
     if path is not None:
         doubt *= math.exp(path.ambiguity)
-    if reason := verdict.reject_chance(doubt, DOUBT):
-        answer = refusal(seq, reason, margin=margin, runner_up=runner_up, doubt=doubt)
-    return with_bits(reader, replace(answer, doubt=doubt), best.embossed, doubt, DOUBT)
+    return judge_chance(reader, best.embossed, answer, doubt, DOUBT)
 
 
 def _verdict_evidence(best: ScanHypothesis) -> verdict.Evidence:

@@ -133,17 +133,13 @@ def _confirm(
     and gain happen to fit.
     """
     second = verify_hypotheses(touch, touch.reader.options.thorough)
-    margin, runner_up = answer.margin, answer.runner_up
     if not second or not first[0].coincides(second[0]):
-        return refusal(answer.seq, AMBIGUOUS, margin=0.0, runner_up=runner_up), second
+        return refusal(answer.seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), second
     doubt = _doubt_of(touch.reader, second[0], _margin_of(answer))
-    reason = reject_chance(doubt, CONFIRMED_DOUBT)
-    if not reason:
+    if not reject_chance(doubt, CONFIRMED_DOUBT):
         return answer, first
-    refused = refusal(answer.seq, reason, margin=margin, runner_up=runner_up, doubt=doubt)
-    return with_bits(
-        touch.reader, refused, second[0].embossed, doubt, touch.reader.options.doubt
-    ), second
+    limit = min(CONFIRMED_DOUBT, touch.reader.options.doubt)
+    return judge_chance(touch.reader, second[0].embossed, answer, doubt, limit), second
 
 
 def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: int) -> Recognition:
@@ -175,33 +171,26 @@ def _best_answer(found: list[VerifiedHypothesis], options: ReaderOptions, seq: i
 def _judge(
     reader: PreparedLab, found: list[VerifiedHypothesis], answer: Recognition
 ) -> Recognition:
-    """Return an answer with its doubt, or its refusal for chance."""
+    """Return an answer with its doubt, or its refusal for chance; a refusal as it is."""
     if not answer:
-        return _count_few(reader, found[0], answer) if found else answer
-    margin = _margin_of(answer)
-    doubt = _doubt_of(reader, found[0], margin)
-    reason = reject_chance(doubt, reader.options.doubt)
-    judged = replace(answer, doubt=doubt)
-    if reason:
-        judged = refusal(answer.seq, reason, margin=margin, runner_up=answer.runner_up, doubt=doubt)
-    return with_bits(reader, judged, found[0].embossed, doubt, reader.options.doubt)
-
-
-def with_bits(
-    reader: PreparedLab, judged: Recognition, embossed: EmbossedArray, doubt: float, limit: float
-) -> Recognition:
-    """Return an answer with its bits, or a refusal with these and those that it misses."""
-    bits = place_bits(reader.lab.arrays, embossed, doubt)
-    missing = math.log2(doubt / limit) if not judged and doubt > limit else None
-    return replace(judged, bits=bits, bits_missing=missing)
-
-
-def _count_few(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> Recognition:
-    """Return a refusal for too few symbols with its bits; any other as it is."""
-    if answer.reason != TOO_FEW:
         return answer
-    doubt = expected_matches(reader.lab.arrays, best.embossed, best.fit, best.hypothesis)
-    return with_bits(reader, answer, best.embossed, doubt, reader.options.doubt)
+    doubt = _doubt_of(reader, found[0], _margin_of(answer))
+    return judge_chance(reader, found[0].embossed, answer, doubt, reader.options.doubt)
+
+
+def judge_chance(
+    reader: PreparedLab, embossed: EmbossedArray, answer: Recognition, doubt: float, limit: float
+) -> Recognition:
+    """Return an answer with its doubt and its bits, or its refusal with the bits that it misses."""
+    reason = reject_chance(doubt, limit)
+    if reason:
+        answer = refusal(answer.seq, reason, margin=answer.margin, runner_up=answer.runner_up)
+    return replace(
+        answer,
+        doubt=doubt,
+        bits=place_bits(reader.lab.arrays, embossed, doubt),
+        bits_missing=math.log2(doubt / limit) if reason else None,
+    )
 
 
 def _margin_of(answer: Recognition) -> float:

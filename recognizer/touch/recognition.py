@@ -131,8 +131,7 @@ class Recognition:
     thesis's way is read."""
     bits: float | None = None
     """What symbols and outline say about the place, bits: `doubt` is 2^-bits times the number of
-    registered places on arrays of that alphabet and style. Known where `doubt` is, and for too few
-    symbols where a place was judged."""
+    registered places on arrays of that alphabet and style. Known where `doubt` is."""
     bits_missing: float | None = None
     """Bits more that the doubt would need to be at the reader's limit; None where none miss."""
     next: NextTouch | None = None  #: where it does not answer or is unsure

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 
+from recognizer.touch.chance import LEAST_SHARE
 from recognizer.touch.evidence import VerifiedHypothesis, symbols_to_name
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.prepare import PreparedLab
@@ -34,7 +35,7 @@ WEAK = 0.35  #: share of that below which a tactel lies over a gap
 #: (seeds 11 and 12).
 GAPS = 0.285
 FINEST, COARSEST = 3.1, 5.0  #: tactels, pitches between which gaps were measured
-LEAST_BORDERS = 1 / 16  #: share of places that a border of two lines leaves (`chance.LEAST_SHARE`)
+LEAST_BORDERS = LEAST_SHARE**2  #: share of places that a border of two lines leaves
 INK = 0.44  #: share of a cell's tactels that its symbol presses, and some around it
 SURE_RATIO = 20.0  #: nats from which a place's symbols are there beyond doubt
 DOUBT = 1e-3  #: of an answer that a better fit may bring below the limit

@@ -7,8 +7,8 @@ the place. One touch (`recognise`) and a scan (`recognizer.scan`) are judged ali
    contradict the place, or where another place comes near.
 2. `reject_chance` where a surface of another lab would match a registered place as well (`chance`).
 
-All limits are of likelihoods and of expected matches, none of numbers of symbols: a letter of a
-large alphabet says more than one of a small one.
+Limits are of likelihoods and of expected matches, none of numbers of symbols that agree: a letter
+of a large alphabet says more than one of a small one. Cells that contradict a place are counted.
 
 Log-likelihoods in nats; 10 nats are odds of 22,000.
 """

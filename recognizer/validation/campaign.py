@@ -74,7 +74,6 @@ LIMIT_CLASSES: dict[str, tuple[str, Shares]] = {
     "corner": ("corner", ()),
     "light": ("face", (("light", 1.0),)),
 }
-LIMITS = "limits-"  #: series of these begin so
 EFFORT = ("candidates", "steps", "finalists", "final_steps")  #: options of a reader
 AS_IS = "as it is"  #: the reader with the settings that it has
 
@@ -243,6 +242,7 @@ class Series:
     levels: Shares
     shard: int
     reader: str = AS_IS
+    limits: str = ""  #: of `LIMIT_CLASSES`, the class whose limits it shows; empty: none
 
     @property
     def shards(self) -> int:
@@ -273,8 +273,8 @@ def series_of(campaign: Campaign) -> tuple[Series, ...]:
         label = f"reader-{name.replace(' ', '-')}"
         found.append(Series(label, campaign.study, (("face", 1.0),), levels, shard, name))
     for name, (kind, own) in LIMIT_CLASSES.items() if campaign.limits else ():
-        kinds: Shares = ((kind, 1.0),)
-        found.append(Series(LIMITS + name, campaign.limits, kinds, own or levels, shard))
+        label, kinds = f"limits-{name}", ((kind, 1.0),)
+        found.append(Series(label, campaign.limits, kinds, own or levels, shard, limits=name))
     return tuple(found)
 
 

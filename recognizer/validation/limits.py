@@ -51,7 +51,7 @@ from recognizer.touch.verify import TouchImages, verify_hypotheses
 from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.statistics import rms, round_digits, share_of
 from recognizer.validation.touch_plan import TouchPlan
-from recognizer.validation.trial import RIGHT, WRONG, Row, judge
+from recognizer.validation.trial import RIGHT, WRONG, Row, judge, number_of_face
 
 Array = NDArray[np.float64]
 
@@ -163,12 +163,9 @@ def bound_of_touch(
 def _true_face(reader: Reader, found: DrawnTouch) -> tuple[Prepared, int] | None:
     scene = found.contact.scene
     for prepared in reader.prepared:
-        embossed = prepared.embossed
-        for number, (owner, _) in enumerate(embossed.faces.tolist()):
-            if embossed.names[owner] != scene.object_name:
-                continue
-            if embossed.face(number).face == scene.face:
-                return prepared, number
+        number = number_of_face(prepared.embossed, scene.object_name, scene.face)
+        if number is not None:
+            return prepared, number
     return None
 
 

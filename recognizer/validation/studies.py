@@ -28,10 +28,9 @@ from probe.contact.press import LEVELS, level_for, table
 from probe.contact.tips import Tips, tip_points
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
-from recognizer.validation.campaign import LIMITS, Campaign, series_of, settings_of
+from recognizer.validation.campaign import Campaign, series_of, settings_of
 from recognizer.validation.draw import draw_touch
-from recognizer.validation.files import LIMITS as LIMIT_ROWS
-from recognizer.validation.files import TIMES, columns_of, read_series
+from recognizer.validation.files import LIMITS, TIMES, columns_of, read_series
 from recognizer.validation.limits import alphabets_of, line_of_limits
 from recognizer.validation.results import line_of
 from recognizer.validation.touch_plan import TouchPlan
@@ -82,7 +81,7 @@ def reader_study(folder: Path, campaign: Campaign) -> Study:
     """Return the outcome of the same touches for readers that spend more or less."""
     study = Study()
     for series in series_of(campaign)[1:]:
-        if series.name.startswith(LIMITS):
+        if series.limits:
             continue
         rows = columns_of(read_series(folder, series))
         spent = columns_of(read_series(folder, series, TIMES))["reading"]
@@ -99,11 +98,10 @@ def limit_study(folder: Path, campaign: Campaign, reader: Reader) -> dict[str, A
     """Return what touches can say at best, by class, and what is answered of them."""
     doubt, lines = reader.options.doubt, []
     for series in series_of(campaign):
-        if series.name.startswith(LIMITS):
-            rows = columns_of(read_series(folder, series, LIMIT_ROWS))
+        if series.limits:
+            rows = columns_of(read_series(folder, series, LIMITS))
             trials = columns_of(read_series(folder, series))
-            name = series.name.removeprefix(LIMITS)
-            lines.append(line_of_limits(name, rows, trials, doubt))
+            lines.append(line_of_limits(series.limits, rows, trials, doubt))
     return {
         "sensor": reader.sensor.name,
         "arrays": alphabets_of(reader.lab.arrays),

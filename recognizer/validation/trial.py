@@ -24,7 +24,7 @@ import numpy as np
 from probe.errors import ContactError
 from probe.scan.places import surface_to_sensor
 from recognizer.scan.session import Scan
-from recognizer.touch.lab import EncodedFace, Lab
+from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import NextTouch, Recognition
@@ -222,9 +222,15 @@ def judge(
 def find_face(lab: Lab, object_name: str, face: str) -> tuple[EncodedFace, int] | None:
     """Return a face of the lab, and the cells of its array's window; None if it is foreign."""
     for encoding in lab.arrays:
-        ids = [number for number, name in encoding.names.items() if name == object_name]
-        for number in np.flatnonzero(np.isin(encoding.faces[:, 0], ids)).tolist():
-            held = encoding.face(number)
-            if held.face == face:
-                return held, encoding.array.window[0] * encoding.array.window[1]
+        number = number_of_face(encoding, object_name, face)
+        if number is not None:
+            window = encoding.array.window
+            return encoding.face(number), window[0] * window[1]
     return None
+
+
+def number_of_face(encoding: EmbossedArray, object_name: str, face: str) -> int | None:
+    """Return the number of a face on an array; None if another one bears it."""
+    ids = [number for number, name in encoding.names.items() if name == object_name]
+    numbers: list[int] = np.flatnonzero(np.isin(encoding.faces[:, 0], ids)).tolist()
+    return next((number for number in numbers if encoding.face(number).face == face), None)

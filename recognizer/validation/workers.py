@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from encoded_objects.base.errors import require
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.validation.campaign import LIMITS, Batch, Work, reader_with, series_of
+from recognizer.validation.campaign import Batch, Work, reader_with, series_of
 from recognizer.validation.encoded_set import set_digest
 from recognizer.validation.errors import WorkersError
 from recognizer.validation.limits import limit_of
@@ -76,7 +76,7 @@ def touch(work: Work, batch: Batch) -> BatchResult:
         rows.append(found.row())
         times.append({"number": number, "drawing": round(drawing, 6),
                       "reading": round(found.seconds, 6)})  # fmt: skip
-        if series.name.startswith(LIMITS):
+        if series.limits:
             limits.append(limit_of(plan, number, reader))
     return BatchResult(batch, tuple(rows), tuple(times), tuple(limits))
 
