@@ -17,6 +17,7 @@ their strokes. `--draw FILE.svg` draws the sets that ship, and searches for noth
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import combinations, pairwise, product
 from pathlib import Path
 
@@ -24,8 +25,8 @@ import numpy as np
 import runner
 
 from encoded_objects.base.sensor_type_file import sensor_type_named
-from generator.alphabet import ALPHABETS, Alphabet, Glyph, SymbolStyle, check_printable
-from generator.errors import AlphabetError
+from generator.alphabet import ALPHABETS, Alphabet, Glyph, SymbolStyle
+from generator.alphabet.printable import is_printable
 from generator.printers import PRINTERS
 from generator.spec.resolve import DRAFTS_RAD
 from recognizer.touch.symbols.template import template_of
@@ -144,14 +145,10 @@ def distances(letters, sensor, pitch, reach, stroke):
 
 def prints(letters, pitch, reach, stroke, printer):
     """Whether a printer makes letters at one of the drafts that `auto` tries."""
-    for draft in DRAFTS_RAD:
-        style = SymbolStyle(pitch_mm=pitch, stroke_mm=stroke * pitch, draft_rad=draft)
-        try:
-            check_printable(alphabet_of(letters, reach, stroke), style, PRINTERS[printer])
-            return True
-        except AlphabetError:
-            continue
-    return False
+    alphabet, limits = alphabet_of(letters, reach, stroke), PRINTERS[printer]
+    style = SymbolStyle(pitch_mm=pitch, stroke_mm=stroke * pitch)
+    styles = (replace(style, draft_rad=draft) for draft in DRAFTS_RAD)
+    return any(is_printable(alphabet, one, limits) for one in styles)
 
 
 def least(apart):

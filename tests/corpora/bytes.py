@@ -34,8 +34,7 @@ from corpora.commands import DATA, FIXTURES, LAB_KEY, Commands, started_commands
 NAME = "bytes"
 ALL = "step,stpz,stl,3mf,glb,mjcf,urdf,sdf,usd"
 SPECS = ("cube.yaml", *sorted(f"specs/{path.name}" for path in (FIXTURES / "specs").iterdir()))
-# Of kits; that of flexitac-12x32 has four rows less than flexitac-16x32, and is left out.
-SENSOR_TYPES = ("flexitac-16x32", "fsr-16", "fsr-8x8", "gel-24x32", "mat-32x32")
+SENSOR_TYPES = ("flexitac-12x32", "flexitac-16x32", "fsr-16", "fsr-8x8", "gel-24x32", "mat-32x32")
 MOST = ALL.replace("stpz,", "")  # gzipped STEP costs more than all else together
 PARTS = ("specs", "shapes", "options", "kit")
 Cases = tuple[tuple[str, str, str], ...]
