@@ -31,7 +31,7 @@ import traceback
 import zipfile
 from binascii import crc_hqx
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -63,6 +63,10 @@ class WrongValueError(AssertionError):
     """Something was read without a word that was never written."""
 
 
+class LeftError(AssertionError):
+    """Files of what was refused."""
+
+
 class LeakError(AssertionError):
     """Bytes of another file were read, or something may lead there."""
 
@@ -90,6 +94,7 @@ class Kind:
     codes: tuple[int, ...] = (2,)  #: exit codes of what is refused
     file: bool = True  #: a file is read, which may also be no file
     placed: bool = True  #: errors name the file
+    longest_s: float = LONGEST_S
     sound: tuple[Callable[[], Any], ...] = ()  #: make what is damaged, once
 
 
@@ -175,26 +180,26 @@ def anything(rng: random.Random, depth: int = 0) -> Any:
     return [anything(rng, depth + 1) for _ in some]
 
 
-def places(value: Any) -> Iterator[tuple[Any, Any]]:
-    """Yield (holder, key) of everything in nested lists and mappings."""
-    items = value.items() if isinstance(value, dict) else enumerate(value)
-    for key, inner in list(items):
-        yield value, key
-        if isinstance(inner, dict | list):
-            yield from places(inner)
+def somewhere(rng: random.Random, value: Any) -> tuple[Any, Any] | None:
+    """Return a random (holder, key) in nested lists and mappings; None in an empty one."""
+    found = None
+    while isinstance(value, dict | list) and value:
+        key = rng.choice(list(value)) if isinstance(value, dict) else rng.randrange(len(value))
+        found = value, key
+        if rng.random() < 0.35:
+            break
+        value = value[key]
+    return found
 
 
 def mutated(rng: random.Random, value: Any) -> Any:
     """Return a copy of nested lists and mappings in which one to three things are others."""
     value = json.loads(json.dumps(value))
     for _ in range(rng.choice((1, 1, 2, 3))):
-        found = list(places(value))
-        if not found:
+        found, other = somewhere(rng, value), somewhere(rng, value)
+        if found is None or other is None:
             return anything(rng)
-        holder, key = rng.choice(found)
-        if isinstance(holder, list) and len(found) > 400 and rng.random() < 0.7:
-            tops = [one for one in found if isinstance(one[0], dict)]  # not always a number
-            holder, key = rng.choice(tops or found)
+        holder, key = found
         do = rng.randrange(7)
         if do in (0, 1, 2):
             holder[key] = anything(rng)
@@ -205,9 +210,8 @@ def mutated(rng: random.Random, value: Any) -> Any:
         elif do == 5 and isinstance(holder, dict):
             holder[rng.choice((*WORDS, "name", "version", "shape", "rows"))] = anything(rng)
         else:
-            other, there = rng.choice(found)
             with suppress(KeyError, IndexError):
-                holder[key] = json.loads(json.dumps(other[there]))
+                holder[key] = json.loads(json.dumps(other[0][other[1]]))
     return value
 
 
@@ -296,7 +300,7 @@ GOOD = 48  #: frames of the recordings
 @cache
 def _kept() -> tuple[Path, list[Any]]:
     """Return a folder of sound things, made once in a process and its children."""
-    folder = Path(tempfile.mkdtemp(prefix="foreign-"))
+    folder = Path(tempfile.mkdtemp(prefix="foreign-", dir=scratch()))
     given = frames(GOOD, pose=pose_at(3.0))
     return folder, given
 
@@ -765,12 +769,42 @@ def write_spec(rng: random.Random, folder: Path) -> Path:
 
 
 def read_spec(path: Path, _out: Path) -> None:
-    """Read specs."""
-    from generator.spec import read_specs
+    """Read specs; what is wrong has places in the files, causes and ways out."""
+    from generator.spec import SpecError, read_specs
 
-    for spec in read_specs([path]):
+    try:
+        specs = read_specs([path])
+    except SpecError as error:
+        for problem in error.problems:
+            mark = problem.mark
+            lines = len(mark.source.lines) if mark else 0
+            if not (problem.cause and problem.fix and problem.place) or (
+                mark and not (1 <= mark.line <= lines + 1 and mark.column >= 1)
+            ):
+                raise WrongValueError(f"a problem without a place: {problem.cause[:60]}") from error
+        raise
+    for spec in specs:
         if not 0 < spec.style.pitch_mm < 1e4:
             raise WrongValueError(f"a pitch of {spec.style.pitch_mm}")
+
+
+def read_by_command(path: Path, out: Path) -> None:
+    """Encode a spec by the whole command; what is refused leaves nothing."""
+    from generator.command import run
+
+    os.chdir(out)
+    said = io.StringIO()
+    with redirect_stderr(said), redirect_stdout(io.StringIO()):
+        code = run([str(path), "--format", "stl"])
+    if code == 0:
+        return
+    error = EncodedObjectsError(said.getvalue(), fix="-", place=path.name)
+    error.exit_code = code
+    if not all(word in said.getvalue() for word in ("error: ", "fix: ")):
+        error.fix = ""
+    if code == 2 and any(out.iterdir()):
+        raise LeftError(", ".join(one.name for one in out.iterdir()))
+    raise error
 
 
 # -- shapes
@@ -960,7 +994,7 @@ def _sql(rng: random.Random, path: Path) -> None:
             value = rng.choice((value, value, b"\xff\0", json.dumps(anything(rng)), "0" * 70_000))
             where = rng.choice(("", f" where rowid % {rng.choice((2, 3, 7))} = 0", " limit 1"))
             with suppress(sqlite3.Error):
-                do = rng.randrange(10)
+                do = rng.randrange(12)
                 if do < 6:
                     if where == " limit 1":
                         where = f" where {column} = (select {column} from {table} limit 1)"
@@ -981,6 +1015,9 @@ def _sql(rng: random.Random, path: Path) -> None:
                         "update meta set value = '0' where key = 'schema_version'",
                         "update meta set value = '../x' where key = 'lab_key'",
                         "create table sqlite (a)",
+                        *(f"update objects set name = '{name}'" for name in ("../x", "a/b", "..")),
+                        *(f"update parts set file = '{file}'" for file in (
+                            "../../secret.txt", "/etc/passwd", "lab.db", "../../../x.stl")),
                     )))  # fmt: skip
         if rng.random() < 0.1:
             base.execute("pragma writable_schema = on")
@@ -1372,6 +1409,7 @@ KINDS: dict[str, Kind] = {
     "sensor type": Kind(write_sensor_type, read_sensor_type),
     "printer": Kind(write_printer, read_printer),
     "spec": Kind(write_spec, read_spec),
+    "command": Kind(write_spec, read_by_command, longest_s=30.0),
     "stl": Kind(_shape_writer(".stl"), read_model),
     "obj": Kind(_shape_writer(".obj"), read_model),
     "step": Kind(_shape_writer(".step"), read_model_in_fork),
@@ -1405,10 +1443,11 @@ def attempt(name: str, number: int, root: Path) -> Outcome:
     """
     kind, rng = KINDS[name], random.Random(f"{name} {number}")
     box, spare = root / "box", root / ("bench-tmp" if name == "page" else "tmp")
-    shutil.rmtree(box, ignore_errors=True)
     given_folder, out = box / "in", box / "out"
     for folder in (given_folder, out, spare):
         folder.mkdir(parents=True, exist_ok=True)
+        if name != "page" or folder != spare:
+            _clear(folder)
     secret = root / "secret.txt"
     secret.write_bytes(SECRET)
     given = kind.write(rng, given_folder)
@@ -1421,7 +1460,7 @@ def attempt(name: str, number: int, root: Path) -> Outcome:
     os.chdir(box)
     start, megabytes = time.monotonic(), 0.0
     try:
-        with _watched() as took:
+        with _watched(kind.longest_s) as took:
             kind.read(given, out)
         what, detail = READ, ""
     except EncodedObjectsError as error:
@@ -1432,6 +1471,8 @@ def attempt(name: str, number: int, root: Path) -> Outcome:
         what, detail = "memory", _where(error)
     except LeakError as error:
         what, detail = "leak", str(error)
+    except LeftError as error:
+        what, detail = "left outside", f"of what was refused: {error}"
     except WrongValueError as error:
         what, detail = "wrong value", str(error)
     except Exception as error:  # noqa: BLE001  (which is what is looked for)
@@ -1448,10 +1489,8 @@ def attempt(name: str, number: int, root: Path) -> Outcome:
             what, detail = "left outside", "the secret was changed"
         elif megabytes * 2**20 > MOST_BYTES:
             what, detail = "memory", f"{megabytes:.0f} MB"
-        elif seconds > LONGEST_S:
+        elif seconds > kind.longest_s:
             what, detail = "hang", f"{seconds:.0f} s"
-    for left in [] if name == "page" else spare.iterdir():
-        shutil.rmtree(left) if left.is_dir() else left.unlink()
     return Outcome(what, detail, seconds, megabytes)
 
 
@@ -1460,7 +1499,7 @@ def _refusal(error: EncodedObjectsError, kind: Kind, path: Any) -> tuple[str, st
     said = f"{type(error).__name__}: {error.cause[:60]}"
     if error.exit_code not in kind.codes:
         return "wrong code", f"{error.exit_code} {said}"
-    text = error.as_text()
+    text = "".join(error.as_text().splitlines()) if error.place == "c.yaml" else error.as_text()
     named = not isinstance(path, Path) or not kind.placed or path.name in text
     if kind.file and path.name in ("c.yaml", "printer.yaml"):  # which name other files
         named = bool(error.place)
@@ -1480,6 +1519,20 @@ def _where(error: BaseException) -> str:
     return f"{type(error).__name__}: {str(error)[:60]!r} at {' < '.join(ours[:-4:-1])}"
 
 
+def _clear(folder: Path) -> None:
+    """Empty a folder."""
+    for entry in os.scandir(folder):
+        if entry.is_dir(follow_symlinks=False):
+            shutil.rmtree(entry.path)
+        else:
+            os.unlink(entry.path)
+
+
+def scratch() -> str | None:
+    """Return where cases are quick: in memory, where there is such a folder."""
+    return "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+
+
 def _names(root: Path) -> set[str]:
     """Return all names below the root but what a reader may make: its output, its session."""
     found = set()
@@ -1494,12 +1547,12 @@ def _names(root: Path) -> set[str]:
 
 
 @contextmanager
-def _watched() -> Iterator[list[float]]:
+def _watched(longest_s: float) -> Iterator[list[float]]:
     """Bound time and memory; yields a list of the megabytes that were taken at most."""
     took = [0.0]
 
     def late(*_: object) -> None:
-        raise HangError(f"longer than {LONGEST_S:g} s")
+        raise HangError(f"longer than {longest_s:g} s")
 
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
@@ -1507,7 +1560,7 @@ def _watched() -> Iterator[list[float]]:
     limits = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (size + ROOM, limits[1]))
     handler = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, LONGEST_S)
+    signal.setitimer(signal.ITIMER_REAL, longest_s)
     try:
         yield took
     finally:

@@ -30,7 +30,7 @@ import foreign
 import runner
 
 BATCH = 250  #: cases of a worker
-LATE_S = 4 * foreign.LONGEST_S  #: after which a worker without a word is killed
+LATE_S = 60.0  #: after which a worker without a word is killed
 LISTED = 5  #: cases of a fault that are kept by number
 HEADS = ("kind", "cases", foreign.READ, foreign.REFUSED, *foreign.FAULTS, "ms a case", "MB")
 
@@ -87,7 +87,10 @@ def campaign(kind: str, asked: Any) -> list[dict[str, Any]]:
     rows = [json.loads(line) for line in file.read_text("utf-8").splitlines()]
     end_s = time.monotonic() + 60 * asked.minutes - sum(row["seconds"] for row in rows)
     done = sum(row["cases"] for row in rows)
-    with tempfile.TemporaryDirectory(prefix="fuzz-") as folder, file.open("a") as out:
+    with (
+        tempfile.TemporaryDirectory(prefix="fuzz-", dir=foreign.scratch()) as folder,
+        file.open("a") as out,
+    ):
         if done < asked.cases:
             foreign.prepare(kind, Path(folder))
         while done < asked.cases and time.monotonic() < end_s:

@@ -5,19 +5,23 @@ The damage is that of `foreign`, by numbers; `tests/campaigns/fuzz.py` goes on w
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
+
 import foreign
 import pytest
 
-CASES = {"step": 25, "database": 60, "import": 60}  #: of a kind; others have `USUAL`
+CASES = {"step": 25, "database": 60, "import": 60, "command": 25, "spec": 250}  #: of a kind; others have `USUAL`
 USUAL = 150
 
 
 @pytest.fixture(scope="module")
-def root(tmp_path_factory):
+def root():
     """A folder of cases; the page's session, if there is one, ends with it."""
-    yield tmp_path_factory.mktemp("foreign")
-    while foreign._PAGE:
-        foreign._PAGE.pop().close()
+    with tempfile.TemporaryDirectory(prefix="foreign-", dir=foreign.scratch()) as folder:
+        yield Path(folder)
+        while foreign._PAGE:
+            foreign._PAGE.pop().close()
 
 
 @pytest.mark.parametrize("kind", foreign.KINDS)
