@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.foreign import open_regular
 from generator.errors import ShapeError
 from generator.polyhedron.read import file_content
 from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
@@ -36,7 +37,7 @@ def part_state(url: URL, part: RegisteredPart) -> PartState:
 
     path = part_path(url, part.file)
     try:
-        with open(path, "rb") as file:
+        with open_regular(path) as file:
             same = hashlib.file_digest(file, "sha256").hexdigest() == part.sha256
         state = "ok" if same else "changed"
     except (FileNotFoundError, NotADirectoryError):

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from encoded_objects.base.foreign import foreign_bytes
 from generator.errors import ShapeError
 from generator.polyhedron.read.mesh import solid_of_soup
 from generator.polyhedron.read.obj import read_obj
@@ -73,20 +74,13 @@ def _check_size(solid: Polyhedron) -> None:
 
 def file_content(file: Path, place: str, largest: int) -> bytes:
     """Return the bytes of a file, at least one and at most `largest`; `ShapeError` if it cannot."""
-    try:
-        size = file.stat().st_size
-        if size > largest:
-            raise ShapeError(
-                f"the file has {size / 2**20:.0f} MB; {largest // 2**20} MB are allowed",
-                fix="simplify the model: planar faces need few triangles",
-                place=place,
-            )
-        content = file.read_bytes()
-    except OSError as error:
-        reason = (error.strerror or "cannot be read").lower()
-        raise ShapeError(
-            reason, fix="give the path of a file that you can read", place=place
-        ) from None
+    content = foreign_bytes(
+        file,
+        lambda cause, **rest: ShapeError(cause, **rest | {"place": place}),
+        most=largest,
+        fix="give the path of a file that you can read",
+        large="simplify the model: planar faces need few triangles",
+    )
     if not content:
         raise ShapeError("the file is empty", fix="export the model again", place=place)
     return content
