@@ -41,7 +41,6 @@ _MOST_FILES: Final = 64  #: open at once in a process of its own; ours take a do
 _LOOK_S: Final = 0.05  #: between two looks at such a process
 
 _KINDS: Final = (
-    (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a named pipe"),
     (stat.S_ISSOCK, "a socket"),
     (stat.S_ISCHR, "a device"),
@@ -53,6 +52,9 @@ class NotRegularError(OSError):
     """A folder, a device, a pipe or a socket where a file should be; raised before it is opened."""
 
     def __init__(self, path: str | os.PathLike[str], mode: int) -> None:
+        if stat.S_ISDIR(mode):
+            super().__init__(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
+            return
         found = next((kind for is_kind, kind in _KINDS if is_kind(mode)), "something else")
         super().__init__(errno.EINVAL, f"it is {found}, not a file", os.fspath(path))
 

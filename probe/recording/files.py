@@ -38,6 +38,7 @@ _FIXES = {
     errno.ENOTDIR: "a file stands where the folder should be",
     errno.EISDIR: "this is a folder: name a file in it",
     errno.ENAMETOOLONG: "take a shorter name",
+    errno.EINVAL: "give the file of a recording",
 }
 
 

@@ -306,7 +306,7 @@ def _counts(image: Message, number: int, path: Path) -> NDArray[Any]:
     kind = _ENCODINGS.get(image["encoding"])
     if kind is None:
         raise RecordingError(
-            f"image {number} is encoded as {image['encoding'][:40]!r}",
+            f"image {number} is encoded as {image['encoding'][:40]}",
             fix=f"take {', '.join(_ENCODINGS)}", place=str(path)
         )  # fmt: skip
     order = ">" if image["is_bigendian"] else "<"

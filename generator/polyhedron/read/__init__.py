@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from encoded_objects.base.foreign import foreign_bytes
 from generator.errors import ShapeError
@@ -54,7 +55,7 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
             solid = read_step(content, place, scale)
         else:
             solid = solid_of_soup(MESHES[suffix](content, place), "file", scale)
-        _check_size(solid)
+        check_size(solid.vertices, place)
         return solid
     except ShapeError as error:
         if error.place.startswith(place):
@@ -63,12 +64,14 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
         raise ShapeError(error.cause, fix=error.fix, place=where) from None
 
 
-def _check_size(solid: Polyhedron) -> None:
-    largest = float(np.ptp(solid.vertices, axis=0).max())
+def check_size(points: NDArray[np.float64], place: str) -> None:
+    """Refuse points (n, 3), mm, that are farther from one another than a length in a spec."""
+    largest = float(np.ptp(points, axis=0).max())
     if largest > LARGEST_MM:
         raise ShapeError(
             f"the model is {largest / 1000:.3g} m long; {LARGEST_MM / 1000:g} m are allowed",
             fix="check its unit: shape: {file: ..., scale: 0.001} makes it a thousandth",
+            place=place,
         )
 
 

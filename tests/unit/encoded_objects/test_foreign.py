@@ -31,7 +31,6 @@ from recognizer.sensor.file import read_state
 def odd(tmp_path):
     """Return what may stand where a file should be, by its name in messages."""
     os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "folder").mkdir()
     bound = socket.socket(socket.AF_UNIX)
     before = os.getcwd()
     os.chdir(tmp_path)  # the name of a socket is short
@@ -41,7 +40,6 @@ def odd(tmp_path):
     return {
         "a device": "/dev/zero",
         "a named pipe": tmp_path / "pipe",
-        "a folder": tmp_path / "folder",
         "a socket": tmp_path / "socket",
     }
 
@@ -55,10 +53,12 @@ def linked(tmp_path, target, name):
 
 
 def test_only_regular_files_are_opened(odd, tmp_path):
-    for name, path in odd.items():
-        for open_it in (open_regular, regular_size):
+    for open_it in (open_regular, regular_size):
+        for name, path in odd.items():
             with pytest.raises(OSError, match=f"it is {name}, not a file"):
                 open_it(path)
+        with pytest.raises(OSError, match="Is a directory"):
+            open_it(tmp_path)
     file = tmp_path / "a"
     file.write_bytes(b"12")
     with open_regular(linked(tmp_path, file, "link")) as opened:
@@ -83,8 +83,8 @@ READERS = {
 
 @pytest.mark.parametrize("name", READERS)
 def test_every_reader_refuses_what_is_no_file(name, odd, tmp_path):
-    for kind in ("a device", "a named pipe", "a socket"):
-        link = linked(tmp_path, odd[kind], name)
+    for kind, path in odd.items():
+        link = linked(tmp_path, path, name)
         with pytest.raises(EncodedObjectsError) as refused:
             READERS[name](link)
         assert str(link) in refused.value.place
