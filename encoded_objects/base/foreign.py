@@ -102,7 +102,7 @@ def foreign_bytes(
         raise refuse(f"cannot be read: {error.strerror}", fix=fix, place=place) from error
     size = max(size, len(content))  # it may grow meanwhile
     if size > most:
-        cause = f"has {_size_words(size)}; {_size_words(most)} are allowed"
+        cause = f"the file has {_size_words(size)}; {_size_words(most)} are allowed"
         raise refuse(cause, fix=large or fix, place=place)
     return content
 
