@@ -1149,7 +1149,7 @@ def read_packets(given: tuple[list[bytes], set[int]], _out: Path) -> None:
             *(receiver.settle(now) if len(piece) == 7 else ()),
         ):
             if frame.counts.shape == (16, 16) and frame.counts.max() > 0:
-                true = _kept()[1][frame.seq % GOOD]
+                true = _kept()[1][frame.seq % 65536 % GOOD]
                 if not (frame.counts == true.counts).all() and frame.counts.max() < 1023:
                     raise WrongValueError("a frame that was not sent")
     receiver.statistics()
