@@ -52,7 +52,7 @@ SECRET = b"kept to itself " * 80  #: of a file next to the folder that is given
 LONGEST_S = 5.0  #: of a case
 MOST_BYTES = 512 << 20  #: of memory that a case may take
 BOMBS_MB = (64, 640)  #: what zips unpack to
-ROOM = 1 << 30  #: bytes of addresses; what asks for more fails at once
+ROOM = 3 << 29  #: bytes of addresses; what asks for more fails at once
 
 READ, REFUSED = "read", "refused"
 FAULTS = ("traceback", "wrong code", "no place", "hang", "memory", "left outside", "leak",
@@ -95,6 +95,7 @@ class Kind:
     file: bool = True  #: a file is read, which may also be no file
     placed: bool = True  #: errors name the file
     longest_s: float = LONGEST_S
+    most_bytes: int = MOST_BYTES
     sound: tuple[Callable[[], Any], ...] = ()  #: make what is damaged, once
 
 
@@ -1402,14 +1403,14 @@ def read_request(made: dict[str, Any], out: Path) -> None:
 
 KINDS: dict[str, Kind] = {
     "recording": Kind(write_recording, read_recording, sound=(recordings,)),
-    "array": Kind(write_array, read_array, sound=(arrays,)),
+    "array": Kind(write_array, read_array, most_bytes=2 * MOST_BYTES, sound=(arrays,)),
     "mcap": Kind(write_mcap, read_mcap, sound=(mcap_file,)),
     "calibration": Kind(write_calibration, read_calibration),
     "state": Kind(write_state, read_state, sound=(state_text,)),
     "sensor type": Kind(write_sensor_type, read_sensor_type),
     "printer": Kind(write_printer, read_printer),
     "spec": Kind(write_spec, read_spec),
-    "command": Kind(write_spec, read_by_command, longest_s=30.0),
+    "command": Kind(write_spec, read_by_command, (1, 2, 4), longest_s=30.0),
     "stl": Kind(_shape_writer(".stl"), read_model),
     "obj": Kind(_shape_writer(".obj"), read_model),
     "step": Kind(_shape_writer(".step"), read_model_in_fork),
@@ -1418,7 +1419,7 @@ KINDS: dict[str, Kind] = {
     "import": Kind(write_database, read_exchange, (4,), sound=(labs,)),
     "packets": Kind(write_packets, read_packets, file=False),
     "line": Kind(write_line, read_line, file=False),
-    "port": Kind(write_url, read_url, (2, 3), file=False, placed=False, sound=(recordings,)),
+    "port": Kind(write_url, read_url, (2, 3, 4), file=False, placed=False, sound=(recordings,)),
     "page": Kind(write_request, read_request, file=False, sound=(labs, recordings, state_text)),
 }
 
@@ -1487,7 +1488,7 @@ def attempt(name: str, number: int, root: Path) -> Outcome:
             what, detail = "left outside", ", ".join(new)[:80]
         elif secret.read_bytes() != SECRET:
             what, detail = "left outside", "the secret was changed"
-        elif megabytes * 2**20 > MOST_BYTES:
+        elif megabytes * 2**20 > kind.most_bytes:
             what, detail = "memory", f"{megabytes:.0f} MB"
         elif seconds > kind.longest_s:
             what, detail = "hang", f"{seconds:.0f} s"
@@ -1500,6 +1501,7 @@ def _refusal(error: EncodedObjectsError, kind: Kind, path: Any) -> tuple[str, st
     if error.exit_code not in kind.codes:
         return "wrong code", f"{error.exit_code} {said}"
     text = "".join(error.as_text().splitlines()) if error.place == "c.yaml" else error.as_text()
+    text += " lab.db" if "home.db" in text else ""  # the two of an import
     named = not isinstance(path, Path) or not kind.placed or path.name in text
     if kind.file and path.name in ("c.yaml", "printer.yaml"):  # which name other files
         named = bool(error.place)
