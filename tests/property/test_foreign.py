@@ -17,6 +17,7 @@ import foreign
 import pytest
 
 from encoded_objects.base.errors import EncodedObjectsError
+from probe.recording.ros import DEFINITIONS, IMAGE
 
 CASES = {
     "step": 25,
@@ -57,7 +58,7 @@ def _mcap_with(more):
     out = io.BytesIO()
     writer = Writer(out)
     writer._writer.add_metadata("recording", {"more": json.dumps(more)})
-    schema = writer.register_msgdef(foreign.IMAGE, foreign.DEFINITIONS[foreign.IMAGE])
+    schema = writer.register_msgdef(IMAGE, DEFINITIONS[IMAGE])
     writer.write_message("/t", schema, foreign.IMAGE_OF_ZEROS, log_time=5, sequence=0)
     writer.finish()
     return out.getvalue()
@@ -98,7 +99,7 @@ def _packed_by_lzma():
 
 LONG = "x" * 300
 FOUND = {
-    "half a letter": ("sensor type", "mine.yaml", lambda: b'name: "\\ud800"\n', "half a letter"),
+    "half a letter": ("sensor type", "half.yaml", lambda: b'name: "\\ud800"\n', "half a letter"),
     "half a letter as a name": ("spec", "c.yaml", lambda: b'"\\ud800": 1\n', "half a letter"),
     "a name too long, of a spec": (
         "spec", "c.yaml", lambda: f"objects: [{LONG}.yaml]\n".encode(), "name too long",
@@ -108,13 +109,13 @@ FOUND = {
     "a chunk of another check sum": ("mcap", "a.mcap", _mcap_of_another_sum, "damaged"),
     "a plate packed by LZMA": ("3mf", "p.3mf", _packed_by_lzma, "no plate"),
     "glyphs that are a number": (
-        "database", "lab.db", lambda: _lab_where("update alphabets set definition = '0'"), "damaged",
+        "database", "lab.db", lambda: _lab_where("update alphabets set definition = 0"), "damaged",
     ),
     "no vertex of a face": (
         "database", "lab.db", lambda: _lab_where("delete from faces_to_vertices"), "damaged",
     ),
     "a pose that is no JSON": (
-        "import", "lab.db", lambda: _lab_where("update parts set t_object_part = '['"), "lab.db",
+        "import", "lab.db", lambda: _lab_where("update parts set T_object_part = '['"), "be read",
     ),
 }  # fmt: skip
 
@@ -133,7 +134,7 @@ def test_what_was_found_is_refused(case, tmp_path):
     assert said.lower() in caught.value.as_text().lower()
 
 
-@pytest.mark.parametrize("url", [f"sim:?sensor_type={LONG}", f"file:{LONG}"])
+@pytest.mark.parametrize("url", [f"sim:?sensor_type={LONG}", f"file:{LONG}", f"serial:///{LONG}"])
 def test_names_that_are_too_long_are_refused(url, tmp_path):
     with pytest.raises(EncodedObjectsError) as caught:
         foreign.read_url(url, tmp_path)
