@@ -884,14 +884,14 @@ def read_model_in_fork(path: Path, out: Path) -> None:
     """Read a STEP model with the kernel in a fork of this process, which has it loaded."""
     from generator.polyhedron.read import kernel, step
 
-    def run(command: list[str], **_: object) -> None:
+    def run(_module: str, arguments: list[str], **_: object) -> tuple[int, bytes]:
         child = os.fork()
         if child == 0:
             code = 1
             with suppress(BaseException):
                 for stream in (1, 2):
                     os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
-                kernel.main(*command[3:])
+                kernel.main(*arguments)
                 code = 0
             os._exit(code)
         try:
@@ -900,17 +900,16 @@ def read_model_in_fork(path: Path, out: Path) -> None:
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
             raise
-        if status:
-            raise step.subprocess.CalledProcessError(status, command)
+        return os.waitstatus_to_exitcode(status), b""
 
     import OCP.STEPControl  # noqa: F401 - loaded before the fork
 
-    before = step.subprocess.run
-    step.subprocess.run = run
+    before = step.run_limited
+    step.run_limited = run
     try:
         read_model(path, out)
     finally:
-        step.subprocess.run = before
+        step.run_limited = before
 
 
 # -- G-code and 3MF

@@ -24,7 +24,6 @@ from generator.database.transaction import (
     place_of,
     read_transaction,
     retry_on_conflict,
-    rows_explained,
     write_transaction,
 )
 from generator.database.transfer import CopyReport, copy_objects
@@ -116,11 +115,10 @@ def import_objects(
     with _open_unchanged(home) as source_engine, read_transaction(source_engine) as source:
 
         def work(target: Connection) -> CopyReport:
-            with rows_explained(home):
-                carried = copy_objects(
-                    source, target, names=names, renamed=renamed, origin=origin,
-                    skip_refused=skip_refused, homes=(home, engine_home),
-                )  # fmt: skip
+            carried = copy_objects(
+                source, target, names=names, renamed=renamed, origin=origin,
+                skip_refused=skip_refused, homes=(home, engine_home),
+            )  # fmt: skip
             if dry_run:
                 target.rollback()
             return carried
