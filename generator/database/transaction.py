@@ -124,12 +124,14 @@ def _is_of_rows(error: BaseException) -> bool:
     """Tell whether an error came up where rows are read, not in the work of a transaction."""
     if isinstance(error, SQLAlchemyError | DatabaseError):
         return isinstance(error, SQLAlchemyError)
-    names = {frame.f_globals.get("__name__", "") for frame, _ in walk_tb(error.__traceback__)}
+    names = [frame.f_globals.get("__name__", "") for frame, _ in walk_tb(error.__traceback__)]
     if isinstance(error, GeneratorError):  # a value that nothing can be made from
         return "generator.database.read" in names
-    return any(
-        name.startswith(("sqlalchemy.", "generator.database.")) for name in names - {__name__}
-    )
+    ours = [name for name in names if name.startswith(("sqlalchemy.", "generator.database."))]
+    ours = [name for name in ours if name != __name__]
+    return (
+        bool(ours) and ours[-1] != "generator.database.register"
+    )  # which refuses what it is given
 
 
 def explain_error(error: Exception, url: URL) -> DatabaseError:
