@@ -9,12 +9,13 @@ import json
 import subprocess
 import sys
 import tempfile
+import threading
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
-from recognizer.bench.errors import BenchError
+from recognizer.bench.errors import BenchError, BusyError
 
 EXAMPLE = "Example"
 SPEC = f"""# An example, made by open-bench.
@@ -23,6 +24,21 @@ shape: {{cube: 60 mm}}
 """
 EXAMPLE_S = 120.0  #: longest time to make the example
 PROMISE_S = 60.0  #: longest time that `encode-object show` may take
+MEMORY = 4 * 1024**3  #: bytes of addresses of the command; the example takes 0.6 GB
+
+# It ends when the thread that began it does, however that ended.
+_START = """
+import ctypes, resource, signal, sys
+ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+memory, seconds = map(int, (sys.argv.pop(1), sys.argv.pop(1)))
+resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+from generator.command import main
+main()
+"""
+_RUNNING: set[subprocess.Popen[str]] = set()
+_TURN = threading.Lock()  #: one command at a time
+_ENDING = threading.Event()
 
 
 def make_example(folder: Path, database: str) -> str:
@@ -86,10 +102,26 @@ def face_promises(
     return {face["name"]: face["promise"] for face in found["faces"] if face["promise"]}
 
 
+def end_all() -> None:
+    """Kill the commands that run, and begin no other: the server ends."""
+    _ENDING.set()
+    for running in tuple(_RUNNING):
+        running.kill()
+
+
 def _run(*words: str, longest_s: float, folder: Path | None = None) -> tuple[int, str]:
     """Run the command in a folder; returns its exit code and what it printed as JSON."""
-    done = subprocess.run(  # noqa: S603, our own command
-        [sys.executable, "-c", "from generator.command import main; main()", *words, "--json"],
-        cwd=folder, capture_output=True, text=True, timeout=longest_s, check=False,
-    )  # fmt: skip
-    return done.returncode, done.stdout
+    command = [sys.executable, "-c", _START, str(MEMORY), str(int(longest_s)), *words, "--json"]
+    with _TURN, subprocess.Popen(  # noqa: S603, our own command
+        command, cwd=folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as running:  # fmt: skip
+        _RUNNING.add(running)
+        try:
+            if _ENDING.is_set():
+                raise BusyError("open-bench ends", fix="start it again")
+            output, _ = running.communicate(timeout=longest_s)
+        finally:
+            running.kill()
+            _RUNNING.discard(running)
+    return running.returncode, output

@@ -260,12 +260,12 @@ class RecognitionThread:
             self._reload = True
             self._news.notify()
 
-    def close(self) -> None:
-        """End the thread."""
+    def close(self, longest_s: float | None = None) -> None:
+        """End the thread; wait no longer than that for it."""
         with self._news:
             self._stop = True
             self._news.notify()
-        self._thread.join()
+        self._thread.join(longest_s)
 
     def _run(self) -> None:
         self._prepare()
