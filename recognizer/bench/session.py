@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +61,7 @@ class Session:
         self._noted = 0
         self._started_ms = time.time() * 1e3
         self.learning: float | None = None  #: share of the learning that is done; None: none is
+        self.mounting: tuple[str, ...] | None = None  #: changes that a touch by hand has shown
         self.learned: dict[str, str] | None = None  #: name and words of the state in use
         self.ending = False  #: set by a signal: what reads a whole recording ends
         self._reading = threading.Lock()  #: of a whole recording
@@ -245,7 +247,9 @@ class Session:
                     self.report()
 
     def _leave(self) -> None:
-        """Close what is connected."""
+        """Close what is connected; how another sensor is mounted is not known."""
+        self.mounting, state = None, self.recognition.state
+        self.recognition.use_state(None if state is None else replace(state, mounting=None))
         self.frames.leave()
         feed, self.feed = self.feed, Feed()
         feed.close()
