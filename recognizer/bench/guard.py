@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import asyncio
 import hmac
-import ipaddress
 import re
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -29,6 +28,7 @@ from starlette.responses import JSONResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
+from encoded_objects.base.network import is_loopback
 from recognizer.bench.files import UPLOAD
 
 COOKIE = "open-bench"
@@ -65,16 +65,6 @@ class AccessRules:
     token: str = ""  #: empty: none is asked for
     body: int = 64 * 1024  #: bytes of a request
     upload: int = UPLOAD  #: bytes of a recording that is sent in
-
-
-def is_loopback(host: str) -> bool:
-    """Tell whether an address is reached from this machine only."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def access_rules(host: str, token: str) -> AccessRules:

@@ -20,6 +20,7 @@ from typing import Any
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from encoded_objects.base.network import is_loopback
 from encoded_objects.base.sensor_type import choose_sensor_type
 from generator.database import DatabaseError
 from generator.database.open import database_exists
@@ -27,7 +28,7 @@ from probe.errors import ProbeError
 from recognizer.bench.app import application
 from recognizer.bench.broker import Broker
 from recognizer.bench.errors import BenchError
-from recognizer.bench.guard import RequestGuard, access_rules, is_loopback
+from recognizer.bench.guard import RequestGuard, access_rules
 from recognizer.bench.options import LAB, BenchOptions
 from recognizer.bench.session import Session
 

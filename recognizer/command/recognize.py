@@ -255,7 +255,7 @@ def _sinks(options: RecognizeOptions, origin: RecordingOrigin) -> Iterator[Answe
     if options.publish:
         from recognizer.command.publish import PublishSink
 
-        yield PublishSink(options.publish)
+        yield PublishSink(options.publish, options.publish_users, to_all=options.open)
 
 
 def _wiring(flip: str, learning: SensorLearning) -> Wiring | None:

@@ -7,6 +7,7 @@ import socket
 
 import pytest
 
+from encoded_objects.base.network import is_loopback
 from recognizer.bench.command import main
 from recognizer.bench.guard import (
     AT_ONCE,
@@ -14,7 +15,6 @@ from recognizer.bench.guard import (
     AccessRules,
     RequestGuard,
     access_rules,
-    is_loopback,
 )
 from recognizer.bench.serve import _address
 
