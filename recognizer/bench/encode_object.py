@@ -6,14 +6,13 @@ It runs as the command, since making and reading share the database alone.
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import tempfile
 import threading
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from encoded_objects.base.foreign import run_limited
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from recognizer.bench.errors import BenchError, BusyError
 
@@ -25,18 +24,8 @@ shape: {{cube: 60 mm}}
 EXAMPLE_S = 120.0  #: longest time to make the example
 PROMISE_S = 60.0  #: longest time that `encode-object show` may take
 MEMORY = 4 * 1024**3  #: bytes of addresses of the command; the example takes 0.6 GB
+WRITTEN = 1024**3  #: bytes of a file that it writes
 
-# It ends when the thread that began it does, however that ended.
-_START = """
-import ctypes, resource, signal, sys
-ctypes.CDLL(None).prctl(1, signal.SIGKILL)
-memory, seconds = map(int, (sys.argv.pop(1), sys.argv.pop(1)))
-resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-from generator.command import main
-main()
-"""
-_RUNNING: set[subprocess.Popen[str]] = set()
 _TURN = threading.Lock()  #: one command at a time
 _ENDING = threading.Event()
 
@@ -56,7 +45,7 @@ def make_example(folder: Path, database: str) -> str:
         if not spec.exists():
             spec.write_text(SPEC, encoding="utf-8")
         code, output = _run(spec.name, "--database", database, folder=folder, longest_s=EXAMPLE_S)
-    except (OSError, subprocess.TimeoutExpired) as error:
+    except (OSError, TimeoutError) as error:
         raise BenchError(f"no example could be made: {error}", fix="see that the folder can be "
                          "written, or make one by encode-object") from error  # fmt: skip
     if code:
@@ -94,7 +83,7 @@ def face_promises(
                 longest_s=PROMISE_S,
             )  # fmt: skip
         found = json.loads(output)
-    except (OSError, ValueError, subprocess.TimeoutExpired) as error:
+    except (OSError, ValueError, TimeoutError) as error:
         raise BenchError(f"the promise of {name} is not known: {error}", fix="try again") from error
     if "error" in found:
         reason = found["error"]
@@ -103,25 +92,23 @@ def face_promises(
 
 
 def end_all() -> None:
-    """Kill the commands that run, and begin no other: the server ends."""
+    """End the command that runs, and begin no other: the server ends."""
     _ENDING.set()
-    for running in tuple(_RUNNING):
-        running.kill()
 
 
 def _run(*words: str, longest_s: float, folder: Path | None = None) -> tuple[int, str]:
-    """Run the command in a folder; returns its exit code and what it printed as JSON."""
-    command = [sys.executable, "-c", _START, str(MEMORY), str(int(longest_s)), *words, "--json"]
-    with _TURN, subprocess.Popen(  # noqa: S603, our own command
-        command, cwd=folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    ) as running:  # fmt: skip
-        _RUNNING.add(running)
-        try:
-            if _ENDING.is_set():
-                raise BusyError("open-bench ends", fix="start it again")
-            output, _ = running.communicate(timeout=longest_s)
-        finally:
-            running.kill()
-            _RUNNING.discard(running)
-    return running.returncode, output
+    """Run the command in a folder; returns its exit code and what it printed as JSON.
+
+    Raises
+    ------
+    BusyError
+        The server ends.
+    """
+    with _TURN:
+        code, printed = run_limited(
+            "generator.command", [*words, "--json"], memory_bytes=MEMORY, cpu_s=longest_s,
+            written_bytes=WRITTEN, folder=folder, ending=_ENDING.is_set,
+        )  # fmt: skip
+    if _ENDING.is_set():
+        raise BusyError("open-bench ends", fix="start it again")
+    return code, printed.decode()

@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - a command a line
 """Every page of help, what every command says as text and as JSON, and every sort of error.
 
 Command -> exit code, stdout (as JSON where it is), stderr. Commands run in one folder after

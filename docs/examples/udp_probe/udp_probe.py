@@ -4,7 +4,7 @@
     probe-sensor live 'udp://127.0.0.1:5005?sensor_type=fsr-8x8'
     recognize-object --port 'udp://127.0.0.1:5005?sensor_type=fsr-8x8' --follow
 
-A sensor on another machine sends to an address of this one: give that address, and know that whoever
+A sensor on another machine sends to an address of this one: give that one, and know that whoever
 reaches it can send images too.
 
 `CommandedProbe` answers commands for a sensor that takes none; what is left to write is `read`.
