@@ -44,8 +44,9 @@ class Reader(PreparedLab):
     >>> import tempfile
     >>> import numpy as np
     >>> from encoded_objects import Reader, encode, open_lab, simulate
-    >>> lab = tempfile.mkdtemp() + "/lab.db"
-    >>> _ = encode({"name": "Cube", "shape": {"cube": "40 mm"}}, database=lab, formats=())
+    >>> folder = tempfile.mkdtemp()
+    >>> lab, cube = folder + "/lab.db", {"name": "Cube", "shape": {"cube": "40 mm"}}
+    >>> _ = encode(cube, database=lab, folder=folder, formats=())
     >>> touch = simulate(lab + "#Cube/F1", x=20, y=19, theta=23, force=80)
     >>> reader = Reader(open_lab(lab))
     >>> answer = reader.read(next(touch.frames()).counts)
