@@ -27,7 +27,7 @@ from generator.database.open import part_file, part_path
 from generator.database.read import find_object, list_objects, object_entry, read_array
 from generator.database.registered import ObjectEntry, digest
 from generator.database.rows import definition_number, definition_of, insert_rows
-from generator.database.transaction import place_of
+from generator.database.transaction import explain_failures, place_of
 from generator.errors import DatabaseError, GeneratorError
 
 Rows = list[dict[str, Any]]
@@ -267,23 +267,24 @@ def copy_objects(
         An object is refused (unless `skip_refused`), or no object has a name asked for.
     """
     new_names = dict(renamed or {})
-    for name in (*names, *new_names):
-        object_entry(source, name)
     homes = homes or (source.engine.url, target.engine.url)
     arrays: dict[int, ArrayHere] = {}
     copied, known, refused = [], [], []
-    for entry in list_objects(source):
-        if names and entry.name not in names:
-            continue
-        name = new_names.get(entry.name, entry.name)
-        try:
-            if _copy_object(source, target, entry, name, arrays, origin, homes):
-                copied.append(name)
-            else:
-                known.append(name)
-        except CopyRefusedError as error:
-            shown = name if name.isprintable() else repr(name)
-            refused.append(RefusedCopy(shown, error.cause, error.fix))
+    with explain_failures(source.engine, homes[0], alone=False):
+        for name in (*names, *new_names):
+            object_entry(source, name)
+        for entry in list_objects(source):
+            if names and entry.name not in names:
+                continue
+            name = new_names.get(entry.name, entry.name)
+            try:
+                if _copy_object(source, target, entry, name, arrays, origin, homes):
+                    copied.append(name)
+                else:
+                    known.append(name)
+            except CopyRefusedError as error:
+                shown = name if name.isprintable() else repr(name)
+                refused.append(RefusedCopy(shown, error.cause, error.fix))
     if refused and not skip_refused:
         raise _refusal(refused, place_of(homes[1]))
     return CopyReport(tuple(copied), tuple(known), tuple(refused))

@@ -19,10 +19,8 @@ from encoded_objects.base.files import staged_file
 from generator.database.open import normal_url
 from generator.database.part_file import part_state
 from generator.database.registered import RegisteredPart
-from probe.errors import RecordingError
-from probe.recording.read import Recording
+from recognizer.bench.convert import convert_recording
 from recognizer.bench.errors import BenchError, BusyError, TooLongError, UnknownError
-from recognizer.bench.feed import playable_blocks
 
 LISTED = 200  #: files of a kind that are offered
 AT_ONCE = 2  #: recordings that are uploaded at the same time
@@ -118,13 +116,20 @@ class Uploads:
         self._coming.add(name)
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            with staged_file(path) as draft:
-                await self._write(draft, chunks)
-                return await run_in_threadpool(_count_frames, draft, name, self._ending)
+            with staged_file(path, replace=False) as copy:
+                sent = copy.with_suffix(".sent.h5")
+                try:
+                    room = await self._write(sent, chunks)
+                    return await run_in_threadpool(
+                        convert_recording, sent, copy, name, room=room, ending=self._ending
+                    )
+                finally:
+                    sent.unlink(missing_ok=True)
         finally:
             self._coming.discard(name)
 
-    async def _write(self, draft: Path, chunks: AsyncIterator[bytes]) -> None:
+    async def _write(self, draft: Path, chunks: AsyncIterator[bytes]) -> int:
+        """Write what comes; returns the bytes that are left for recordings."""
         room = QUOTA - folder_bytes(self._folder)
         began_s, came, coming = time.monotonic(), 0, aiter(chunks)
         with draft.open("wb") as file:
@@ -133,7 +138,7 @@ class Uploads:
                 try:
                     chunk = await asyncio.wait_for(anext(coming), min(left_s, SILENT_S))
                 except StopAsyncIteration:
-                    return
+                    return room
                 except TimeoutError:
                     raise BenchError(
                         f"{came:,} bytes came in {time.monotonic() - began_s:.0f} s",
@@ -148,17 +153,6 @@ class Uploads:
                         fix="move old ones elsewhere",
                     )
                 file.write(chunk)
-
-
-def _count_frames(draft: Path, name: str, ending: Callable[[], bool]) -> int:
-    """Return the frames of an uploaded file, of which every value is looked at."""
-    try:
-        recording = Recording(draft)
-        for _ in playable_blocks(recording, ending):
-            pass
-    except (RecordingError, BenchError) as error:
-        raise type(error)(error.cause, fix=error.fix, place=name) from error
-    return len(recording)
 
 
 def folder_bytes(folder: Path) -> int:

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hostile_recordings import write_zeros
+from hostile_recordings import write_hostile, write_zeros
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.open import open_database
@@ -133,6 +133,25 @@ def test_a_recording_that_is_sent_in_is_kept_only_if_it_is_one(tmp_path):
             taken_in(uploads, "b.h5", bad)
     assert [path.name for path in (tmp_path / "kept").iterdir()] == ["a.h5"]
     assert (tmp_path / "kept" / "a.h5").read_bytes() == content
+
+
+def test_what_is_sent_in_is_read_by_a_process_with_limits(tmp_path, monkeypatch):
+    content = recorded(tmp_path / "mine.h5", [0, 9]).read_bytes()
+    kept = tmp_path / "kept"
+    with pytest.raises(BusyError, match="ends"):
+        taken_in(Uploads(kept, lambda: True), "a.h5", content)
+    monkeypatch.setattr("recognizer.bench.convert._MEMORY", 1 << 26)
+    with pytest.raises(RecordingError, match=r"a.h5: it takes more memory or time"):
+        taken_in(Uploads(kept), "a.h5", content)
+    assert list(kept.iterdir()) == []
+
+
+@pytest.mark.parametrize("kind", ["external storage", "external link", "10^9 images"])
+def test_what_leads_out_or_claims_much_is_not_kept(kind, tmp_path):
+    content = write_hostile(kind, tmp_path / "mine.h5").read_bytes()
+    with pytest.raises(RecordingError, match=r"a.h5: /frames (leads|claims)"):
+        taken_in(Uploads(tmp_path / "kept"), "a.h5", content)
+    assert list((tmp_path / "kept").iterdir()) == []
 
 
 def test_recordings_that_cannot_be_played_are_not_read(tmp_path, monkeypatch):
