@@ -133,13 +133,14 @@ def foreign_member(archive: ZipFile, name: str, most: int) -> bytes:
 
     Raises `ValueError` where it is longer, and what is in `DAMAGE`.
     """
+    from lzma import LZMAError
     from zipfile import BadZipFile
 
     try:
         if archive.getinfo(name).file_size > most:  # the archive reads no more than it says here
             raise ValueError(f"{name} takes more than {_size_words(most)} when it is unpacked")
         return archive.read(name)
-    except (BadZipFile, NotImplementedError, OSError) as error:
+    except (BadZipFile, LZMAError, NotImplementedError, OSError) as error:
         raise ValueError(str(error)) from error
 
 

@@ -88,6 +88,17 @@ def note_engine(context: ExceptionContext) -> None:
         context.sqlalchemy_exception.engine = context.engine  # type: ignore[attr-defined]
 
 
+@contextmanager
+def rows_explained(url: URL) -> Iterator[None]:
+    """Turn what comes of rows that were never written into a DatabaseError about this database."""
+    try:
+        yield
+    except (*DAMAGE, GeneratorError) as error:
+        if isinstance(error, DatabaseError):
+            raise
+        raise explain_error(error, url) from error
+
+
 def take_turn(connection: Connection) -> None:
     """Wait until no other transaction writes; held until this one ends."""
     if connection.dialect.name == "postgresql":
@@ -153,7 +164,8 @@ def explain_error(error: Exception, url: URL) -> DatabaseError:
                 fix="run the same command again",
                 place=place,
             )
-        return DatabaseError(f"the database refuses the object: {first_line}", place=place)
+        cause = f"the database refuses the object: {first_line}"
+        return DatabaseError(cause, fix=_RESTORE, place=place)
     if code is None and url.get_backend_name() == "sqlite":
         return DatabaseError(f"the database is damaged: {first_line}", fix=_RESTORE, place=place)
     if code is None:

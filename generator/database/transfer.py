@@ -19,12 +19,19 @@ from numpy.typing import NDArray
 from sqlalchemy import URL, Connection, Table, insert, select
 
 from encoded_objects.base.files import name_fault
+from encoded_objects.base.foreign import DAMAGE
 from generator.array import array_from
 from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.cells import array_key, faces_at, find_array, mark_cells, occupied_cells
 from generator.database.open import part_file, part_path
-from generator.database.read import find_object, list_objects, object_entry, read_array
+from generator.database.read import (
+    find_object,
+    list_objects,
+    object_entry,
+    read_array,
+    read_object,
+)
 from generator.database.registered import ObjectEntry, digest
 from generator.database.rows import definition_number, definition_of, insert_rows
 from generator.database.transaction import explain_failures, place_of
@@ -92,6 +99,14 @@ def check_alphabet(source: Connection, alphabet_id: int) -> None:
     ).one()
     if digest(row.definition) != row.definition_sha256:
         raise CopyRefusedError("has an alphabet whose definition was changed", _DAMAGED)
+
+
+def check_readable(source: Connection, name: str) -> None:
+    """Refuse an object whose faces or parts nobody could read."""
+    try:
+        read_object(source, name)
+    except (*DAMAGE, GeneratorError) as error:
+        raise CopyRefusedError(f"cannot be read: {error}", _DAMAGED) from error
 
 
 def check_cells(target: Connection, name: str, here: ArrayHere, cells: Rows) -> None:
@@ -319,6 +334,7 @@ def _copy_object(
     texts = (x for found in rows.values() for one in found for x in one.values())
     if not all(text.isprintable() for text in texts if isinstance(text, str)):
         raise CopyRefusedError("has names that cannot be shown", _DAMAGED)
+    check_readable(source, entry.name)
 
     array_id, alphabet_id = (
         definition_number(target, table, **definition_of(source, table, row))
