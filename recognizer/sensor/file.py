@@ -23,7 +23,12 @@ from recognizer.touch.sensor_state import ASIDE_SD_MM, SensorState
 FORMAT = "tactile sensor state"
 VERSION = 1
 DIGITS = 7  #: significant digits of every number
-_ARRAYS = ("offset", "gain", "gain_deviation", "aside_mm", "aside_deviation_mm")
+#: least and most of each array that can be learned: counts or N, shares, mm
+_RANGES = {
+    "offset": (-1e5, 1e5), "gain": (1e-3, 1e3), "gain_deviation": (0.0, 1e3),
+    "aside_mm": (-10.0, 10.0), "aside_deviation_mm": (0.0, 10.0),
+}  # fmt: skip
+_ARRAYS = tuple(_RANGES)
 
 
 def write_state(state: SensorState, path: str | os.PathLike[str]) -> None:
@@ -90,8 +95,10 @@ def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -
             mounting=_mounting(document.get("mounting")),
             **{name: np.array(document[name], np.float64) for name in _ARRAYS},
         )
-        if (state.gain <= 0).any():
-            raise ValueError("gains are above 0")
+        for name, (least, most) in _RANGES.items():
+            values = getattr(state, name)
+            if not ((values >= least) & (values <= most)).all():
+                raise ValueError(f"{name} from {least:g} to {most:g}")
     except (*DAMAGE, SensorStateError) as error:
         raise SensorStateError(f"is damaged: {error!r}", fix=again, place=place) from error
     if sensors and state.sensor not in sensors:
