@@ -8,9 +8,11 @@ number, time and space.
 from __future__ import annotations
 
 import asyncio
+import os
 import re
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from fastapi.concurrency import run_in_threadpool
@@ -52,14 +54,19 @@ def checked_name(name: str, suffix: str) -> str:
 
 def list_files(folder: Path, suffix: str) -> list[str]:
     """Return the names of the newest files with this ending, newest first."""
-    if not folder.is_dir():
-        return []
     dated = sorted(
-        (-path.stat().st_mtime, path.name)
-        for path in folder.glob(f"*{suffix}")
+        (-found.st_mtime, path.name)
+        for path, found in _there(folder, suffix)
         if not path.stem.endswith(".part") and _NAME.fullmatch(path.name)
     )
     return [name for _, name in dated[:LISTED]]
+
+
+def _there(folder: Path, suffix: str) -> Iterator[tuple[Path, os.stat_result]]:
+    """Yield the files with this ending; not those that lead nowhere, or went meanwhile."""
+    for path in folder.glob(f"*{suffix}"):
+        with suppress(OSError):
+            yield path, path.stat()
 
 
 def part_folder(database: str) -> Path | None:
@@ -157,4 +164,4 @@ class Uploads:
 
 def folder_bytes(folder: Path) -> int:
     """Return how much all recordings of a folder take."""
-    return sum(path.stat().st_size for path in folder.glob("*.h5")) if folder.is_dir() else 0
+    return sum(found.st_size for _, found in _there(folder, ".h5"))
