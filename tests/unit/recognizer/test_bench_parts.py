@@ -189,7 +189,7 @@ def test_recordings_that_are_sent_in_have_a_quota_a_number_and_a_time(tmp_path, 
         await asyncio.sleep(0)
         with pytest.raises(BusyError):
             await uploads.take("d.h5", pieces(content))
-        with pytest.raises(BenchError, match="nothing came"):
+        with pytest.raises(BenchError, match="came in"):
             await first
         monkeypatch.setattr("recognizer.bench.files.QUOTA", 10**9)
         return await uploads.take("d.h5", pieces(content))
@@ -206,7 +206,8 @@ def test_parts_are_sent_from_their_folder_alone(tmp_path):
     (lab / "link.stl").symlink_to(tmp_path / "secret.stl")
 
     def part(file):
-        return RegisteredPart("p", "stl", file, "", np.eye(4))
+        content = (lab / file).read_bytes() if (lab / file).is_file() else b""
+        return RegisteredPart("p", "stl", file, hashlib.sha256(content).hexdigest(), np.eye(4))
 
     database, folder = str(lab / "lab.db"), lab.resolve()
     assert part_to_send(database, folder, part("ok.stl")) == lab / "ok.stl"
@@ -215,6 +216,10 @@ def test_parts_are_sent_from_their_folder_alone(tmp_path):
             part_to_send(database, folder, part(file))
     with pytest.raises(UnknownError):
         part_to_send(database, None, part("ok.stl"))
+    registered = part("ok.stl")
+    (lab / "ok.stl").write_text("another file")
+    with pytest.raises(UnknownError, match="is changed"):
+        part_to_send(database, folder, registered)
 
 
 # -- when a touch is read
