@@ -8,7 +8,6 @@ where windows can lie and which object and face an answer belongs to.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from encoded_objects.base import console, output
 from encoded_objects.base.errors import UsageError
+from encoded_objects.base.foreign import foreign_json, parse_json
 from encoded_objects.base.options import Application, Argument, Option, command
 
 if TYPE_CHECKING:
@@ -125,11 +125,14 @@ def _array(profile_name: str, definition: str, lab_key: str) -> FoldedArray | Pr
     if profile_name or lab_key:
         given = "--profile" if profile_name else "--lab-key"
         raise UsageError(f"both {given} and --array were given; give one of them")
-    try:
-        text = definition if definition.lstrip().startswith("{") else Path(definition).read_text()
-        values = json.loads(text)
-    except (OSError, ValueError) as problem:
-        raise UsageError(f"--array cannot be read: {problem}") from None
+
+    def refuse(cause: str, *, place: str = "", **_: str) -> UsageError:
+        return UsageError(" ".join(filter(None, ["--array", place, cause])))
+
+    if definition.lstrip().startswith("{"):
+        values = parse_json(definition, refuse)
+    else:
+        values = foreign_json(definition, refuse, fix="")
     if not isinstance(values, dict):
         raise UsageError('--array must be a JSON object, as {"family": "prba", ...}')
     return array_from(values)

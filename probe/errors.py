@@ -6,6 +6,7 @@
     └── ProbeError
         ├── FrameError        an image that is no matrix of readings
         ├── PortError         exit code 3: no such device, busy, gone, or not our probe
+        │   └── PortUrlError  exit code 2: a port URL or an option in it that means nothing
         ├── RecordingError    a file that is no recording, damaged, or of a newer format
         ├── CalibrationError  too few loads, loads that do not determine the law
         ├── SurfaceError      a mesh or a face that gives no height map
@@ -34,6 +35,12 @@ class PortError(ProbeError):
     """A device that is not there, is used by another, went away, or is no probe."""
 
     exit_code = 3
+
+
+class PortUrlError(PortError):
+    """A port URL that cannot be read, or an option in it that is out of its range."""
+
+    exit_code = 2
 
 
 class RecordingError(ProbeError):

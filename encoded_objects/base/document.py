@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from encoded_objects.base.errors import EncodedObjectsError, printable
+from encoded_objects.base.foreign import open_regular
 
 _LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 BYTES_MAX = 256 * 1024  #: of a file
@@ -143,17 +144,16 @@ def read_text(path: Path, kind: DocumentKind) -> str:
         return kind.error([Problem(cause, fix, file=str(path))])
 
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             data = file.read(BYTES_MAX + 1)
     except FileNotFoundError:
         raise refusal("there is no such file", _suggest_similar(path, kind)) from None
-    except IsADirectoryError:
-        fix = f"name the files in it, for example {path / '*.yaml'}"
-        raise refusal(f"this is a folder, not {kind.name}", fix) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
+    except OSError as error:
+        if path.is_dir():
+            fix = f"name the files in it, for example {path / '*.yaml'}"
+            raise refusal(f"this is a folder, not {kind.name}", fix) from None
         fix = "check the name and the rights of the file"
-        raise refusal(f"cannot read: {reason}", fix) from None
+        raise refusal(f"cannot read: {error.strerror}", fix) from None
     if len(data) > BYTES_MAX:
         raise refusal(f"the file is larger than {BYTES_MAX // 1024} KiB", kind.large)
     try:

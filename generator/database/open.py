@@ -28,6 +28,7 @@ from sqlalchemy.exc import ArgumentError
 from sqlalchemy.schema import CreateIndex, CreateTable
 
 from encoded_objects.base.errors import install_line
+from encoded_objects.base.foreign import regular_size
 from generator.array.lab_key import draw_lab_key
 from generator.database.migrate import migrate
 from generator.database.tables import FORMAT, SCHEMA_VERSION, meta, metadata
@@ -137,6 +138,12 @@ def check_place(path: Path) -> None:
     if path.is_dir():
         fix = f"name a file in it, such as {path / 'lab.db'}"
         raise DatabaseError("this is a folder, not a database file", fix=fix, place=place)
+    try:
+        if os.path.lexists(path):  # also a link that leads nowhere: SQLite would make its target
+            regular_size(path)
+    except OSError as error:
+        cause = f"this is no database: {error.strerror}"
+        raise DatabaseError(cause, fix="name a file, such as lab.db", place=place) from error
 
 
 def _sqlite_engine(url: URL, path: Path, writable: bool, wait_s: float) -> Engine:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.foreign import open_regular
 from generator.errors import ShapeError
-from generator.polyhedron.read import file_content
+from generator.polyhedron.read import check_size, file_content
 from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def part_state(url: URL, part: RegisteredPart) -> PartState:
 
     path = part_path(url, part.file)
     try:
-        with open(path, "rb") as file:
+        with open_regular(path) as file:
             same = hashlib.file_digest(file, "sha256").hexdigest() == part.sha256
         state = "ok" if same else "changed"
     except (FileNotFoundError, NotADirectoryError):
@@ -56,11 +57,12 @@ def part_triangles(file: str | os.PathLike[str]) -> NDArray[np.float64]:
     ------
     ShapeError
         The file cannot be read, is no STL, is not as long as it says, holds NaN, no triangle,
-        or too many.
+        or too many, or is larger than 10 m.
     """
     place = str(file)
     content = file_content(Path(file), place, LARGEST_BYTES)
     corners = stl_triangles(content, place, most=MOST_PART_TRIANGLES, padded=False)
     if not len(corners):
         raise ShapeError("the file holds no triangle", fix="export the part again", place=place)
+    check_size(corners.reshape(-1, 3), place)
     return corners

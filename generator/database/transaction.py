@@ -14,13 +14,17 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from traceback import walk_tb
 from typing import TypeVar
 
 import numpy as np
 from sqlalchemy import URL, Connection, Engine, text
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
-from generator.errors import DatabaseError
+from encoded_objects.base.foreign import DAMAGE
+from generator.errors import DatabaseError, GeneratorError
+
+_FAILURES = (*DAMAGE, SQLAlchemyError, GeneratorError)
 
 WAIT_S = 60.0  #: how long a writer waits for its turn, and a reader for a commit to end
 
@@ -47,7 +51,9 @@ def write_transaction(engine: Engine) -> Iterator[Connection]:
             with connection.begin():
                 take_turn(connection)
                 yield connection
-    except DBAPIError as error:
+    except _FAILURES as error:
+        if not _is_of_rows(error):
+            raise
         raise explain_error(error, engine.url) from error
 
 
@@ -62,7 +68,9 @@ def read_transaction(engine: Engine) -> Iterator[Connection]:
                 )
             with connection.begin():
                 yield connection
-    except DBAPIError as error:
+    except _FAILURES as error:
+        if not _is_of_rows(error):
+            raise
         raise explain_error(error, engine.url) from error
 
 
@@ -87,13 +95,29 @@ def place_of(url: URL) -> str:
     return url.set(drivername=url.get_backend_name()).render_as_string(hide_password=True)
 
 
-def explain_error(error: DBAPIError, url: URL) -> DatabaseError:
-    """Return the cause and the way out of what the database driver reports."""
+def _is_of_rows(error: BaseException) -> bool:
+    """Tell whether an error came up where rows are read, not in the work of a transaction."""
+    if isinstance(error, SQLAlchemyError | DatabaseError):
+        return isinstance(error, SQLAlchemyError)
+    names = {frame.f_globals.get("__name__", "") for frame, _ in walk_tb(error.__traceback__)}
+    if isinstance(error, GeneratorError):  # a value that nothing can be made from
+        return "generator.database.read" in names
+    return any(
+        name.startswith(("sqlalchemy.", "generator.database.")) for name in names - {__name__}
+    )
+
+
+def explain_error(error: Exception, url: URL) -> DatabaseError:
+    """Return the cause and the way out of what the database driver reports, or a row says."""
+    place = place_of(url)
+    if not isinstance(error, DBAPIError):
+        reason = str(error).partition("\n")[0][:100]
+        cause = f"the database is damaged, it holds what was never written: {reason}"
+        return DatabaseError(cause, fix=_RESTORE, place=place)
     # SQLite names its errors (SQLITE_BUSY), PostgreSQL numbers them (SQLSTATE 55P03).
     code = getattr(error.orig, "sqlite_errorname", None) or getattr(error.orig, "sqlstate", None)
     said = str(error.orig).strip().splitlines()
     first_line = said[0] if said else type(error.orig).__name__
-    place = place_of(url)
     for codes, cause, fix in _MEANINGS:
         if code is not None and code.startswith(codes):
             return DatabaseError(cause, fix=fix, place=place)
@@ -114,13 +138,17 @@ def explain_error(error: DBAPIError, url: URL) -> DatabaseError:
                 place=place,
             )
         return DatabaseError(f"the database refuses the object: {first_line}", place=place)
+    if code is None and url.get_backend_name() == "sqlite":
+        return DatabaseError(f"the database is damaged: {first_line}", fix=_RESTORE, place=place)
     if code is None:
         return connection_error(str(error.orig), url, place)
-    return DatabaseError(f"the database failed: {first_line} ({code})", place=place)
+    return DatabaseError(f"the database failed: {first_line} ({code})", fix=_RESTORE, place=place)
 
 
 _RACES = ("40001", "40P01")  # serialization failure, deadlock
 _NOT_UNIQUE = ("SQLITE_CONSTRAINT_PRIMARYKEY", "SQLITE_CONSTRAINT_UNIQUE", "23505")
+
+_RESTORE = "restore it from a copy, or rescue what is left with `sqlite3 FILE .recover`"
 
 _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
     (
@@ -132,7 +160,7 @@ _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
     (
         ("SQLITE_CORRUPT",),
         "the database file is damaged",
-        "restore it from a copy, or rescue what is left with `sqlite3 FILE .recover`",
+        _RESTORE,
     ),
     (
         ("SQLITE_READONLY", "25006", "42501"),

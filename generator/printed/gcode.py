@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.foreign import DAMAGE, foreign_bytes, foreign_member
 from generator.errors import PrintError
 
 Floats = NDArray[np.float64]
@@ -386,6 +387,9 @@ _HEAD = 4096  # characters of a file in which its slicer gives its name
 _WIDTHS_AGREE = (0.7, 1.5)
 
 
+_MOST_BYTES = 1 << 30  # of G-code: 30 million moves
+
+
 def read_gcode(path: Path | str) -> Toolpath:
     """Read `.gcode`, `.gco`, `.g`, or the first plate of Bambu Studio's `.gcode.3mf`.
 
@@ -394,12 +398,7 @@ def read_gcode(path: Path | str) -> Toolpath:
     extruded, or volumes that contradict the widths announced.
     """
     path = Path(path)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise PrintError(
-            f"cannot read the G-code: {error.strerror}", fix="check the name", place=str(path)
-        ) from None
+    content = foreign_bytes(path, PrintError, most=_MOST_BYTES, fix="check the name")
     return toolpath_of(_text(content, str(path)), str(path))
 
 
@@ -422,8 +421,8 @@ def _text(content: bytes, name: str) -> str:
         try:
             with zipfile.ZipFile(io.BytesIO(content)) as archive:
                 plates = sorted(n for n in archive.namelist() if n.endswith(".gcode"))
-                content = archive.read(plates[0]) if plates else b""
-        except (zipfile.BadZipFile, NotImplementedError, RuntimeError):
+                content = foreign_member(archive, plates[0], _MOST_BYTES) if plates else b""
+        except (*DAMAGE, zipfile.BadZipFile):
             content = b""
         if not content:
             raise PrintError(

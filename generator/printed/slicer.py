@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.files import staged_file
+from encoded_objects.base.foreign import foreign_bytes
 from generator.errors import PrintError
 from generator.printed.gcode import Toolpath, read_gcode
 from generator.printers import Printer
@@ -142,11 +143,17 @@ def _inherit(sections: configparser.RawConfigParser, kind: str, name: str) -> di
     return settings | {key: value for key, value in section.items() if key != "inherits"}
 
 
+_MOST_SETTINGS = 4 << 20  # bytes; PrusaSlicer exports 20 KiB
+
+
 def _read_exported(file: Path) -> dict[str, str]:
     sections = _parser()
+    content = foreign_bytes(
+        file, PrintError, most=_MOST_SETTINGS, fix="give a file of print settings that you can read"
+    )
     try:
-        sections.read_string("[all]\n" + file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, configparser.Error):
+        sections.read_string("[all]\n" + content.decode("utf-8"))
+    except (UnicodeDecodeError, configparser.Error):
         sections = _parser()
     settings = dict(sections["all"]) if sections.has_section("all") else {}
     if "nozzle_diameter" not in settings:

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from encoded_objects.base.document import DocumentError, Problem
+from encoded_objects.base.foreign import open_regular
 from encoded_objects.base.sensor_type import SENSOR_FILES, USUAL_SENSOR, SensorType
 from encoded_objects.base.yaml_tree import Tree, read_tree
 from generator.alphabet.known import ALPHABETS, Alphabet, alphabet_from
@@ -271,9 +272,13 @@ def _from_file(settings: _Block, tree: Tree) -> tuple[_Block, Tree]:
     if own.problems:
         raise SpecError(own.problems)
     try:
-        return _from_file(type(settings).model_validate(own.value), own)
+        block = type(settings).model_validate(own.value)
     except ValidationError as error:
         raise SpecError(explain_errors(error, own, type(settings))) from None
+    if block.file is not None:  # it may name itself
+        cause = f"this file names another one, '{block.file}'"
+        raise SpecError([Problem(cause, "write the settings here", mark_of(own, "file"))])
+    return block, own
 
 
 def _described_printer(settings: PrinterSettings, tree: Tree) -> Printer:
@@ -473,11 +478,10 @@ def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeS
         )
         return None
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        refuse("shape.file", f"cannot read '{path}': {reason}", _similar_model(path))
+    except OSError as error:
+        refuse("shape.file", f"cannot read '{path}': {error.strerror}", _similar_model(path))
         return None
     scaled = {} if scale == 1.0 else {"scale": scale}  # as if it had been left out
     return ShapeSpec("file", {"sha256": digest, **scaled}, path)

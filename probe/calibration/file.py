@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.files import whole_file
+from encoded_objects.base.foreign import DAMAGE, foreign_json
 from probe.circuit import Electronics, Noise
 from probe.errors import CalibrationError, CircuitError
 
@@ -147,17 +148,9 @@ def read_calibration(path: str | os.PathLike[str], *, sensor: str | None = None)
     sensor's.
     """
     place = str(path)
-    try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CalibrationError(
-            f"cannot be read: {error.strerror}", fix="give a calibration file", place=place
-        ) from error
-    except ValueError as error:
-        raise CalibrationError(
-            f"is no JSON: {error}", fix="give a file that `probe-sensor calibrate` wrote",
-            place=place
-        ) from error  # fmt: skip
+    document = foreign_json(
+        path, CalibrationError, fix="give a file that `probe-sensor calibrate` wrote"
+    )
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise CalibrationError(
             "is no calibration", fix="give a file that `probe-sensor calibrate` wrote", place=place
@@ -170,7 +163,7 @@ def read_calibration(path: str | os.PathLike[str], *, sensor: str | None = None)
         )
     try:
         calibration = _calibration_of(document)
-    except (KeyError, TypeError, ValueError, CircuitError, CalibrationError) as error:
+    except (*DAMAGE, CircuitError, CalibrationError) as error:
         raise CalibrationError(
             f"is damaged: {error}", fix="calibrate again", place=place
         ) from error

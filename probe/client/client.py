@@ -35,10 +35,11 @@ from probe.protocol import (
 _BUFFER = 2048  #: frames, about 2 MB and 20 s
 _SILENCE_S = 0.5  #: after so long without a packet the stream is started again
 _IDENT_S = 2.0  #: for which the description of the probe is waited for
-_ANSWER_S = 5.0  #: a probe that has a boot loader answers within that
+_ANSWER_S = 4.5  #: a probe that has a boot loader answers within 3; a person waits 5
 _SLICE_S = 0.05  #: longest wait for bytes; a frame without successor is held so long
 _GATHER_S = 0.006  #: pause after few bytes, so that each byte does not wake the thread
 _FEW = 4096  #: bytes of one read, below which that pause is made
+_SOFTWARE = ("sim:", "file:")  #: may pause for as long as they like
 _NOTICES = 256  #: kept for whoever asks
 
 
@@ -57,7 +58,7 @@ class Client:
     reopen_s
         How long a port that went away is tried again before `frames` raises.
     answer_s
-        How long the first packet may take.
+        How long a line may bring no trusted frame before `frames` raises.
 
     Raises
     ------
@@ -81,6 +82,8 @@ class Client:
         self._bits = b"" if bits is None else bits_command(bits)
         self._buffer, self._reopen_s, self._answer_s = buffer, reopen_s, answer_s
         self._waits = url.startswith("file:")
+        self._software = url.startswith(_SOFTWARE)
+        self._shape: tuple[int, ...] = ()
         self._ready = threading.Condition()
         self._frames: deque[Frame] = deque()
         self._notices: deque[str] = deque(maxlen=_NOTICES)
@@ -105,8 +108,8 @@ class Client:
     def frames(self, timeout_s: float | None = None) -> Iterator[Frame]:
         """Yield trusted frames until the client is closed, or a recording ends.
 
-        It ends, too, when no frame came for `timeout_s`. Raises PortError: nothing answers, or the
-        port went away for good.
+        It ends, too, when no frame came for `timeout_s`. Raises PortError: nothing answers, or no
+        frame that can be trusted; images of another shape; the port went away for good.
         """
         while True:
             with self._ready:
@@ -210,13 +213,16 @@ class Client:
 
     def _converse(self) -> None:
         self._send(self._greeting())
-        heard_s = asked_s = began_s = time.monotonic()
+        heard_s = asked_s = opened_s = framed_s = time.monotonic()
+        frames, before = 0, self._receiver.counts()
         while not self._stop.is_set():
             try:
                 data = self._exchange()
             except PortError as gone:
+                if time.monotonic() - framed_s > self._reopen_s + self._answer_s:
+                    raise  # it opens, and breaks again and again
                 self._reopen(gone)
-                heard_s = asked_s = time.monotonic()
+                heard_s = asked_s = opened_s = time.monotonic()
                 continue
             now_s, now_ns = time.monotonic(), time.monotonic_ns()
             if not data:
@@ -230,8 +236,12 @@ class Client:
                     self._tell(f"nothing came for {_SILENCE_S:g} s; the stream is started again")
                 self._send(self._greeting())
                 asked_s = now_s
-            if not self._receiver.packets and now_s - began_s > self._answer_s:
-                raise diagnose_silence(self._receiver.damages, self._answer_s, self._port.url)
+            if self._receiver.frames > frames or (self._software and self._receiver.packets):
+                frames, before, framed_s = self._receiver.frames, self._receiver.counts(), now_s
+            elif now_s - max(framed_s, opened_s) > self._answer_s:
+                came = self._receiver.counts()
+                came.subtract(before)
+                raise diagnose_silence(came, self._answer_s, self._port.url)
             if 0 < len(data) < _FEW:
                 time.sleep(_GATHER_S)
 
@@ -260,6 +270,15 @@ class Client:
     def _hand_on(self, frames: list[Frame]) -> None:
         with self._ready:
             for frame in frames:
+                self._shape = self._shape or frame.counts.shape
+                if frame.counts.shape != self._shape:
+                    raise PortError(
+                        "its images changed from {} x {} to {} x {}".format(
+                            *self._shape, *frame.counts.shape
+                        ),
+                        fix="start again, if another sensor was plugged in; or flash its firmware",
+                        place=self._port.url,
+                    )
                 if self._waits:
                     self._ready.wait_for(
                         lambda: len(self._frames) < self._buffer or self._stop.is_set()
@@ -311,18 +330,35 @@ class Client:
             self._notices.append(notice)
 
 
-def diagnose_silence(damages: Mapping[Damage, int], waited_s: float, url: str) -> PortError:
-    """Return the error for a port at which no probe answered for so long."""
-    if damages[Damage.VERSION]:
+def diagnose_silence(came: Mapping[Damage | str, int], waited_s: float, url: str) -> PortError:
+    """Return the error for a port that brought no trusted frame for so long, but `came`."""
+    damaged = sum(came[kind] for kind in Damage)
+    if came["packets"] and damaged:
+        cause = f"{damaged} of {damaged + came['packets']} packets of the last {waited_s:g} s are "
+        cause += f"damaged, and no image comes through ({_worst(came).value})"
+        fix = "take a shorter cable away from motors, another USB port, or a lower baud rate"
+    elif came["doubtful"]:
+        cause = f"no image of the last {waited_s:g} s agrees with the next: they change their "
+        cause += "shape, or go astray on the line"
+        fix = "flash the firmware that belongs to this programme; then look at the cable"
+    elif came["packets"]:
+        cause = f"the probe answers, and sends no images for {waited_s:g} s"
+        fix = "reset it, and see whether the sensor is plugged in"
+    elif came[Damage.VERSION]:
         cause = f"the device speaks another version of the protocol, not {VERSION}"
         fix = "flash the firmware that belongs to this programme"
-    elif any(damages.values()):
+    elif damaged or came["bytes"]:
         cause = "what comes from the device are no packets of a probe"
         fix = "try another baud rate; if that does not help, it has not the probe's firmware"
     else:
         cause = f"the device was silent for {waited_s:g} s"
         fix = "try another baud rate, and see whether it has power and the probe's firmware"
     return PortError(cause, fix=fix, place=url)
+
+
+def _worst(came: Mapping[Damage | str, int]) -> Damage:
+    """Return the damage that is met most."""
+    return max(Damage, key=lambda kind: came[kind])
 
 
 def name_of(ident: IdentPacket | None, url: str) -> str:

@@ -5,7 +5,8 @@ corruptions, so a frame is held back until what follows agrees with it:
 
 - the next packet continues its number, or what failed in between accounts for the numbers
   that are missing, by its blocks or by its bytes (a lost delimiter joins two packets);
-- the next packet's time is later, by at most `_LONGEST_STEP_US` a frame.
+- the next packet's time is later, by at most `_LONGEST_STEP_US` a frame;
+- the next image has the same shape.
 
 Bytes that get lost between the head of one frame and the tail of another leave a gap that
 nothing accounts for; a damaged number or time disagrees with the next. After `probe.client` heard
@@ -23,7 +24,7 @@ restarts, its number restarts too, and the time goes on rising by the host's clo
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass
 
 from probe.frame import Frame
@@ -143,6 +144,8 @@ class FrameOrder:
 def _agree(held: FramePacket, packet: Packet, failed: int) -> bool:
     steps = (packet.seq - held.seq) % _NUMBERS
     later_us = (packet.t_us - held.t_us) % _TIMES
+    if isinstance(packet, FramePacket) and packet.counts.shape != held.counts.shape:
+        return False
     return 1 <= steps <= 1 + failed and later_us <= steps * _LONGEST_STEP_US
 
 
@@ -170,6 +173,7 @@ class Receiver:
         self.device: StatisticsPacket | None = None
         self.damages: dict[Damage, int] = dict.fromkeys(Damage, 0)
         self.packets = 0
+        self.bytes = 0
         self.torn = False  #: whether the last block was no packet
         self.frames = 0
         self._order = FrameOrder()
@@ -184,6 +188,7 @@ class Receiver:
     def feed(self, data: bytes, now_ns: int) -> list[Frame]:
         """Return the frames that `data` completes and confirms."""
         frames = []
+        self.bytes += len(data)
         for block in self._splitter.feed(data):
             packet = decode(block, self.ident.bits if self.ident else 10)
             first, self._first = self._first, False
@@ -207,6 +212,14 @@ class Receiver:
         """Return the frame that waits for a neighbour: the line is silent, none will come."""
         frame = self._order.settle(now_ns)
         return [] if frame is None else [self._counted(frame)]
+
+    def counts(self) -> Counter[Damage | str]:
+        """Return what came so far: damaged blocks by kind, packets, doubtful frames, bytes."""
+        counted: Counter[Damage | str] = Counter(list[Damage | str]())
+        counted.update(self.damages)
+        more = {"packets": self.packets, "doubtful": self._order.doubtful, "bytes": self.bytes}
+        counted.update(more)
+        return counted
 
     @property
     def reboots(self) -> int:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import datetime
+import io
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.console import FAILED, interruption
 from encoded_objects.base.files import refuse_taken
+from encoded_objects.base.foreign import MOST_TEXT, foreign_bytes
 from encoded_objects.base.output import message, pairs, warning, write, write_json
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.calibration import (
@@ -246,14 +248,12 @@ def write_list(path: Path, given: Iterable[LoadRecording]) -> None:
 
 
 def _read_list(path: Path) -> list[LoadRecording]:
+    fix = "give a table of loads (CSV)"
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise CalibrationError(
-            f"cannot be read: {reason}", fix="give a table of loads (CSV)", place=str(path)
-        ) from error
+        text = foreign_bytes(path, CalibrationError, most=MOST_TEXT, fix=fix).decode("utf-8-sig")
+        rows = list(csv.DictReader(io.StringIO(text, newline="")))
+    except (UnicodeError, csv.Error) as error:
+        raise CalibrationError(f"cannot be read: {error}", fix=fix, place=str(path)) from error
     given = []
     for number, row in enumerate(rows, 2):
         place = f"{path}:{number}"
@@ -286,13 +286,12 @@ def _newtons(text: str, place: str) -> float:
 
 
 def _footprint(path: Path) -> NDArray[np.float64]:
+    fix = "give a line a row of numbers with commas between"
+    content = foreign_bytes(path, CalibrationError, most=MOST_TEXT, fix=fix)
     try:
-        shares = np.loadtxt(path, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
-        raise CalibrationError(
-            f"cannot be read: {error}", fix="give a line a row of numbers with commas between",
-            place=str(path)
-        ) from error  # fmt: skip
+        shares = np.loadtxt(io.BytesIO(content), delimiter=",", ndmin=2, encoding="utf-8")
+    except ValueError as error:
+        raise CalibrationError(f"cannot be read: {error}", fix=fix, place=str(path)) from error
     return shares
 
 

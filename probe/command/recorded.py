@@ -76,6 +76,14 @@ def record_port(options: RecordOptions) -> int:
             raise
         result = _result(client, recorder, name, ended, seconds)
     _say(result, options.as_json)
+    if ended == "silence":
+        early = PortError(
+            f"the recording ended early: {seconds:.1f} of {options.seconds:g} s, then nothing came",
+            fix="see whether the probe is plugged in, and record again",
+            place=url,
+        )
+        message(early.as_text())  # the result stands on stdout already
+        return early.exit_code
     return INTERRUPTED if ended == "interrupted" and total is not None else 0
 
 

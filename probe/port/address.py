@@ -10,7 +10,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 from urllib.parse import parse_qsl
 
-from probe.errors import PortError
+from probe.errors import PortUrlError
+
+MOST_HZ = 10_000.0  #: frames a second of a probe in software; boards reach 500
 
 
 class Port(Protocol):
@@ -48,7 +50,7 @@ class Address:
 
 
 def split_url(url: str) -> Address:
-    """Return the parts of a URL, whatever its scheme; PortError when its options cannot be read."""
+    """Return the parts of a URL of any scheme; PortUrlError when its options cannot be read."""
     scheme, _, rest = url.partition(":")
     target, mark, query = rest.rpartition("?")
     if not mark or "#" in query:  # a question mark within the address of a database
@@ -56,14 +58,16 @@ def split_url(url: str) -> Address:
     try:
         options = dict(parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query)))
     except ValueError as bad:
-        raise PortError(
+        raise PortUrlError(
             f"the options {query!r} cannot be read", fix="write name=value&name=value", place=url
         ) from bad
     return Address(url, scheme, target.removeprefix("//"), options)
 
 
-def number(address: Address, name: str, default: float, least: float = 0.0) -> float:
-    """Return an option that is a finite number, at least `least`; PortError when it is none."""
+def number(
+    address: Address, name: str, default: float, *, least: float = 0.0, most: float
+) -> float:
+    """Return an option that is a number of `least` to `most`; PortUrlError when it is none."""
     given = address.options.get(name)
     if given is None:
         return default
@@ -71,9 +75,9 @@ def number(address: Address, name: str, default: float, least: float = 0.0) -> f
         value = float(given)
     except ValueError:
         value = float("nan")
-    if not least <= value < float("inf"):
-        raise PortError(
-            f"{name}={given!r} is no number from {least:g}",
+    if not least <= value <= most:
+        raise PortUrlError(
+            f"{name}={given!r} is no number from {least:g} to {most:g}",
             fix=f"write for example {name}={default:g}",
             place=address.url,
         )
@@ -81,10 +85,10 @@ def number(address: Address, name: str, default: float, least: float = 0.0) -> f
 
 
 def refuse_unknown(address: Address, known: tuple[str, ...]) -> None:
-    """Refuse options that this scheme does not have (PortError), with those that it has."""
+    """Refuse options that this scheme does not have (PortUrlError), with those that it has."""
     unknown = sorted(set(address.options) - set(known))
     if unknown:
-        raise PortError(
+        raise PortUrlError(
             f"{address.scheme}: has no option {', '.join(unknown)}",
             fix=f"its options are {', '.join(known)}",
             place=address.url,

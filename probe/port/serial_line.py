@@ -11,6 +11,7 @@ import errno
 import grp
 import os
 import select
+import termios
 from contextlib import suppress
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from probe.port.listing import list_ports
 
 _CHUNK = 65536
 _BAUD = 1_000_000  #: where the address names none
+_MOST_BAUD = 20_000_000  #: more than any USB chip takes
 _WRITE_TIMEOUT_S = 1.0  #: a line that takes no byte for so long is broken
 
 
@@ -31,7 +33,7 @@ def open_serial(address: Address) -> Port:
     Raises PortError: it is not there, busy, forbidden, or cannot run at this baud rate.
     """
     refuse_unknown(address, ("baud",))
-    return open_line(address, int(number(address, "baud", _BAUD, least=1)))
+    return open_line(address, int(number(address, "baud", _BAUD, least=1, most=_MOST_BAUD)))
 
 
 def open_line(address: Address, baud: int) -> SerialLine:
@@ -41,7 +43,7 @@ def open_line(address: Address, baud: int) -> SerialLine:
             address.target, baud, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True
         )
         line.reset_input_buffer()
-    except (OSError, ValueError) as failed:  # pyserial's own error is an OSError
+    except (OSError, ValueError, termios.error) as failed:  # pyserial's own is an OSError
         raise _explain_refusal(address, failed, baud) from failed
     with suppress(OSError, ValueError):  # a pty or a CDC device has no such mode
         line.set_low_latency_mode(True)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.frame import Frame
-from probe.port.address import Address, Port, number, refuse_unknown
+from probe.port.address import MOST_HZ, Address, Port, number, refuse_unknown
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
 
@@ -29,7 +29,7 @@ _WAY_Y = 4 / 16  #: ... and of the rows
 
 def open_simulation(address: Address) -> Port:
     """Open a simulated probe; PortError when an option is unknown."""
-    rate = number(address, "rate", _RATE_HZ, least=0.1)
+    rate = number(address, "rate", _RATE_HZ, least=0.1, most=MOST_HZ)
     sensor = choose_sensor_type(address.options.get("sensor_type"), "", None, address.url)
     if address.target:
         from probe.simulate.source import frames_of

@@ -20,6 +20,7 @@ from probe.port.address import Address, Port, number, refuse_unknown
 from probe.port.commanded import CommandedProbe
 from probe.protocol import FramePacket, IdentPacket, encode
 
+_MOST_SPEED = 1e6  #: times as fast; 0 is as fast as it is read
 _BATCH = 64  #: packets of one read at most
 _LATE_S = 0.5  #: a reader later than that makes the device wait
 _PAUSE_NS = 10_000_000  #: between the end of a recording and its repetition
@@ -31,8 +32,8 @@ def open_recording(address: Address) -> Port:
     from probe.recording.read import Recording
 
     refuse_unknown(address, ("speed", "loop"))
-    speed = number(address, "speed", 1.0)
-    again = number(address, "loop", 0.0) > 0
+    speed = number(address, "speed", 1.0, most=_MOST_SPEED)
+    again = number(address, "loop", 0.0, most=1.0) > 0
     recording = Recording(address.target)
     frames = endless_frames(recording.frames) if again else recording.frames()
     rows, columns = recording.shape

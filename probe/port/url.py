@@ -20,7 +20,7 @@ from collections.abc import Callable
 from importlib import import_module
 
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
-from probe.errors import PortError
+from probe.errors import PortError, PortUrlError
 from probe.port.address import Address, Port, split_url
 
 GROUP = "encoded_objects.ports"
@@ -41,8 +41,8 @@ _TYPE_OPTION = "sensor_type"
 def open_port(url: str) -> Port:
     """Open a port; its URL as in the table of the module.
 
-    Raises PortError: the URL cannot be read, or the device is not there, busy or forbidden;
-    RecordingError: the file is no recording.
+    Raises PortUrlError: the URL cannot be read; PortError: the device is not there, busy or
+    forbidden; RecordingError: the file is no recording.
     """
     address = address_of(url)
     return _opener(address)(address)
@@ -51,20 +51,20 @@ def open_port(url: str) -> Port:
 def address_of(url: str) -> Address:
     """Read a port URL.
 
-    Raises PortError: the scheme is unknown, or its target is missing.
+    Raises PortUrlError: the scheme is unknown, or its target is missing.
     """
     scheme, colon, _ = url.partition(":")
     if not is_url(url):
         guess = f"serial://{url}" if url.startswith("/dev/") else f"file:{url}"
         known = [f"{name}:" for name in (*SCHEMES, *sorted(_other_schemes()))]
-        raise PortError(
+        raise PortUrlError(
             f"this is no port URL, it must begin with {', '.join(known[:-1])} or {known[-1]}",
             fix=f"write {guess}" if not colon else f"write for example {EXAMPLES}",
             place=url,
         )
     address, (_, needed) = split_url(url), SCHEMES.get(scheme, ("", ""))
     if needed and not address.target:
-        raise PortError(
+        raise PortUrlError(
             f"the URL names no {needed}", fix=f"write for example {EXAMPLES}", place=url
         )
     return address

@@ -21,6 +21,7 @@ from itertools import count
 from pathlib import Path
 from typing import Final
 
+from encoded_objects.base.foreign import DAMAGE, open_regular
 from probe.errors import RecordingError
 
 _PART = ".part"
@@ -37,6 +38,7 @@ _FIXES = {
     errno.ENOTDIR: "a file stands where the folder should be",
     errno.EISDIR: "this is a folder: name a file in it",
     errno.ENAMETOOLONG: "take a shorter name",
+    errno.EINVAL: "give the file of a recording",
 }
 
 
@@ -50,10 +52,10 @@ def explain_errors(path: Path, action: str) -> Iterator[None]:
             raise _missing_error(path) from error
         if error.errno is None:
             raise damaged_error(path, action) from error
-        reason = os.strerror(error.errno)
+        reason = error.strerror
         fix = _FIXES.get(error.errno, "check the disk and the folder")
         raise RecordingError(f"cannot {action} it: {reason}", fix=fix, place=str(path)) from error
-    except (RuntimeError, KeyError, ValueError, TypeError) as error:
+    except DAMAGE as error:
         raise damaged_error(path, action) from error
 
 
@@ -99,7 +101,7 @@ def take_lock(descriptor: int) -> None:
 def is_locked(path: Path) -> bool:
     """Tell whether a running process holds the lock on this file."""
     try:
-        with open(path, "rb") as file:
+        with open_regular(path) as file:
             answer = fcntl.fcntl(file, fcntl.F_OFD_GETLK, _lock_request(fcntl.F_RDLCK))
     except OSError:
         return False

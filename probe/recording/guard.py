@@ -17,13 +17,13 @@ from __future__ import annotations
 
 import io
 import math
-import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Final
 
+from encoded_objects.base.foreign import open_regular, regular_size
 from probe.errors import RecordingError
 from probe.recording.files import blank_error, explain_errors, is_part, not_closed_error
 
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     import h5py
 
 MOST_TACTELS: Final = 1 << 20  #: of an image, 1024 x 1024; 256 of them are read at a time
-_FREE: Final = 8 << 20  #: bytes of values that any file may hold: 16,384 images of 16 x 16
-_PACKED: Final = 1100  #: bytes of values in a byte of the file; our recordings reach 185
+FREE: Final = 8 << 20  #: bytes of values that any file may hold: 16,384 images of 16 x 16
+PACKED: Final = 1100  #: bytes of values in a byte of the file; our recordings reach 185
 _PIECE: Final = 512  #: bytes of values that a chunk costs at least, to find and to unpack
-_MOST_CHUNK: Final = 64 << 20  #: bytes of a chunk, which is unpacked as a whole
+MOST_CHUNK: Final = 64 << 20  #: bytes of a chunk, which is unpacked as a whole
 _LARGE_CHUNK: Final = 256 << 10  #: bytes; it is kept from one block to the next
 _MOST_LINKS: Final = 10_000  #: of all groups; checking as many datasets takes 1 to 2 s
 _MOST_DEPTH: Final = 64  #: groups in one another; libhdf5 visits them by recursion
@@ -85,7 +85,7 @@ def open_hdf5(
         with explain_errors(path, "open"):
             source: object = path
             if not head.whole:
-                source = PaddedFile(stack.enter_context(open(path, "rb")), head)
+                source = PaddedFile(stack.enter_context(open_regular(path)), head)
             file = stack.enter_context(h5py.File(source, "r"))
         with explain_errors(path, "read"):
             _held = check_file(file, path)
@@ -114,8 +114,8 @@ class Superblock:
 
 def superblock_of(path: Path) -> Superblock | None:
     """Return the superblock of a file; None if it is no HDF5 file, OSError if it is unreadable."""
-    size = os.path.getsize(path)
-    with open(path, "rb") as file:
+    size = regular_size(path)
+    with open_regular(path) as file:
         start = 0
         while start < size:  # a user block of 512, 1024, 2048, ... bytes may come first
             file.seek(start)
@@ -176,7 +176,7 @@ def check_file(file: h5py.File, path: Path) -> list[h5py.h5d.DatasetID]:
 
     if not strings_end(path):
         raise ValueError("a collection of strings without end")
-    most = _FREE + _PACKED * path.stat().st_size
+    most = FREE + PACKED * path.stat().st_size
     root = file["/"].id
     groups, known = [(root, "")], {h5py.h5o.get_info(root).addr}
     soft: list[tuple[h5py.h5g.GroupID, bytes, str]] = []
@@ -260,9 +260,9 @@ def _checked_cache(
     chunk = made.get_chunk() if chunked else (1,) * len(shape)
     piece = math.prod(chunk) * size
     pieces = math.prod(-(-n // c) for n, c in zip(shape, chunk, strict=True))
-    if chunked and piece > _MOST_CHUNK:
+    if chunked and piece > MOST_CHUNK:
         raise RecordingError(
-            f"{place[:80]} is stored in chunks of {piece:,} bytes, {_MOST_CHUNK:,} can be read",
+            f"{place[:80]} is stored in chunks of {piece:,} bytes, {MOST_CHUNK:,} can be read",
             fix="save it in smaller chunks, of 64 images each",
             place=str(path),
         )
@@ -292,7 +292,7 @@ def _leads_out(path: Path, place: str) -> RecordingError:
 def strings_end(path: Path) -> bool:
     """Tell whether every collection of strings in the beginning of a file has an end."""
     room = 2 * path.stat().st_size  # collections lie apart; those that were freed may overlap
-    with open(path, "rb") as file:
+    with open_regular(path) as file:
         for start in _heaps(file):
             file.seek(start + 8)
             objects = file.read(max(0, min(_number(file.read(8), 0), _SEARCHED) - _HEAD))

@@ -37,6 +37,10 @@ if TYPE_CHECKING:
 
 _FILE_FORMAT: Final = ("v110", "v110")
 _OURS: Final = ("format", "format_version", "tool_version", "piece")
+_TYPES: Final = {
+    "format_version": int, "tool_version": str, "piece": int, "sensor": str, "calibration": str,
+    "units": str, "sensor_type": str,
+}  # fmt: skip
 _IMPORT: Final = "import the array that holds the images (N, rows, columns)"
 #: by kind of numbers: the values of a dataset, and what to do with others
 _MEANT: Final = {
@@ -176,7 +180,10 @@ def _checked(file: h5py.File, path: Path, *, closed: bool) -> FrameFile:
         attributes = {name: _attribute_value(value) for name, value in file.attrs.items()}
         names = [name for name in DATASETS if name in file]
         others = ", ".join(sorted(file)) or "nothing"
-    own = attributes.get("format") == FORMAT
+    named = attributes.get("format")
+    own = isinstance(named, str) and named == FORMAT
+    if own:
+        _check_attributes(attributes, path)
     if own and attributes.get("format_version") != FORMAT_VERSION:
         raise RecordingError(
             f"its format is {attributes.get('format_version')}, this programme knows "
@@ -217,6 +224,19 @@ def _checked(file: h5py.File, path: Path, *, closed: bool) -> FrameFile:
         poses="pose" in names,
         read=lambda start, stop: _read_block(file, path, start, stop),
     )
+
+
+def _check_attributes(attributes: dict[str, Any], path: Path) -> None:
+    """Refuse attributes of a recording of ours that are of another type than we write."""
+    for name, kind in _TYPES.items():
+        value = attributes.get(name, kind())
+        if not isinstance(value, kind):
+            raise RecordingError(
+                f"its attribute {name} is no {'number' if kind is int else 'text'}: "
+                f"{str(value)[:40]!r}",
+                fix=f"delete the attribute {name}, or write it as it was",
+                place=str(path),
+            )
 
 
 def _read_block(file: h5py.File, path: Path, start: int, stop: int) -> FrameBlock:

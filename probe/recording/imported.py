@@ -16,6 +16,9 @@ in the attributes, and `units` says "scaled".
 from __future__ import annotations
 
 import csv
+import io
+import math
+import tokenize
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +30,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.foreign import DAMAGE, foreign_bytes, foreign_member, open_regular
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from probe.errors import RecordingError
 from probe.frame import WRIST
@@ -42,6 +46,8 @@ if TYPE_CHECKING:
 
 SUFFIXES: Final = (".png", ".pgm", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg")
 _AT_ONCE: Final = 1024  #: images read at a time
+_MOST_BYTES: Final = 1 << 30  #: of the arrays of an archive, which are read as a whole
+_MOST_TABLE: Final = 128 << 20  #: bytes of a table: its cells take 16 times that in memory
 _FULL: Final = 65535  #: counts
 
 
@@ -145,10 +151,11 @@ def _arrays_at(path: Path, image: tuple[int, int]) -> Iterator[list[FileArray]]:
     if path.suffix.lower() == ".csv":
         yield [_table_array(path, image)]
         return
-    with explain_errors(path, "read"), open(path, "rb") as file:
+    with explain_errors(path, "read"), open_regular(path) as file:
         head = file.read(128)
-    if head.startswith(b"\x93NUMPY") or zipfile.is_zipfile(path):
-        yield _numpy_arrays(path)
+        archive = zipfile.is_zipfile(file)
+    if head.startswith(b"\x93NUMPY") or archive:
+        yield _numpy_arrays(path, archive=archive)
     elif head.startswith(b"MATLAB 5.0") or (path.suffix == ".mat" and b"MATLAB 7.3" not in head):
         yield _matlab_arrays(path)
     else:
@@ -237,17 +244,16 @@ def _block(
     )
 
 
-def _numpy_arrays(path: Path) -> list[FileArray]:
+def _numpy_arrays(path: Path, *, archive: bool) -> list[FileArray]:
     try:
-        with explain_errors(path, "read"):
-            loaded = np.load(path, mmap_mode="r", allow_pickle=False)
-            if isinstance(loaded, np.ndarray):
-                return [FileArray(path.stem, loaded)]
-            with loaded:
-                return [FileArray(name, loaded[name]) for name in loaded.files]
-    except RecordingError as error:
-        if not isinstance(error.__cause__, ValueError):
-            raise
+        if not archive:
+            return [FileArray(path.stem, np.load(path, mmap_mode="r", allow_pickle=False))]
+        with open_regular(path) as file, zipfile.ZipFile(file) as members:
+            names = members.namelist()
+            _check_claim(path, sum(members.getinfo(name).file_size for name in names))
+            arrays = {name: foreign_member(members, name, _MOST_BYTES) for name in names}
+        return [FileArray(name.removesuffix(".npy"), _npy(data)) for name, data in arrays.items()]
+    except (*DAMAGE, zipfile.BadZipFile, tokenize.TokenError) as error:
         raise RecordingError(
             "it holds objects, or it is damaged",
             fix="save a plain array of numbers (N, rows, columns)",
@@ -255,13 +261,43 @@ def _numpy_arrays(path: Path) -> list[FileArray]:
         ) from error
 
 
+def _npy(content: bytes) -> NDArray[Any]:
+    """Return the array in an .npy file; ValueError where it claims more values than there are."""
+    stream = io.BytesIO(content)
+    version = np.lib.format.read_magic(stream)
+    read_header = (
+        np.lib.format.read_array_header_1_0
+        if version == (1, 0)
+        else np.lib.format.read_array_header_2_0
+    )
+    shape, _, dtype = read_header(stream)
+    if math.prod(shape) * dtype.itemsize > len(content):
+        raise ValueError(f"{shape} values in {len(content)} bytes")
+    stream.seek(0)
+    read: NDArray[Any] = np.load(stream, allow_pickle=False)
+    return read
+
+
+def _check_claim(path: Path, claimed: int) -> None:
+    """Refuse arrays that take too many bytes, before a value is read."""
+    if claimed > _MOST_BYTES:
+        raise RecordingError(
+            f"it claims arrays of {claimed:,} bytes, {_MOST_BYTES:,} are read",
+            fix="save a part of it, or as .npy or HDF5, which are read piece by piece",
+            place=str(path),
+        )
+
+
 def _matlab_arrays(path: Path) -> list[FileArray]:
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
     from scipy.io.matlab import MatReadError
 
     try:
-        with explain_errors(path, "read"):
-            variables = loadmat(path, appendmat=False)
+        with explain_errors(path, "read"), open_regular(path) as file:
+            shapes = [shape for _, shape, _ in whosmat(file, appendmat=False)]
+            _check_claim(path, sum(8 * math.prod(shape) for shape in shapes))
+            file.seek(0)
+            variables = loadmat(file, appendmat=False)
     except MatReadError as error:
         raise RecordingError(
             "it is no MATLAB file, or it is damaged", fix="save it again", place=str(path)
@@ -300,8 +336,11 @@ def _folder_array(folder: Path, image: tuple[int, int]) -> FileArray:
 def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
     with explain_errors(path, "read"):
         try:
-            with open(path, encoding="utf-8-sig", newline="") as file:
-                lines = [line for line in csv.reader(file) if any(cell.strip() for cell in line)]
+            content = foreign_bytes(
+                path, RecordingError, most=_MOST_TABLE, fix="give a table (CSV), or an array (.npy)"
+            )
+            text = io.StringIO(content.decode("utf-8-sig"), newline="")
+            lines = [line for line in csv.reader(text) if any(cell.strip() for cell in line)]
         except (UnicodeError, csv.Error) as bad:
             raise RecordingError(
                 f"it is no table: {bad}", fix="save it as CSV, UTF-8", place=str(path)
@@ -331,15 +370,17 @@ def _picture(path: Path, image: tuple[int, int]) -> NDArray[np.float64]:
 
     with explain_errors(path, "read"):
         try:
-            with Image.open(path) as opened:
-                values = np.asarray(opened)
-        except (UnidentifiedImageError, SyntaxError) as bad:
+            with open_regular(path) as file, Image.open(file) as opened:
+                shape = opened.size[::-1]
+                values = np.asarray(opened) if shape == image else None  # a bomb stays packed
+        except (UnidentifiedImageError, Image.DecompressionBombError, SyntaxError) as bad:
             raise RecordingError(
                 "it is no picture, or it is damaged", fix="save it again", place=str(path)
             ) from bad
-    if values.shape != image or values.dtype.kind not in "uif":
+    if values is None or values.shape != image or values.dtype.kind not in "uif":
+        shape = shape if values is None else values.shape
         raise RecordingError(
-            f"a picture of {' x '.join(map(str, values.shape))}, not of "
+            f"a picture of {' x '.join(map(str, shape))}, not of "
             f"{image[0]} x {image[1]} grey values",
             fix="save it in grey, a pixel a tactel; or give the --sensor-type",
             place=str(path),

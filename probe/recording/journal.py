@@ -30,6 +30,7 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.foreign import open_regular
 from probe.errors import RecordingError
 from probe.frame import WRIST
 from probe.recording.files import (
@@ -115,7 +116,7 @@ class JournalWriter:
 
 def is_journal(path: Path) -> bool:
     """Tell whether a file begins as a journal."""
-    with explain_errors(path, "read"), open(path, "rb") as file:
+    with explain_errors(path, "read"), open_regular(path) as file:
         return file.read(len(_MAGIC)) == _MAGIC
 
 
@@ -129,7 +130,7 @@ def open_journal(path: Path, *, live: bool = False) -> Iterator[FrameFile]:
         raise not_closed_error(path)
     with ExitStack() as stack:
         with explain_errors(path, "read"):
-            file = stack.enter_context(open(path, "rb"))
+            file = stack.enter_context(open_regular(path))
             head, start = _read_head(file)
             sensor, calibration, units, kind = (str(head[name]) for name in _ORIGIN)
             more = MappingProxyType(dict(head["more"]))

@@ -17,19 +17,22 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
-from typing import IO, Any, Final, Self
+from typing import IO, TYPE_CHECKING, Any, BinaryIO, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.errors import require
+from encoded_objects.base.foreign import DAMAGE, open_regular, parse_json, regular_size
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from probe.errors import FrameError, RecordingError
 from probe.frame import Frame, frame_from
 from probe.recording.files import check_name, explain_errors
+from probe.recording.guard import FREE, MOST_CHUNK, PACKED
 from probe.recording.hdf5 import write_recording
 from probe.recording.layout import FrameBlock, RecordingOrigin, block_of, json_value
 from probe.recording.read import Recording
@@ -40,15 +43,25 @@ from probe.recording.ros import (
     METADATA,
     POSE,
     TOUCH_FRAME,
+    cdr_values,
     frame_message,
     image_message,
     pose_message,
 )
 
+if TYPE_CHECKING:
+    from mcap.reader import McapReader
+    from mcap.summary import Summary
+
 IMAGE_TOPIC: Final = "/touch/image"
 POSE_TOPIC: Final = "/touch/pose"
 FRAME_TOPIC: Final = "/touch/frame"
+Message = dict[str, Any]  #: values by name, `cdr_values`
+
+_MEND: Final = "mend it with `mcap recover`"
 _AT_ONCE: Final = 1024  #: frames read at a time
+_RECORD_HEAD: Final = 9  #: bytes before a record: kind, length
+_PARTS: Final = (("orientation", "xyzw"), ("position", "xyz"))  #: of a pose
 _ENCODINGS: Final = {"32FC1": "f4", "16UC1": "u2", "mono16": "u2", "mono8": "u1", "8UC1": "u1"}
 
 
@@ -135,36 +148,83 @@ def import_mcap(
 
 def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
     """Return the origin of the frames of an MCAP file, and these in order of their time."""
-    require("mcap_ros2.decoder", extra="robot", purpose="MCAP")
-    from mcap.exceptions import McapError
-    from mcap.reader import make_reader
-
-    try:
-        with explain_errors(path, "read"), open(path, "rb") as stream:
-            reader = make_reader(stream)
-            summary = reader.get_summary()
-            kinds = {} if summary is None else {s.id: s.name for s in summary.schemas.values()}
-            if summary is not None and IMAGE not in kinds.values():
-                there = ", ".join(sorted(set(kinds.values()))) or "nothing"
-                raise RecordingError(
-                    f"no {IMAGE} in it, but {there}", fix="record the tactile image too",
-                    place=str(path)
-                )  # fmt: skip
-            said = {one.name: one.metadata for one in reader.iter_metadata()}.get(METADATA, {})
-    except McapError as error:
-        raise RecordingError(
-            f"this is no MCAP file ({type(error).__name__})", fix="give a file of ROS 2 messages",
-            place=str(path)
-        ) from error  # fmt: skip
-    try:
-        more = json.loads(said.get("more", "{}"))
-    except ValueError:
-        more = {}
-    origin = RecordingOrigin(
-        said.get("sensor", ""), said.get("calibration", ""), said.get("units", "counts"),
-        said.get("sensor_type", ""), MappingProxyType(dict(more))
-    )  # fmt: skip
+    with _open_mcap(path) as reader:
+        summary = reader.get_summary()
+        kinds = {} if summary is None else {s.id: s.name for s in summary.schemas.values()}
+        if summary is not None and IMAGE not in kinds.values():
+            there = ", ".join(sorted(set(kinds.values()))) or "nothing"
+            raise RecordingError(
+                f"no {IMAGE} in it, but {there[:200]}", fix="record the tactile image too",
+                place=str(path)
+            )  # fmt: skip
+        said = {one.name: one.metadata for one in reader.iter_metadata()}.get(METADATA, {})
+        more = parse_json(said.get("more", "{}"), RecordingError, fix=_MEND, place=str(path))
+        origin = RecordingOrigin(
+            said.get("sensor", ""), said.get("calibration", ""), said.get("units", "counts"),
+            said.get("sensor_type", ""), MappingProxyType(dict(more))
+        )  # fmt: skip
     return origin, _frames(path)
+
+
+@contextmanager
+def _open_mcap(path: Path) -> Iterator[McapReader]:
+    """Open an MCAP file whose chunks unpack to no more than its size allows.
+
+    What its reader raises on damaged content becomes a RecordingError.
+    """
+    require("mcap.reader", "zstandard", extra="robot", purpose="MCAP")
+    from mcap.exceptions import InvalidMagic, McapError
+    from mcap.reader import make_reader
+    from zstandard import ZstdError
+
+    with explain_errors(path, "open"):
+        stream = open_regular(path)
+    with stream:
+        try:
+            reader = make_reader(stream)
+            _check_chunks(path, stream, reader.get_summary())
+            yield reader
+        except InvalidMagic as error:
+            raise RecordingError(
+                "this is no MCAP file, or it is cut off",
+                fix=f"give a file of ROS 2 messages, or {_MEND}", place=str(path)
+            ) from error  # fmt: skip
+        except (*DAMAGE, OSError, McapError, ZstdError) as error:
+            said = f": {str(error)[:120]}" if str(error) else ""
+            raise RecordingError(
+                f"it is damaged ({type(error).__name__}{said})", fix=_MEND, place=str(path)
+            ) from error
+
+
+def _check_chunks(path: Path, stream: BinaryIO, summary: Summary | None) -> None:
+    """Refuse chunks that unpack to more than a chunk takes, or all to more than the file can."""
+    import zstandard
+    from mcap.data_stream import ReadDataStream
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader
+
+    def chunks() -> Iterator[Chunk]:
+        if summary is not None and summary.chunk_indexes:
+            for index in summary.chunk_indexes:
+                stream.seek(index.chunk_start_offset + _RECORD_HEAD)
+                yield Chunk.read(ReadDataStream(stream))
+            return
+        stream.seek(0)
+        for record in StreamReader(stream, emit_chunks=True, record_size_limit=MOST_CHUNK).records:
+            if isinstance(record, Chunk):
+                yield record
+
+    room = FREE + PACKED * regular_size(path)
+    for chunk in chunks():
+        size = max(chunk.uncompressed_size, len(chunk.data))
+        if chunk.compression == "zstd":  # which unpacks what its own head says
+            size = max(size, zstandard.frame_content_size(chunk.data))
+        room -= size
+        if size > MOST_CHUNK or room < 0:
+            raise RecordingError(
+                f"a chunk of {size:,} bytes when unpacked, more than the file can hold",
+                fix="write it again in chunks of some MB", place=str(path)
+            )  # fmt: skip
 
 
 def _blocks(frames: Iterator[Frame], path: Path) -> Iterator[FrameBlock]:
@@ -181,9 +241,9 @@ def _blocks(frames: Iterator[Frame], path: Path) -> Iterator[FrameBlock]:
 def _frames(path: Path) -> Iterator[Frame]:
     """Yield the frames of an MCAP file: ours in the order of the file, others' in that of time."""
     number = 0
-    poses = {_stamp(message): _pose(message.pose) for _, message in _messages(path, {POSE})}
-    image: Any = None
-    rest: Any = None
+    poses = {_stamp(message): _pose(message, path) for _, message in _messages(path, {POSE})}
+    image: Message | None = None
+    rest: Message | None = None
     for kind, message in _messages(path, {IMAGE, TOUCH_FRAME}):
         if kind == IMAGE:
             if image is not None:
@@ -196,44 +256,39 @@ def _frames(path: Path) -> Iterator[Frame]:
         yield _frame(image, rest, poses, number, path)
 
 
-def _messages(path: Path, kinds: Collection[str]) -> Iterator[tuple[str, Any]]:
+def _messages(path: Path, kinds: Collection[str]) -> Iterator[tuple[str, Message]]:
     """Yield type and content of the messages of some types.
 
     Of a file with `TouchFrame` messages poses are left out, for these hold them, and the rest comes
     as it was written: the clock of a probe may restart.
     """
-    from mcap.exceptions import McapError
-    from mcap.reader import make_reader
-    from mcap_ros2.decoder import DecoderFactory
-
-    with explain_errors(path, "read"), open(path, "rb") as stream:
-        try:
-            reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-            summary = reader.get_summary()
-            names = {} if summary is None else {s.id: s.name for s in summary.schemas.values()}
-            channels = {} if summary is None else summary.channels
-            topics = [c.topic for c in channels.values() if names.get(c.schema_id) in kinds]
-            ours = TOUCH_FRAME in names.values()
-            if not topics or (ours and IMAGE not in kinds):
-                return
-            read = reader.iter_decoded_messages(topics=topics, log_time_order=not ours)
-            for schema, _, _, message in read:
-                yield ("" if schema is None else schema.name), message
-        except McapError as error:
-            raise RecordingError(
-                f"it is damaged ({type(error).__name__}: {error})",
-                fix="mend it with `mcap recover`", place=str(path)
-            ) from error  # fmt: skip
+    with _open_mcap(path) as reader:
+        summary = reader.get_summary()
+        names = {} if summary is None else {s.id: s.name for s in summary.schemas.values()}
+        channels = {} if summary is None else summary.channels
+        topics = [c.topic for c in channels.values() if names.get(c.schema_id) in kinds]
+        ours = TOUCH_FRAME in names.values()
+        if not topics or (ours and IMAGE not in kinds):
+            return
+        for schema, channel, message in reader.iter_messages(topics, log_time_order=not ours):
+            kind = "" if schema is None else schema.name
+            if kind not in kinds or channel.message_encoding != "cdr":
+                raise ValueError(f"messages of {kind[:60]!r} as {channel.message_encoding[:20]!r}")
+            yield kind, cdr_values(kind, message.data)
 
 
 def _frame(
-    image: Any, rest: Any, poses: Mapping[int, NDArray[np.float64]], number: int, path: Path
+    image: Message,
+    rest: Message | None,
+    poses: Mapping[int, NDArray[np.float64]],
+    number: int,
+    path: Path,
 ) -> Frame:
     t_ns, seq, wrist = _stamp(image), number, None
     T = poses.get(t_ns)
     if rest is not None:
-        t_ns, seq, wrist = rest.t_ns, rest.seq, np.array(rest.wrist, np.uint16)
-        T = np.array(rest.pose).reshape(4, 4) if rest.has_pose else None
+        t_ns, seq, wrist = rest["t_ns"], rest["seq"], np.array(rest["wrist"], np.uint16)
+        T = np.array(rest["pose"]).reshape(4, 4) if rest["has_pose"] else None
     try:
         return frame_from(_counts(image, number, path), t_ns=t_ns, seq=seq, wrist=wrist, pose=T)
     except FrameError as error:
@@ -242,34 +297,41 @@ def _frame(
         ) from error
 
 
-def _stamp(message: Any) -> int:
-    stamp = message.header.stamp
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+def _stamp(message: Message) -> int:
+    sec, nanosec = message["header.stamp.sec"], message["header.stamp.nanosec"]
+    return int(sec) * 1_000_000_000 + int(nanosec)
 
 
-def _counts(image: Any, number: int, path: Path) -> NDArray[Any]:
-    kind = _ENCODINGS.get(image.encoding)
+def _counts(image: Message, number: int, path: Path) -> NDArray[Any]:
+    kind = _ENCODINGS.get(image["encoding"])
     if kind is None:
         raise RecordingError(
-            f"image {number} is encoded as {image.encoding}",
+            f"image {number} is encoded as {image['encoding'][:40]}",
             fix=f"take {', '.join(_ENCODINGS)}", place=str(path)
         )  # fmt: skip
-    order = ">" if image.is_bigendian else "<"
-    rows = np.frombuffer(bytes(image.data), np.uint8)
-    if rows.size != image.height * image.step or image.step < image.width * int(kind[1]):
+    order = ">" if image["is_bigendian"] else "<"
+    rows = np.frombuffer(image["data"], np.uint8)
+    height, width, step = image["height"], image["width"], image["step"]
+    if rows.size != height * step or step < width * int(kind[1]):
         raise RecordingError(
-            f"image {number} has {rows.size} bytes, not {image.height} rows of {image.step}",
+            f"image {number} has {rows.size} bytes, not {height} rows of {step}",
             fix="write its step and height as they are", place=str(path)
         )  # fmt: skip
-    plain = rows.reshape(image.height, image.step)[:, : image.width * int(kind[1])]
+    plain = rows.reshape(height, step)[:, : width * int(kind[1])]
     return np.ascontiguousarray(plain).view(order + kind)
 
 
-def _pose(pose: Any) -> NDArray[np.float64]:
+def _pose(pose: Message, path: Path) -> NDArray[np.float64]:
     from scipy.spatial.transform import Rotation
 
-    turn, at = pose.orientation, pose.position
+    turn, at = ([pose[f"pose.{part}.{name}"] for name in names] for part, names in _PARTS)
     T = np.eye(4)
-    T[:3, :3] = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
-    T[:3, 3] = 1e3 * np.array([at.x, at.y, at.z])
+    try:
+        T[:3, :3] = Rotation.from_quat(turn).as_matrix()
+    except ValueError as error:
+        raise RecordingError(
+            f"the pose at {_stamp(pose)} ns has no orientation: {turn}",
+            fix="write a unit quaternion", place=str(path)
+        ) from error  # fmt: skip
+    T[:3, 3] = 1e3 * np.array(at)
     return T

@@ -82,13 +82,18 @@ _HEADER_FIELDS: Final = (
 _POSE_FIELDS: Final = tuple((f"pose.pose.position.{name}", "d") for name in "xyz") + tuple(
     (f"pose.pose.orientation.{name}", "d") for name in "xyzw"
 )
-#: type -> its fields in order: a letter of `struct`, `string`, `bytes` (of any length), or 36 d
+#: type -> its fields in order: a letter of `struct`, `string`, `bytes` and `[]H` (of any length),
+#: or 36 d
 FIELDS: Final[dict[str, tuple[tuple[str, str], ...]]] = {
     IMAGE: (
         *_HEADER_FIELDS, ("height", "I"), ("width", "I"), ("encoding", "string"),
         ("is_bigendian", "B"), ("step", "I"), ("data", "bytes")
     ),
-    POSE_WITH_COVARIANCE: (*_HEADER_FIELDS, *_POSE_FIELDS, ("pose.covariance", "36d"))
+    POSE_WITH_COVARIANCE: (*_HEADER_FIELDS, *_POSE_FIELDS, ("pose.covariance", "36d")),
+    POSE: (*_HEADER_FIELDS, *((name.removeprefix("pose."), form) for name, form in _POSE_FIELDS)),
+    TOUCH_FRAME: (
+        ("t_ns", "q"), ("seq", "q"), ("wrist", "[]H"), ("has_pose", "?"), ("pose", "16d")
+    ),
 }  # fmt: skip
 
 
@@ -174,6 +179,39 @@ def cdr_bytes(kind: str, fields: Mapping[str, Any]) -> bytes:
         else:
             _append(body, form, value)
     return b"\0\1\0\0" + bytes(body)
+
+
+def cdr_values(kind: str, message: bytes) -> dict[str, Any]:
+    """Return the values of a message of one of the types of `FIELDS` by their names; undoes it.
+
+    The layout is that of the type, whatever definition a file gives it. Raises ValueError: it is
+    no plain CDR, or ends too early.
+    """
+    if len(message) < 4 or message[0] or message[1] > 1:
+        raise ValueError("a message that is no plain CDR")
+    order, at = "<" if message[1] else ">", 4
+    values: dict[str, Any] = {}
+
+    def take(form: str) -> tuple[Any, ...]:
+        nonlocal at
+        at += -(at - 4) % struct.calcsize(form[-1])
+        at += struct.calcsize(order + form)
+        if at > len(message):
+            raise ValueError(f"a message of {len(message)} bytes, which is cut off")
+        return struct.unpack_from(order + form, message, at - struct.calcsize(order + form))
+
+    for name, form in FIELDS[kind]:
+        if form in ("string", "bytes", "[]H"):
+            (length,) = take("I")
+            if form == "[]H":
+                values[name] = take(f"{length}H") if length else ()
+                continue
+            (text,) = take(f"{length}s")
+            values[name] = text.rstrip(b"\0").decode() if form == "string" else text
+        else:
+            found = take(form)
+            values[name] = found if len(form) > 1 else found[0]
+    return values
 
 
 def _append(body: bytearray, form: str, *values: float) -> None:

@@ -32,6 +32,7 @@ from probe.contact.contract import Touch
 from probe.contact.press import accuracy_of, level_for
 from probe.errors import ContactError, SurfaceError
 from probe.frame import Frame
+from probe.port.address import MOST_HZ
 from probe.simulate.scene import Scene
 from probe.simulate.sensor import SimulatedSensor, simulated_sensor
 from probe.simulate.target import surface_of
@@ -42,6 +43,12 @@ LEVELS = 16  #: of the force while it rises and falls: each is one contact
 TRIES = 64  #: directions tried for the next step, places tried that hold no sensor
 DOWN, HELD, UP = 0.15, 0.65, 0.80  #: shares of a period: full force, begin to lift, off
 _DEFAULTS = {"tilt": 0.0, "step": 5.0, "period": 2.0, "rate": 100.0, "seed": 0.0}
+#: least and most of each number: mm, degrees, N, s, Hz
+_RANGES = {
+    "x": (-1e4, 1e4), "y": (-1e4, 1e4), "theta": (-360.0, 360.0), "force": (0.0, 1e4),
+    "tilt": (0.0, 45.0), "step": (0.0, 1e4), "period": (0.01, 3600.0), "rate": (0.1, MOST_HZ),
+    "seed": (0.0, 2.0**53),
+}  # fmt: skip
 _CHOICES = {"overlay": ("tab", "pad"), "noise": ("typical", "quiet")}
 _WORDS = ("accuracy", "sensor_type")
 NAMES = ("x", "y", "theta", "force", *_DEFAULTS, *_CHOICES, *_WORDS)
@@ -102,10 +109,10 @@ def _number(name: str, text: str, place: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    signed, zero = name in ("x", "y", "theta"), name in ("force", "tilt", "step", "seed")
-    if not math.isfinite(value) or not (signed or value > 0 or (zero and value == 0)):
-        allowed = "a number" if signed else "0 or more" if zero else "a number above 0"
-        raise SurfaceError(f"{name}={text!r}", fix=f"write {allowed}", place=place)
+    least, most = _RANGES[name]
+    if not least <= value <= most:
+        fix = f"write a number from {least:g} to {most:g}"
+        raise SurfaceError(f"{name}={text!r}", fix=fix, place=place)
     return value
 
 

@@ -12,6 +12,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from encoded_objects.base.foreign import MOST_TEXT, foreign_bytes
 from recognizer.command.options import five_angles
 from recognizer.errors import RecognizerError
 
@@ -118,12 +119,8 @@ def read_joints(path: Path) -> Joints:
     ScanError
         It cannot be read, or a line holds something else.
     """
-    try:
-        lines = path.read_text("utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScanError(
-            f"cannot read joint angles: {error}", fix="give a text file", place=str(path)
-        ) from error
+    content = foreign_bytes(path, ScanError, most=MOST_TEXT, fix="give a text file of joint angles")
+    lines = content.decode("utf-8", "replace").splitlines()
     found = []
     for number, line in enumerate(lines, start=1):
         words = line.partition("#")[0].replace(",", " ").split()

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from encoded_objects.base.files import staged_file
+from encoded_objects.base.foreign import DAMAGE, foreign_json
 from recognizer.errors import SensorStateError
 from recognizer.sensor.learn import LEAST_TOUCHES
 from recognizer.touch.sensor_state import ASIDE_SD_MM, SensorState
@@ -63,14 +64,7 @@ def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -
         The file is none, of a newer version, damaged, or another sensor's.
     """
     place, again = str(path), "learn the sensor again: recognize-object --learn FILE"
-    try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SensorStateError(
-            f"cannot be read: {error.strerror}", fix=again, place=place
-        ) from error
-    except ValueError as error:
-        raise SensorStateError(f"is no JSON: {error}", fix=again, place=place) from error
+    document = foreign_json(path, SensorStateError, fix=again)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise SensorStateError("is no state of a sensor", fix=again, place=place)
     if document.get("version") != VERSION:
@@ -94,7 +88,7 @@ def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -
         )
         if (state.gain <= 0).any():
             raise ValueError("gains are above 0")
-    except (KeyError, TypeError, ValueError, SensorStateError) as error:
+    except (*DAMAGE, SensorStateError) as error:
         raise SensorStateError(f"is damaged: {error!r}", fix=again, place=place) from error
     if sensors and state.sensor not in sensors:
         raise SensorStateError(

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.foreign import foreign_bytes
 from encoded_objects.base.sensor_type import SensorType
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import Frame
@@ -160,12 +161,12 @@ def _calibration_in(folder: Path, named: str) -> tuple[Calibration | None, str]:
 
     for path in sorted(folder.glob("*.json")):
         try:
-            small = path.stat().st_size <= LARGEST
-            if small and named.encode() in path.read_bytes():
+            content = foreign_bytes(path, CalibrationError, most=LARGEST, fix="")
+            if named.encode() in content:
                 known = read_calibration(path)
                 if calibration_hash(known) == named:
                     return known, ""
-        except (OSError, CalibrationError):  # not the one
+        except CalibrationError:  # not the one
             continue
     return None, (
         f"the recording names calibration {named[:12]}..., which is not beside it: read as counts;"

@@ -10,7 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from encoded_objects.base.foreign import foreign_bytes
 from generator.errors import ShapeError
 from generator.polyhedron.read.mesh import solid_of_soup
 from generator.polyhedron.read.obj import read_obj
@@ -53,7 +55,7 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
             solid = read_step(content, place, scale)
         else:
             solid = solid_of_soup(MESHES[suffix](content, place), "file", scale)
-        _check_size(solid)
+        check_size(solid.vertices, place)
         return solid
     except ShapeError as error:
         if error.place.startswith(place):
@@ -62,31 +64,26 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
         raise ShapeError(error.cause, fix=error.fix, place=where) from None
 
 
-def _check_size(solid: Polyhedron) -> None:
-    largest = float(np.ptp(solid.vertices, axis=0).max())
+def check_size(points: NDArray[np.float64], place: str) -> None:
+    """Refuse points (n, 3), mm, that are farther from one another than a length in a spec."""
+    largest = float(np.ptp(points, axis=0).max())
     if largest > LARGEST_MM:
         raise ShapeError(
             f"the model is {largest / 1000:.3g} m long; {LARGEST_MM / 1000:g} m are allowed",
             fix="check its unit: shape: {file: ..., scale: 0.001} makes it a thousandth",
+            place=place,
         )
 
 
 def file_content(file: Path, place: str, largest: int) -> bytes:
     """Return the bytes of a file, at least one and at most `largest`; `ShapeError` if it cannot."""
-    try:
-        size = file.stat().st_size
-        if size > largest:
-            raise ShapeError(
-                f"the file has {size / 2**20:.0f} MB; {largest // 2**20} MB are allowed",
-                fix="simplify the model: planar faces need few triangles",
-                place=place,
-            )
-        content = file.read_bytes()
-    except OSError as error:
-        reason = (error.strerror or "cannot be read").lower()
-        raise ShapeError(
-            reason, fix="give the path of a file that you can read", place=place
-        ) from None
+    content = foreign_bytes(
+        file,
+        lambda cause, **rest: ShapeError(cause, **rest | {"place": place}),
+        most=largest,
+        fix="give the path of a file that you can read",
+        large="simplify the model: planar faces need few triangles",
+    )
     if not content:
         raise ShapeError("the file is empty", fix="export the model again", place=place)
     return content

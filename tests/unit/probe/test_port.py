@@ -19,14 +19,16 @@ import numpy as np
 import pytest
 
 from probe.client.client import Client
-from probe.errors import PortError
+from probe.command import run
+from probe.errors import PortError, SurfaceError
 from probe.frame import Frame, frame_from
 from probe.port.address import Address
 from probe.port.flexitac import MARKER, PAUSE_LEAST_S, MarkedImages
 from probe.port.serial_line import _explain_refusal
 from probe.port.software import SoftwareProbe, endless_frames
 from probe.port.url import GROUP, address_of, open_port, typed_port
-from probe.protocol import FramePacket, IdentPacket, Splitter, StatisticsPacket, decode
+from probe.protocol import FramePacket, IdentPacket, Splitter, StatisticsPacket, decode, encode
+from probe.recording.read import Recording
 
 
 @pytest.mark.parametrize(
@@ -56,6 +58,11 @@ def test_urls_are_read(url, target, options):
         ("sim:?rate=fast", "rate='fast' is no number from 0.1"),
         ("sim:?rate=0", "rate='0' is no number from 0.1"),
         ("sim:?rate=inf", "is no number"),
+        ("sim:?rate=1e9", "rate='1e9' is no number from 0.1 to 10000"),
+        ("sim:?rate=nan", "is no number"),
+        ("file:touch.h5?speed=1e300", "is no number from 0 to 1e+06"),
+        ("file:touch.h5?loop=2", "is no number from 0 to 1"),
+        ("serial:///dev/ttyACM0?baud=1e30", "is no number from 1 to 2e+07"),
         ("file:touch.h5?speed=-1", "no number from 0"),
         ("serial:///dev/ttyACM0?boud=1", "serial: has no option boud"),
     ],
@@ -65,7 +72,14 @@ def test_urls_that_mean_nothing_are_refused(url, says):
         open_port(url)
     assert says in str(refused.value)
     assert refused.value.fix
-    assert refused.value.exit_code == 3
+    assert refused.value.exit_code == 2
+
+
+@pytest.mark.parametrize("option", ["period=1e9", "force=-1", "seed=1e300", "x=nan"])
+def test_options_of_a_simulated_part_are_in_their_range(option):
+    with pytest.raises(SurfaceError, match="write a number from") as refused:
+        open_port(f"sim:washer?{option}")
+    assert refused.value.exit_code == 2
 
 
 def test_without_permission_the_group_is_named(tmp_path):
@@ -105,6 +119,116 @@ def line():
 
 
 IDENT = IdentPacket(0, 0, name="test")
+
+
+def packet(seq, shape=(16, 16)) -> bytes:
+    return encode(
+        FramePacket(seq % 65536, 10_000 * seq, np.full(shape, 7, np.uint16), np.zeros(4, np.uint16))
+    )
+
+
+def spoilt(seq) -> bytes:
+    """Return a frame whose check sum is wrong."""
+    block = bytearray(packet(seq))
+    block[20] ^= 1
+    return bytes(block)
+
+
+NOISE = np.random.default_rng(1).integers(0, 256, 1 << 20, dtype=np.uint8).tobytes()
+#: what a device sends as packet number `seq`, and what is said of it
+# fmt: off
+FAULTS = {
+    "bad checks": (lambda seq: encode(IDENT) if not seq else spoilt(seq), "no image comes through"),
+    "bad checks alone": (spoilt, "no packets of a probe"),
+    "changing shapes": (
+        lambda seq: packet(seq, ((16, 16), (12, 32))[seq % 2]), "change their shape"),
+    "garbage": (lambda seq: NOISE[500 * seq % (1 << 19) :][:500], "no packets of a probe"),
+    "garbage without end": (lambda _: b"x" * 500, "no packets of a probe"),
+    "silence": (lambda _: b"", "silent for 0.8 s"),
+    "an ident alone": (lambda seq: b"" if seq else encode(IDENT), "sends no images"),
+    "no numbers": (lambda _: packet(3), "no image of the last 0.8 s agrees"),
+    "another shape": (
+        lambda seq: packet(seq, ((16, 16), (12, 32))[seq > 20]), "changed from 16 x 16 to"),
+    "silence later": (lambda seq: packet(seq) if seq < 20 else b"", "silent for 0.8 s"),
+    "bad checks later": (
+        lambda seq: packet(seq) if seq < 20 else spoilt(seq), "packets of a probe"),
+}
+# fmt: on
+
+
+@contextmanager
+def sending(packet_of, period_s=0.005, goes_after=None):
+    """Yield the URL of a device that sends packet after packet once it is greeted, or goes."""
+    master, slave = pty.openpty()
+    tty.setraw(master)
+    name = os.ttyname(slave)
+    stop = threading.Event()
+
+    def send():
+        os.read(master, 1)
+        os.close(slave)
+        for seq in itertools.count():
+            if stop.wait(period_s) or seq == goes_after:
+                break
+            if data := packet_of(seq):
+                with suppress(OSError):
+                    os.write(master, data)
+        os.close(master)
+
+    thread = threading.Thread(target=send, daemon=True)
+    thread.start()
+    try:
+        yield f"serial://{name}"
+    finally:
+        stop.set()
+        thread.join(5)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_line_without_images_is_told_by_what_comes(fault):
+    packet_of, said = FAULTS[fault]
+    with sending(packet_of) as url, Client(url, answer_s=0.8) as client:
+        began_s = time.monotonic()
+        with pytest.raises(PortError, match=said) as failed:
+            list(client.frames(timeout_s=5))
+        assert time.monotonic() < began_s + 5
+    assert failed.value.exit_code == 3
+    assert failed.value.place == url
+    assert failed.value.fix
+
+
+def test_what_is_damaged_between_good_images_is_counted():
+    def packet_of(seq):
+        return spoilt(seq) if seq % 5 == 4 else packet(seq)
+
+    with sending(packet_of) as url, Client(url, answer_s=0.8) as client:
+        read = list(islice(client.frames(timeout_s=5), 200))
+        counts = client.statistics()
+    assert len(read) == 200
+    assert counts.failed > 30
+    assert counts.lost >= 30
+
+
+def test_a_lone_image_of_another_shape_is_dropped():
+    def packet_of(seq):
+        return packet(seq, (12, 32) if seq == 20 else (16, 16))
+
+    with sending(packet_of) as url, Client(url, answer_s=0.8) as client:
+        read = list(islice(client.frames(timeout_s=5), 50))
+    assert {frame.counts.shape for frame in read} == {(16, 16)}
+    assert len(read) == 50
+
+
+def test_a_recording_whose_device_goes_says_that_it_ended_early(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("probe.command.recorded._SILENT_S", 0.5)
+    out = tmp_path / "touch.h5"
+    with sending(packet, goes_after=60) as url:
+        code = run(["record", url, "-o", str(out), "--seconds", "1"])
+    said = capsys.readouterr().err
+    assert code == 3
+    assert f"{url}: error: the recording ended early: 0." in said
+    assert "of 1 s" in said
+    assert len(Recording(out)) > 30
 
 
 def frame(seq: int, t_ns: int) -> Frame:
