@@ -23,7 +23,6 @@ from encoded_objects.base.compiled import addresses
 from recognizer.touch.options import Effort
 from recognizer.touch.symbols.image import (
     Image,
-    balanced_gain,
     deep_gain,
     first_gain,
     normalize_image,
@@ -121,11 +120,8 @@ def search_image(
     """
     if gains is None:
         deep = deep_gain(image)
-        if deep is None:
-            guessed = (first_gain(image), tilted_gain(image))
-            gains = [gain for gain in guessed if gain is not None]
-        else:
-            gains = [deep, balanced_gain(image, deep)]
+        guessed = (first_gain(image), tilted_gain(image) if deep is None else deep)
+        gains = [gain for gain in guessed if gain is not None]
     return tuple(CoarseSearch(gain, _search_under(image, bank, gain)) for gain in gains)
 
 

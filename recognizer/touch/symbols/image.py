@@ -316,13 +316,18 @@ def deep_gain(image: Image) -> Array | None:
     return np.asarray(bounded_gain(np.array([[math.log(scale), *plane]]))[0])
 
 
-def balanced_gain(image: Image, deep: Array) -> Array:
+def balanced_gain(image: Image) -> Array | None:
     """Return the gain (4,) of a plate pressed at its centre that balances over the loaded area.
+
+    None where `deep_gain` is.
 
     Forces on an even bed u0 + ux x + uy y over that area A balance about the centre if the integral
     of (1, x, y) (1, x, y)^T over A, times (u0, ux, uy), is along (1, 0, 0). Symbols are no even bed
-    and tabs harden, so the plate tilts less. `deep` is the image's `deep_gain`.
+    and tabs harden, so the plate tilts less.
     """
+    deep = deep_gain(image)
+    if deep is None:
+        return None
     basis = image.plane[image.loaded & (image.trust > 0)]
     even = np.linalg.lstsq(basis.T @ basis, np.array([1.0, 0.0, 0.0]), rcond=None)[0]
     slopes = BALANCED_SLOPE * even[1:] / max(float(even[0]), 1e-9)
