@@ -99,6 +99,16 @@ def _claimed_beside(file: h5py.File) -> None:
     file.create_dataset("t_ns", (10**9,), np.int64, chunks=(64,))
 
 
+def _packed_twice(file: h5py.File) -> None:
+    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    made.set_chunk((4, 16, 16))
+    made.set_deflate(1)
+    made.set_fletcher32()
+    made.set_deflate(9)
+    space = h5py.h5s.create_simple(IMAGES.shape)
+    h5py.h5d.create(file.id, b"frames", h5py.h5t.NATIVE_UINT16, space, dcpl=made)
+
+
 def _first_chunk_only(file: h5py.File) -> None:
     file.create_dataset("frames", (10**9, 16, 16), np.uint16, chunks=(64, 16, 16))[0] = 1
 
@@ -139,6 +149,7 @@ HOSTILE: dict[str, tuple[Callable[[h5py.File], None], str]] = {
         _claimed(9, chunks=(10**6, 16, 16), maxshape=(None, 16, 16)),
         "/frames is stored in chunks of 512,000,000 bytes, 67,108,864 can be read",
     ),
+    "packed twice": (_packed_twice, "/frames is packed twice"),
     "groups in groups": (_deep, "groups 64 deep"),
     "10,002 objects": (_many, "more than 10,000 objects"),
 }

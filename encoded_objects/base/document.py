@@ -6,6 +6,7 @@ raises. A problem prints as `file:line:column: error: cause`, the line, a caret 
 
 from __future__ import annotations
 
+import os
 import re
 import unicodedata
 from collections.abc import Iterable
@@ -149,7 +150,7 @@ def read_text(path: Path, kind: DocumentKind) -> str:
     except FileNotFoundError:
         raise refusal("there is no such file", _suggest_similar(path, kind)) from None
     except OSError as error:
-        if path.is_dir():
+        if os.path.isdir(path):
             fix = f"name the files in it, for example {path / '*.yaml'}"
             raise refusal(f"this is a folder, not {kind.name}", fix) from None
         fix = "check the name and the rights of the file"

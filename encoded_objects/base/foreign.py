@@ -133,13 +133,14 @@ def foreign_member(archive: ZipFile, name: str, most: int) -> bytes:
 
     Raises `ValueError` where it is longer, and what is in `DAMAGE`.
     """
+    from lzma import LZMAError
     from zipfile import BadZipFile
 
     try:
         if archive.getinfo(name).file_size > most:  # the archive reads no more than it says here
             raise ValueError(f"{name} takes more than {_size_words(most)} when it is unpacked")
         return archive.read(name)
-    except (BadZipFile, NotImplementedError, OSError) as error:
+    except (BadZipFile, LZMAError, NotImplementedError, OSError) as error:
         raise ValueError(str(error)) from error
 
 
@@ -150,9 +151,12 @@ def run_limited(
     memory_bytes: int,
     cpu_s: float,
     written_bytes: int,
+    folder: str | os.PathLike[str] | None = None,
     ending: Callable[[], bool] = lambda: False,
 ) -> tuple[int, bytes]:
     """Run a module of ours in a process of its own; return its exit code and what it printed.
+
+    It works in `folder`, the current one by default.
 
     The system ends it where it takes more memory (address space), time or room of one file; the
     code is negative then: the number of the signal. `ending` ends it at any time.
@@ -167,6 +171,7 @@ def run_limited(
     one_thread = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
     with subprocess.Popen(  # noqa: S603 - our own module, no shell
         command,
+        cwd=folder,
         env={**os.environ, **one_thread, "PYTHONPATH": path},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,

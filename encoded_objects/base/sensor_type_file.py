@@ -6,6 +6,7 @@ everything else is a file. Lengths in mm.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from functools import lru_cache
@@ -248,7 +249,7 @@ def sensor_type_named(name: str) -> SensorType:
     if name in shipped_names():
         return parse_sensor_type(shipped_text(name), f"{name}.yaml")
     path = Path(name)
-    if path.suffix in SENSOR_FILES or path.parent != Path() or path.exists():
+    if path.suffix in SENSOR_FILES or path.parent != Path() or os.path.exists(path):
         return _sensor_type(read_tree(path, _KIND))
     fix = suggest(name, shipped_names(), f"take {', '.join(shipped_names())}, or a file")
     raise SensorTypeError([Problem(f"there is no sensor type '{name}'", fix, file="--sensor-type")])

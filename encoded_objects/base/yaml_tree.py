@@ -21,6 +21,7 @@ DEPTH_MAX = 16
 
 Place = tuple[str | int, ...]  #: keys and list positions from the root
 
+_HALF_LETTER = re.compile("[\ud800-\udfff]")
 _INTEGER = re.compile(r"[-+]?[0-9]{1,400}\Z")
 _HEXADECIMAL = re.compile(r"0x[0-9a-fA-F]{1,300}\Z")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?\Z")
@@ -219,14 +220,14 @@ class _Reader:
 
     def _key(self, event: Any, events: Iterator[Any]) -> str | None:
         if isinstance(event, yaml.ScalarEvent) and event.anchor is None and event.tag is None:
-            return str(event.value)
+            return self._text(event)
         self._refuse(event, "a setting must have a plain name", "write it as  name: value")
         _discard(event, events)
         return None
 
     def _scalar(self, event: Any) -> Any:
         """Return a scalar's value by the rules of YAML 1.2; quoted text stays text."""
-        text: str = event.value
+        text = self._text(event)
         if not event.implicit[0]:
             return text
         if text in _WORDS:
@@ -236,6 +237,14 @@ class _Reader:
         if _HEXADECIMAL.match(text):
             return int(text, 16)
         return float(text) if _FLOAT.match(text) else text
+
+    def _text(self, event: Any) -> str:
+        """Return the text of a scalar; refuse halves of letters, which escapes can write."""
+        text: str = event.value
+        whole = _HALF_LETTER.sub("\N{REPLACEMENT CHARACTER}", text)
+        if whole != text:
+            self._refuse(event, "half a letter in the text", "write the letter itself")
+        return whole
 
     def _mark(self, event: Any) -> SourceMark:
         return SourceMark(self.source, event.start_mark.line + 1, event.start_mark.column + 1)

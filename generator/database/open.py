@@ -35,6 +35,7 @@ from generator.database.tables import FORMAT, SCHEMA_VERSION, meta, metadata
 from generator.database.transaction import (
     WAIT_S,
     begin_sqlite,
+    note_engine,
     place_of,
     read_transaction,
     write_transaction,
@@ -155,12 +156,14 @@ def _sqlite_engine(url: URL, path: Path, writable: bool, wait_s: float) -> Engin
             uri, uri=True, timeout=wait_s, isolation_level=None, check_same_thread=False
         )
         connection.execute("PRAGMA foreign_keys = ON")
+        connection.execute("PRAGMA trusted_schema = OFF")
         if not writable:
             connection.execute("PRAGMA query_only = ON")
         return connection
 
     engine = create_engine(url, creator=connect, poolclass=NullPool)
     event.listen(engine, "begin", begin_sqlite)
+    event.listen(engine, "handle_error", note_engine)
     return engine
 
 
@@ -183,6 +186,7 @@ def _postgresql_engine(url: URL, writable: bool, wait_s: float) -> Engine:
     except ImportError as error:
         fix = install_line("postgres")
         raise DatabaseError("psycopg is not installed", fix=fix, place=place_of(url)) from error
+    event.listen(engine, "handle_error", note_engine)
     if not writable:
         event.listen(engine, "connect", _read_only)
     return engine
@@ -305,6 +309,15 @@ def _schema_version(connection: Connection) -> int | None:
             fix="name a database of its own for encoded objects, such as lab.db",
             place=place_of(url),
         )
+    if url.get_backend_name() == "sqlite":
+        # Statements of a stranger, which would run without end as rows are read or written.
+        foreign = text("SELECT type, name FROM sqlite_master WHERE type IN ('view', 'trigger')")
+        if (row := connection.execute(foreign).first()) is not None:
+            raise DatabaseError(
+                f"it holds a {row.type} '{str(row.name)[:40]}', which this tool never makes",
+                fix=f"delete it: sqlite3 FILE 'DROP {row.type.upper()} ...'; or take a copy",
+                place=place_of(url),
+            )
     said = stored.get("schema_version", "")
     version = int(said) if said.isascii() and said.isdecimal() else 0
     if version < 1:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Select, Table, func, literal, select
 
+from generator.alphabet.known import alphabet_from
 from generator.alphabet.outline import SymbolStyle
 from generator.database import tables
 from generator.database.registered import (
@@ -139,7 +140,8 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
         .join(tables.provenance)
         .where(tables.objects.c.object_id == entry.object_id)
     ).one()
-    spec = json.loads(text)
+    spec, glyphs = json.loads(text), json.loads(alphabet)
+    alphabet_from(glyphs)  # or an AlphabetError
     return RegisteredObject(
         entry=entry,
         polyhedron=polyhedron,
@@ -147,7 +149,7 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
         layout=layout,
         style=SymbolStyle(*style),
         array=read_array(connection, entry.array_id),
-        alphabet=json.loads(alphabet),
+        alphabet=glyphs,
         parts=read_parts(connection, entry.object_id),
         spec=spec,
     )

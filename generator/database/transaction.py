@@ -18,7 +18,7 @@ from traceback import walk_tb
 from typing import TypeVar
 
 import numpy as np
-from sqlalchemy import URL, Connection, Engine, text
+from sqlalchemy import URL, Connection, Engine, ExceptionContext, text
 from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
 from encoded_objects.base.foreign import DAMAGE
@@ -45,33 +45,58 @@ def write_transaction(engine: Engine) -> Iterator[Connection]:
         Other writers keep the database for too long, the place is read-only or full, or the
         database refuses a row (a cell that another object holds).
     """
-    try:
-        with engine.connect() as connection:
-            connection.execution_options(writing=True)
-            with connection.begin():
-                take_turn(connection)
-                yield connection
-    except _FAILURES as error:
-        if not _is_of_rows(error):
-            raise
-        raise explain_error(error, engine.url) from error
+    with explain_failures(engine), engine.connect() as connection:
+        connection.execution_options(writing=True)
+        with connection.begin():
+            take_turn(connection)
+            yield connection
 
 
 @contextmanager
 def read_transaction(engine: Engine) -> Iterator[Connection]:
     """Open a transaction that sees one state of the database, whatever others write."""
+    with explain_failures(engine), engine.connect() as connection:
+        if connection.dialect.name == "postgresql":
+            connection.execution_options(
+                isolation_level="REPEATABLE READ", postgresql_readonly=True
+            )
+        with connection.begin():
+            yield connection
+
+
+@contextmanager
+def explain_failures(
+    engine: Engine, home: URL | None = None, *, alone: bool = True
+) -> Iterator[None]:
+    """Explain what fails in a database, by its place `home`, if that is not the engine's.
+
+    Not `alone`: another database takes part, whose own errors pass. Raises DatabaseError: the
+    driver reports an error, or rows hold what was never written.
+    """
     try:
-        with engine.connect() as connection:
-            if connection.dialect.name == "postgresql":
-                connection.execution_options(
-                    isolation_level="REPEATABLE READ", postgresql_readonly=True
-                )
-            with connection.begin():
-                yield connection
+        yield
     except _FAILURES as error:
-        if not _is_of_rows(error):
+        theirs = isinstance(error, DBAPIError) and getattr(error, "engine", engine) is not engine
+        if (theirs and not alone) or not _is_of_rows(error):
             raise
-        raise explain_error(error, engine.url) from error
+        raise explain_error(error, home or engine.url) from error
+
+
+def note_engine(context: ExceptionContext) -> None:
+    """Let an error of the driver remember its engine; a listener of `handle_error`."""
+    if context.sqlalchemy_exception is not None:
+        context.sqlalchemy_exception.engine = context.engine  # type: ignore[attr-defined]
+
+
+@contextmanager
+def rows_explained(url: URL) -> Iterator[None]:
+    """Turn what comes of rows that were never written into a DatabaseError about this database."""
+    try:
+        yield
+    except (*DAMAGE, GeneratorError) as error:
+        if isinstance(error, DatabaseError):
+            raise
+        raise explain_error(error, url) from error
 
 
 def take_turn(connection: Connection) -> None:
@@ -99,12 +124,14 @@ def _is_of_rows(error: BaseException) -> bool:
     """Tell whether an error came up where rows are read, not in the work of a transaction."""
     if isinstance(error, SQLAlchemyError | DatabaseError):
         return isinstance(error, SQLAlchemyError)
-    names = {frame.f_globals.get("__name__", "") for frame, _ in walk_tb(error.__traceback__)}
+    names = [frame.f_globals.get("__name__", "") for frame, _ in walk_tb(error.__traceback__)]
     if isinstance(error, GeneratorError):  # a value that nothing can be made from
         return "generator.database.read" in names
-    return any(
-        name.startswith(("sqlalchemy.", "generator.database.")) for name in names - {__name__}
-    )
+    ours = [name for name in names if name.startswith(("sqlalchemy.", "generator.database."))]
+    ours = [name for name in ours if name != __name__]
+    return (
+        bool(ours) and ours[-1] != "generator.database.register"
+    )  # which refuses what it is given
 
 
 def explain_error(error: Exception, url: URL) -> DatabaseError:
@@ -137,7 +164,8 @@ def explain_error(error: Exception, url: URL) -> DatabaseError:
                 fix="run the same command again",
                 place=place,
             )
-        return DatabaseError(f"the database refuses the object: {first_line}", place=place)
+        cause = f"the database refuses the object: {first_line}"
+        return DatabaseError(cause, fix=_RESTORE, place=place)
     if code is None and url.get_backend_name() == "sqlite":
         return DatabaseError(f"the database is damaged: {first_line}", fix=_RESTORE, place=place)
     if code is None:

@@ -219,6 +219,11 @@ def _json_numbers(row: np.ndarray) -> list[Any]:
 
 
 def _calibration_of(document: dict[str, Any]) -> Calibration:
+    for name, kind in (("sensor", str), ("made", str), ("full", int)):
+        if type(document[name]) is not kind:
+            raise ValueError(f"{name} is no {'text' if kind is str else 'whole number'}")
+    if not 1 <= document["full"] <= 65535:
+        raise ValueError(f"a full scale of {document['full']}")
     board = document["board"]
     if board is not None:
         board = Electronics(**{**board, "noise": Noise(**board["noise"])})

@@ -90,7 +90,7 @@ class SerialLine:
 
 def _explain_refusal(address: Address, failed: Exception, baud: int) -> PortError:
     device, number_ = Path(address.target), getattr(failed, "errno", None)
-    if not device.exists():
+    if not os.path.exists(device):
         there = ", ".join(entry.url for entry in list_ports()) or "none"
         cause, fix = f"there is no {device}", f"plug the probe in; ports that are there: {there}"
     elif number_ in (errno.EACCES, errno.EPERM):

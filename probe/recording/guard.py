@@ -255,6 +255,13 @@ def _checked_cache(
     layout = made.get_layout()
     if layout == h5py.h5d.VIRTUAL or made.get_external_count():
         raise _leads_out(path, place)
+    filters = [made.get_filter(number)[0] for number in range(made.get_nfilters())]
+    if len(set(filters)) < len(filters):
+        raise RecordingError(
+            f"{place[:80]} is packed twice, and may unpack to any size",
+            fix="save it with one compression",
+            place=str(path),
+        )
     shape, size = dataset.shape, dataset.get_type().get_size()
     chunked = layout == h5py.h5d.CHUNKED
     chunk = made.get_chunk() if chunked else (1,) * len(shape)

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 SUFFIXES: Final = (".png", ".pgm", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg")
 _AT_ONCE: Final = 1024  #: images read at a time
-_MOST_BYTES: Final = 1 << 30  #: of the arrays of an archive, which are read as a whole
+_MOST_BYTES: Final = 1 << 29  #: of the arrays of an archive, which are read as a whole
 _MOST_TABLE: Final = 128 << 20  #: bytes of a table: its cells take 16 times that in memory
 _FULL: Final = 65535  #: counts
 

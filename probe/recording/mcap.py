@@ -159,11 +159,22 @@ def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
             )  # fmt: skip
         said = {one.name: one.metadata for one in reader.iter_metadata()}.get(METADATA, {})
         more = parse_json(said.get("more", "{}"), RecordingError, fix=_MEND, place=str(path))
+        odd = [name for name, value in {**said, **dict(more)}.items() if not _is_kept(value)]
+        if odd:
+            raise RecordingError(
+                f"attribute {odd[0][:60]!r} of the recording is no text, number or array of them",
+                fix="write it as one of these", place=str(path)
+            )  # fmt: skip
         origin = RecordingOrigin(
             said.get("sensor", ""), said.get("calibration", ""), said.get("units", "counts"),
             said.get("sensor_type", ""), MappingProxyType(dict(more))
         )  # fmt: skip
     return origin, _frames(path)
+
+
+def _is_kept(value: object) -> bool:
+    """Tell whether a recording can hold a value as an attribute."""
+    return "\0" not in value if isinstance(value, str) else np.asarray(value).dtype.kind in "biuf"
 
 
 @contextmanager
@@ -181,7 +192,7 @@ def _open_mcap(path: Path) -> Iterator[McapReader]:
         stream = open_regular(path)
     with stream:
         try:
-            reader = make_reader(stream)
+            reader = make_reader(stream, validate_crcs=True)
             _check_chunks(path, stream, reader.get_summary())
             yield reader
         except InvalidMagic as error:

@@ -7,6 +7,7 @@ it is, to its last whole record.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -159,11 +160,11 @@ def open_frames(
 
 def _files_of(path: Path, live: bool) -> list[Path]:
     """Return the files of a recording, in order; `path` itself if there are none."""
-    if path.exists():
+    if os.path.exists(path):  # also of a name that is too long
         return [path]
     series = [file for _, file in series_of(path)]
     part = part_of(path)
-    if part.exists() and not (live and series and _is_blank(part)):
+    if os.path.exists(part) and not (live and series and _is_blank(part)):
         series.append(part)
     return series or [path]
 

@@ -17,12 +17,18 @@ from encoded_objects.base.files import staged_file
 from encoded_objects.base.foreign import DAMAGE, foreign_json
 from recognizer.errors import SensorStateError
 from recognizer.sensor.learn import LEAST_TOUCHES
+from recognizer.sensor.wiring import WORDS
 from recognizer.touch.sensor_state import ASIDE_SD_MM, SensorState
 
 FORMAT = "tactile sensor state"
 VERSION = 1
 DIGITS = 7  #: significant digits of every number
-_ARRAYS = ("offset", "gain", "gain_deviation", "aside_mm", "aside_deviation_mm")
+#: least and most of each array that can be learned: counts or N, shares, mm
+_RANGES = {
+    "offset": (-1e5, 1e5), "gain": (1e-3, 1e3), "gain_deviation": (0.0, 1e3),
+    "aside_mm": (-10.0, 10.0), "aside_deviation_mm": (0.0, 10.0),
+}  # fmt: skip
+_ARRAYS = tuple(_RANGES)
 
 
 def write_state(state: SensorState, path: str | os.PathLike[str]) -> None:
@@ -44,6 +50,8 @@ def write_state(state: SensorState, path: str | os.PathLike[str]) -> None:
         "drift": float(f"{state.drift:.{DIGITS}g}"),
         "tactels": ["".join(row) for row in letters],
     }
+    if state.mounting is not None:
+        document["mounting"] = list(state.mounting)
     document |= {name: _round_digits(getattr(state, name).tolist()) for name in _ARRAYS}
     lines = ",\n".join(f"  {json.dumps(key)}: {_text(value)}" for key, value in document.items())
     try:
@@ -84,10 +92,13 @@ def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -
             hot=letters == "H",
             floating=bool(document["floating"]),
             drift=float(document["drift"]),
+            mounting=_mounting(document.get("mounting")),
             **{name: np.array(document[name], np.float64) for name in _ARRAYS},
         )
-        if (state.gain <= 0).any():
-            raise ValueError("gains are above 0")
+        for name, (least, most) in _RANGES.items():
+            values = getattr(state, name)
+            if not ((values >= least) & (values <= most)).all():
+                raise ValueError(f"{name} from {least:g} to {most:g}")
     except (*DAMAGE, SensorStateError) as error:
         raise SensorStateError(f"is damaged: {error!r}", fix=again, place=place) from error
     if sensors and state.sensor not in sensors:
@@ -116,6 +127,7 @@ def state_entry(state: SensorState) -> dict[str, Any]:
         if known.any()
         else 0.0,
         "drift": state.drift,
+        "mounting": None if state.mounting is None else WORDS[state.mounting],
     }
 
 
@@ -124,10 +136,10 @@ def state_words(state: SensorState) -> str:
     entry = state_entry(state)
     many = "1 touch" if state.touches == 1 else f"{state.touches:,} touches"
     if state.touches < LEAST_TOUCHES:
-        return (
-            f"{state.sensor}: {many}, too few to learn from; touch {LEAST_TOUCHES} places or more"
-        )
-    parts = []
+        few = f"{many}, too few to learn from; touch {LEAST_TOUCHES} places or more"
+        known = "" if state.mounting is None else f"mounted {WORDS[state.mounting]}; "
+        return f"{state.sensor}: {known}{few}"
+    parts = [] if state.mounting is None else [f"mounted {WORDS[state.mounting]}"]
     for name, what in (("dead", "never answer"), ("hot", "read high with nothing on them")):
         if len(entry[name]):
             parts.append(f"{len(entry[name])} of {state.dead.size} tactels {what}")
@@ -140,6 +152,13 @@ def state_words(state: SensorState) -> str:
     if abs(state.drift) >= (0.05 if state.newtons else 2.0):
         parts.append(f"the background drifted by {state.drift:+.2g} {unit}")
     return f"{state.sensor}, {many}: {'; '.join(parts)}"
+
+
+def _mounting(stored: list[str] | None) -> tuple[str, ...] | None:
+    found = None if stored is None else tuple(stored)
+    if found is not None and found not in WORDS:
+        raise ValueError(f"mounting is one of {[list(known) for known in WORDS]}")
+    return found
 
 
 def _round_digits(value: Any) -> Any:

@@ -33,7 +33,7 @@ from generator.database.registered import (
     RegisteredStyle,
     RoundFace,
 )
-from generator.database.transaction import read_transaction
+from generator.database.transaction import read_transaction, rows_explained
 from probe.surface.polygon import FaceRegion, polygon
 from recognizer.errors import LabError
 from recognizer.touch.as_built import PrintedFace, print_of, usual_print
@@ -154,12 +154,13 @@ class EmbossedArray:
         if number not in self.known:
             object_id = int(self.faces[number, 0])
             numbers = np.flatnonzero(self.faces[:, 0] == object_id)
-            with read_transaction(self.engine) as connection:
-                found = read_object(connection, self.names[object_id])
-                prints = (*read_as_built(connection, object_id), *read_as_built(connection))
-            encoded = dict(_encoded_faces(found, prints))
-            for near in numbers.tolist():
-                self.known[near] = encoded[int(self.faces[near, 1])]
+            with rows_explained(self.engine.url):
+                with read_transaction(self.engine) as connection:
+                    found = read_object(connection, self.names[object_id])
+                    prints = (*read_as_built(connection, object_id), *read_as_built(connection))
+                encoded = dict(_encoded_faces(found, prints))
+                for near in numbers.tolist():
+                    self.known[near] = encoded[int(self.faces[near, 1])]
         return self.known[number]
 
 
@@ -206,7 +207,7 @@ def open_lab(database: str | Path) -> Lab:
     """
     url = str(database)
     engine = open_database(url, writable=False)
-    with read_transaction(engine) as connection:
+    with rows_explained(engine.url), read_transaction(engine) as connection:
         arrays = tuple(_embossed_arrays(connection, engine))
     if not arrays:
         raise LabError(

@@ -116,9 +116,9 @@ def test_recognize_object_refuses_it(folder, lab, capsys, monkeypatch):
 
 
 def ended(process, number):
-    """Send a signal; return how many seconds of CPU the process took to end, and its exit code."""
+    """Send a signal; return how many seconds of CPU it took to end, and the exit code."""
     others_s = children_s()
-    times = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    times = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:15]
     before_s = sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
     process.send_signal(number)
     code = process.wait(PATIENCE_S)

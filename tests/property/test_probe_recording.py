@@ -1,9 +1,8 @@
-"""Whatever is recorded is read again; whatever happens to a file, nothing else is read."""
+"""Whatever is recorded is read again; what happens to files: `test_foreign.py`."""
 
 from __future__ import annotations
 
 import tempfile
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded import record, same
 
-from probe.errors import RecordingError
 from probe.frame import Frame, frame_from
 from probe.recording.read import Recording
-from probe.recording.repair import repair
 
 
 def stream(seed: int, count: int, gaps: float, poses: float) -> list[Frame]:
@@ -59,42 +56,3 @@ def test_any_stream_is_read_as_it_was(seed, count, poses, flush_s, roll_over_s, 
         assert len(part) == len(frames[start : start + length])
         assert all(map(same, part, frames[start : start + length]))
         assert len(recording.block(start, start + length)) == len(part)
-
-
-@settings(deadline=None, max_examples=30)
-@given(seed=st.integers(0, 2**32), kind=st.sampled_from(["flip", "zero", "cut", "insert"]))
-def test_a_hurt_file_is_refused_or_gives_frames_that_were_recorded(seed, kind):
-    frames, whole = recorded()
-    rng = np.random.default_rng(seed)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "touch.h5"
-        content = bytearray(whole)
-        at = int(rng.integers(0, len(content)))
-        if kind == "flip":
-            content[at] ^= 1 << int(rng.integers(8))
-        elif kind == "zero":
-            content[at : at + 512] = bytes(len(content[at : at + 512]))
-        elif kind == "cut":
-            del content[at:]
-        else:
-            content[at:at] = rng.bytes(64)
-        path.write_bytes(content)
-        by_seq = {frame.seq: frame for frame in frames}
-        for attempt in (lambda path: Recording(path).frames(), repaired):
-            try:
-                read = list(attempt(path))
-            except RecordingError:
-                continue
-            assert all(same(frame, by_seq[frame.seq]) for frame in read)
-
-
-@cache
-def recorded() -> tuple[list[Frame], bytes]:
-    """Return frames, and the file that holds them."""
-    frames = stream(1, 200, 0.1, 0.5)
-    with tempfile.TemporaryDirectory() as folder:
-        return frames, record(Path(folder) / "touch.h5", frames).files[0].read_bytes()
-
-
-def repaired(path: Path):
-    return Recording(repair(path).path).frames()

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
-import subprocess
-import sys
+import signal
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.errors import install_line
+from encoded_objects.base.foreign import run_limited
 from generator.errors import ShapeError
 from generator.polyhedron.read.merge import merge_triangles
 from generator.polyhedron.read.soup import soup_of_loops, weld
@@ -28,7 +27,10 @@ from generator.polyhedron.winged import Face, Polyhedron, developable_from, poly
 
 Loops = list[list[int]]
 
-LONGEST_S = 300.0  #: of the CAD kernel's process, which is stopped then
+#: of the CAD kernel's process, which is stopped then: a cone of 1 MB takes 52 s of a busy machine
+LONGEST_S, LEAST_S, SECONDS_MB = 300.0, 60.0, 120.0
+MEMORY, MEMORY_FOLD = 2 << 30, 200  #: bytes of address space (it loads .8 GB), and for each byte
+MOST_ANSWER = 1 << 30  #: bytes
 FACET_WELD = 1e-5  #: points of the kernel's facets nearer than this share of the size are one
 LISTED_BLANK = 12  #: blank faces of one kind that a note names with their places
 
@@ -75,25 +77,20 @@ def _ask_kernel(content: bytes, place: str, scale: float) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         model, answer = Path(folder) / "model.step", Path(folder) / "answer.json"
         model.write_bytes(content)
-        command = [sys.executable, "-m", KERNEL, str(model), str(answer), repr(scale)]
-        path = os.pathsep.join(entry for entry in sys.path if entry)
+        seconds = min(LONGEST_S, LEAST_S + SECONDS_MB * len(content) / 1e6)
         try:
-            subprocess.run(  # noqa: S603 - our own module, no shell
-                command,
-                env={**os.environ, "PYTHONPATH": path},
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                timeout=LONGEST_S,
-                check=True,
-            )
-            found: dict[str, Any] = json.loads(answer.read_text())
-        except subprocess.TimeoutExpired:
-            cause = f"the CAD kernel did not finish in {LONGEST_S:.0f} s"
-            raise ShapeError(cause, fix="simplify the model", place=place) from None
-        except (subprocess.CalledProcessError, OSError, ValueError):
-            cause = "the CAD kernel broke down on it"
-            raise ShapeError(cause, fix=_AGAIN, place=place) from None
+            code, _ = run_limited(
+                KERNEL, [str(model), str(answer), repr(scale)], cpu_s=seconds,
+                memory_bytes=MEMORY + MEMORY_FOLD * len(content), written_bytes=MOST_ANSWER,
+            )  # fmt: skip
+        except TimeoutError:
+            code = -signal.SIGXCPU
+        if code in (-signal.SIGXCPU, -signal.SIGKILL):
+            cause = f"the CAD kernel did not finish in {seconds:.0f} s of processor time"
+            raise ShapeError(cause, fix="simplify the model", place=place)
+        if code:
+            raise ShapeError("the CAD kernel broke down on it", fix=_AGAIN, place=place)
+        found: dict[str, Any] = json.loads(answer.read_text())
     return found
 
 

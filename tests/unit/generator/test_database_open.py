@@ -7,6 +7,7 @@ import signal
 import sqlite3
 import tempfile
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,8 @@ from alembic.migration import MigrationContext
 from sqlalchemy import select, text
 
 from generator.array.lab_key import read_lab_key
+from generator.cad import encode
+from generator.command import run
 from generator.database import migrate, tables
 from generator.database.cells import occupied_cells
 from generator.database.lab import lab_key
@@ -157,6 +160,52 @@ def unprivileged():
             if root:
                 os.seteuid(0)
             folder.chmod(0o755)
+
+
+@pytest.fixture(scope="module")
+def cube_lab(tmp_path_factory):
+    """Return a database that holds a cube."""
+    path = tmp_path_factory.mktemp("lab") / "lab.db"
+    encode("name: Cube\nshape: {cube: 40 mm}\n", database=str(path), formats=())
+    return path
+
+
+DAMAGED = {
+    "a definition that is no JSON": "UPDATE arrays SET definition = '{'",
+    "a definition nested too deep": f"UPDATE arrays SET definition = '{'[' * 5000}'",
+    "a definition of another type": "UPDATE arrays SET definition = '[]'",
+    "an array that is gone": "DELETE FROM arrays",
+    "an alphabet that is none": "UPDATE alphabets SET definition = 'null'",
+    "a spec that is no JSON": "UPDATE provenance SET spec = ''",
+    "a text where a number was": "UPDATE cells SET x_mm = 'x'",
+    "bytes that are no text": "UPDATE objects SET name = CAST(x'ff' AS TEXT)",
+    "a table that is gone": "DROP TABLE faces",
+    "a view": "CREATE VIEW v AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT 1 FROM c) "
+    "SELECT * FROM c",
+    "a trigger": "CREATE TRIGGER t AFTER INSERT ON objects BEGIN DELETE FROM objects; END",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGED)
+def test_a_damaged_database_says_so_at_every_command(damage, cube_lab, tmp_path, capsys):
+    path = tmp_path / "lab.db"
+    shutil.copy(cube_lab, path)
+    with closing(sqlite3.connect(path)) as plain, plain:
+        plain.execute("PRAGMA foreign_keys = OFF")
+        plain.execute(DAMAGED[damage])
+    (tmp_path / "box.yaml").write_text("name: Box\nshape: {cube: 30 mm}\n")
+    box = [str(tmp_path / "box.yaml"), "--dry-run", "-o", str(tmp_path / "out")]
+    codes = set()
+    commands = (["list"], ["show", "Cube"], ["lab"], ["export", str(tmp_path / "o.db")], box)
+    for command in (*commands, ["import", str(path)]):
+        lab = tmp_path / "new.db" if "import" in command else path
+        code = run([*command, "--database", str(lab)])
+        said = capsys.readouterr().err
+        codes.add(code)
+        assert code in (0, 4), said
+        assert code == 0 or (f"{tmp_path}/" in said and "fix: " in said), said
+        assert not list(tmp_path.glob(".*"))
+    assert 4 in codes
 
 
 def test_a_read_only_place_is_refused_for_writing_alone(unprivileged):

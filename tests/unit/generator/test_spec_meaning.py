@@ -356,3 +356,14 @@ def test_words_of_people():
         format_option(" , ")
     with pytest.raises(SpecError, match="--database: error: 'postgresql:/name' is half an address"):
         database_option("postgresql:/name")
+
+
+@pytest.mark.parametrize(
+    "block", ["print: {printer: {file: own.yaml}}", "symbols: {alphabet: {file: own.yaml}}"]
+)
+def test_a_file_of_settings_that_names_itself_is_refused(block, tmp_path):
+    (tmp_path / "own.yaml").write_text("file: own.yaml\n")
+    (tmp_path / "c.yaml").write_text(f"name: C\nshape: {{cube: 40 mm}}\n{block}\n")
+    with pytest.raises(SpecError) as refused:
+        read_specs([tmp_path / "c.yaml"])
+    assert "own.yaml:1:7: error: this file names another one" in str(refused.value)

@@ -109,8 +109,8 @@ def test_a_file_that_is_no_text_of_ours(text, message):
         ("x.yaml", "there is no such file",
          "write a first one with: encode-object init cube -o cube.yaml"),
         ("a\0b", "cannot read: embedded null byte", "check the name and the rights of the file"),
-        ("/dev/zero", "the file is larger than 256 KiB",
-         "give a large polyhedron as a file, for example shape: {file: part.stl}"),
+        ("/dev/zero", "cannot read: it is a device, not a file",
+         "check the name and the rights of the file"),
     ],
 )  # fmt: skip
 def test_unreadable_file(path, cause, fix):

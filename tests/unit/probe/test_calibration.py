@@ -3,6 +3,7 @@
 import json
 import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -274,3 +275,17 @@ def test_drift_of_the_bias_warns_and_nothing_else_does(made, sensor):
     for bad in (np.zeros((8, 8)), NONE - 1, NONE + np.nan):
         with pytest.raises(CalibrationError):
             expected_counts(bad, made)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("full", "x"), ("full", None), ("full", 10**30), ("full", 0), ("sensor", []), ("made", 3),
+     ("gain_s", [[]]), ("gain_s", 10**30), ("board", []), ("condition", [["?"]]), ("loads", 3)],
+)  # fmt: skip
+def test_a_calibration_with_values_of_another_type_is_damaged(name, value, tmp_path):
+    file = Path(__file__).parents[3] / "fixtures/recordings/calibration.json"
+    changed = tmp_path / "c.json"
+    changed.write_text(json.dumps(json.loads(file.read_text()) | {name: value}))
+    with pytest.raises(CalibrationError, match="is damaged: ") as refused:
+        read_calibration(changed)
+    assert refused.value.place == str(changed)
