@@ -1,7 +1,8 @@
 """Build hook: the C files of a folder -> its `kernels.so`, by the compiler that `ziglang` brings.
 
 No compiler is needed on the machine. The code is for any processor of its kind, so that a wheel
-may be kept and moved; products and sums are not contracted, so that it rounds as numpy does.
+may be kept and moved; products and sums are not contracted, so that it rounds as numpy does. The
+same text and compiler give the same bytes, wherever they are built.
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 FOLDERS = ("probe/surface", "recognizer/touch")
-OPTIONS = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC", "-mcpu=baseline"]
+OPTIONS = [
+    "-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC", "-mcpu=baseline",
+    "-g0", "-s",
+]  # fmt: skip
 
 
 class CompiledKernels(BuildHookInterface):  # type: ignore[misc, type-arg]
@@ -36,7 +40,9 @@ def compile_folder(folder: Path) -> None:
     made, draft = folder / "kernels.so", folder / "kernels.so.draft"
     text = b"".join(source.read_bytes() for source in sources)
     made_of = f"-DSOURCE_SUM={zlib.crc32(text)}u"
-    compiled = [str(source) for source in sources if source.suffix == ".c"]
-    arguments = [*OPTIONS, made_of, *compiled, "-lm", "-o", str(draft)]
-    subprocess.run([sys.executable, "-m", "ziglang", "cc", *arguments], check=True)  # noqa: S603
+    compiled = [str(source.relative_to(folder)) for source in sources if source.suffix == ".c"]
+    arguments = [*OPTIONS, made_of, *compiled, "-lm", "-o", draft.name]
+    # From its own folder, so that no name of a folder comes into the library.
+    command = [sys.executable, "-m", "ziglang", "cc", *arguments]
+    subprocess.run(command, check=True, cwd=folder)  # noqa: S603
     draft.replace(made)

@@ -61,6 +61,10 @@ class WriteError(GeneratorError):
     exit_code = 1
 
 
+class FileThereError(GeneratorError):
+    """A file of somebody else, which is not replaced unasked."""
+
+
 class DatabaseError(GeneratorError):
     """A database that cannot be opened, is newer than this tool, or refuses the object."""
 

@@ -16,6 +16,8 @@ from probe.errors import FrameError
 
 WRIST = 4  #: transducers of the wrist
 
+MOST_HZ = 10_000.0  #: frames a second of a probe in software; boards reach 500
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,6 +11,25 @@ from pathlib import Path
 from typing import IO
 
 from encoded_objects.base.errors import EncodedObjectsError
+
+NAME_LENGTH = 60  #: characters of the name of an object, which names files and rows too
+_NAME = re.compile(r"[^\W_][\w .()+-]*\Z")
+
+
+def name_fault(name: str) -> tuple[str, str] | None:
+    """Return what is wrong with the name of an object, and the way out; None if nothing is.
+
+    >>> name_fault("Cube"), name_fault("../Cube")[0]
+    (None, "'../Cube' cannot be part of a file name")
+    """
+    if not name.strip():
+        return "the name is empty", "write, for example, name: Cube"
+    if len(name) > NAME_LENGTH:
+        return f"the name has {len(name)} characters, {NAME_LENGTH} are allowed", "shorten it"
+    if not _NAME.match(name) or name[-1] in " .":
+        fix = "use letters, digits, spaces and - _ . ( ) +, a letter or digit first"
+        return f"{name!r} cannot be part of a file name", fix
+    return None
 
 
 def refuse_taken(out: Path, suffix: str, *, replace: bool) -> None:

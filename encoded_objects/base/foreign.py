@@ -151,9 +151,12 @@ def run_limited(
     memory_bytes: int,
     cpu_s: float,
     written_bytes: int,
+    folder: str | os.PathLike[str] | None = None,
     ending: Callable[[], bool] = lambda: False,
 ) -> tuple[int, bytes]:
     """Run a module of ours in a process of its own; return its exit code and what it printed.
+
+    It works in `folder`, the current one by default.
 
     The system ends it where it takes more memory (address space), time or room of one file; the
     code is negative then: the number of the signal. `ending` ends it at any time.
@@ -168,6 +171,7 @@ def run_limited(
     one_thread = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
     with subprocess.Popen(  # noqa: S603 - our own module, no shell
         command,
+        cwd=folder,
         env={**os.environ, **one_thread, "PYTHONPATH": path},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from encoded_objects.base.errors import UsageError
 from encoded_objects.base.options import Application, Argument, Json, Option, command
 from generator.command import NAME
+
+if TYPE_CHECKING:
+    from encoded_objects.base.document import Problem
+    from generator.spec import ObjectSpec
 
 HELP = """Emboss objects with a pseudo-random array, so that a touch tells object, face and place.
 
@@ -74,7 +80,14 @@ def encode(
         Option("Slice the plates with PrusaSlicer: time and filament on the build sheet.",
                names=("--slice",)),
     ] = False,
-    replace: Annotated[bool, Option("Allow a changed spec under a registered name.")] = False,
+    replace: Annotated[
+        bool,
+        Option("Allow a changed spec under a registered name, and replace files that no object "
+               "of the database has made."),
+    ] = False,
+    yes: Annotated[
+        bool, Option("Write where a spec says without a question, also outside its folder.")
+    ] = False,
     printed_check: Annotated[
         bool,
         Option("Slice and print in simulation: which symbols survive; makes a picture, registers "
@@ -106,6 +119,8 @@ def encode(
     url = database_option(database) if database else None
     sensor = sensor_type_option(sensor_type) if sensor_type else ""
     found = read_specs(specs, database=url, sensor_type=sensor)
+    if not (yes or dry_run):
+        _confirm_places(found, folder, url, as_json=as_json)
     with progress_bar("reading", 1) as bar:
 
         def progress(what: str, share: float) -> None:
@@ -134,3 +149,61 @@ def encode(
     else:
         print_made(made, dry_run=dry_run, as_json=as_json)
     return 0
+
+
+def _confirm_places(
+    specs: Sequence[ObjectSpec], folder: Path | None, url: str | None, *, as_json: bool
+) -> None:
+    """Ask before a spec writes outside its folder and the current one; leave if the answer is no.
+
+    What the command line names is not asked for.
+
+    Raises
+    ------
+    SpecError
+        Nobody is there to be asked.
+    """
+    from generator.spec.problem import SpecError
+
+    outside = {
+        (problem.place, problem.cause): problem
+        for spec in specs
+        for problem in _places_outside(spec, folder, url)
+    }
+    if not outside:
+        return
+    if as_json or not sys.stdin.isatty():
+        raise SpecError(list(outside.values()))
+    import typer
+
+    for problem in outside.values():
+        sys.stderr.write(f"{problem.place}: {problem.cause}\n")
+    if not typer.confirm("Write there?", err=True):
+        raise typer.Exit(1)
+
+
+def _places_outside(spec: ObjectSpec, folder: Path | None, url: str | None) -> Iterator[Problem]:
+    """Yield what a spec says of places outside its folder and the current one."""
+    from encoded_objects.base.document import Problem
+    from generator.database.open import normal_url, without_password
+    from generator.spec.problem import mark_of
+
+    said = spec.source.value.get("output") if isinstance(spec.source.value, dict) else None
+    said = said if isinstance(said, dict) else {}
+    near = (Path.cwd().resolve(), spec.source.folder.resolve())
+    places: dict[str, tuple[Path | None, str, str]] = {}
+    if folder is None and said.get("folder") is not None:
+        places["folder"] = (spec.folder.resolve(), str(spec.folder.resolve()), "-o DIR")
+    if url is None and said.get("database") is not None:
+        home = normal_url(spec.database)
+        on_disk = home.get_backend_name() == "sqlite"
+        path = Path(home.database or "").resolve() if on_disk else None
+        shown = without_password(spec.database) if path is None else str(path)
+        places["database"] = (path, shown, "--database URL")
+    for key, (path, shown, option) in places.items():
+        if path is None or not any(path.is_relative_to(home) for home in near):
+            yield Problem(
+                f"output: {key} writes to {shown}, outside the spec's folder and the current one",
+                f"confirm it with --yes, or say where: {option}",
+                mark_of(spec.source, f"output.{key}"),
+            )

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import URL, Connection, Table, insert, select
 
+from encoded_objects.base.files import name_fault
 from encoded_objects.base.foreign import DAMAGE
 from generator.array import array_from
 from generator.array.contract import SymbolArray
@@ -47,6 +49,9 @@ GEOMETRY = (
     tables.placements,
     tables.cells,
 )  #: what makes two objects the same, in an order that foreign keys allow
+
+PART_SUFFIXES = {kind: f".{kind}" for kind in ("step", "stl", "3mf", "glb")}
+"""Ending of the files of parts, by their format."""
 
 _DAMAGED = "export it once more, from the lab that registered it"
 
@@ -127,6 +132,33 @@ def check_cells(target: Connection, name: str, here: ArrayHere, cells: Rows) -> 
             "arrays of their own; without one, or with the same, share one database instead, "
             "postgresql://HOST/NAME",
         )
+
+
+def check_names(name: str, old: str, parts: Rows, home: URL) -> None:
+    """Refuse a name that no spec may give, and files that no part of an export has.
+
+    Parameters
+    ----------
+    name, old
+        Of the object here, and where it comes from.
+    parts
+        Its rows of the table of parts.
+    home
+        Where it comes from; on a server parts have absolute names.
+    """
+    if fault := name_fault(name):
+        raise CopyRefusedError(f"may not be called so: {fault[0]}", f"--rename {old!r}=NEW")
+    for part in parts:
+        file = PurePosixPath(part["file"])
+        inside = home.get_backend_name() != "sqlite" or not (
+            file.is_absolute() or ".." in file.parts
+        )
+        plain = part["file"].isprintable() and part["name"].isprintable()
+        if not inside or not plain or PART_SUFFIXES.get(part["format"]) != file.suffix:
+            raise CopyRefusedError(
+                f"names a file of its part that lies elsewhere or is none: {part['file']!r}",
+                f"export it from that lab: encode-object export FILE --object {old!r}",
+            )
 
 
 def geometry(source: Connection, object_id: int) -> dict[Table, Rows]:
@@ -266,7 +298,8 @@ def copy_objects(
                 else:
                     known.append(name)
             except CopyRefusedError as error:
-                refused.append(RefusedCopy(name, error.cause, error.fix))
+                shown = name if name.isprintable() else repr(name)
+                refused.append(RefusedCopy(shown, error.cause, error.fix))
     if refused and not skip_refused:
         raise _refusal(refused, place_of(homes[1]))
     return CopyReport(tuple(copied), tuple(known), tuple(refused))
@@ -282,6 +315,9 @@ def _copy_object(
     homes: tuple[URL, URL],
 ) -> bool:
     """Copy one object, if it is new; check all of it before the first row is written."""
+    parts = rows_of(source, tables.parts, entry.object_id)
+    if origin:
+        check_names(name, entry.name, parts, homes[0])
     present = find_object(target, name)
     if present is not None:
         if same_object(source, entry, target, present):
@@ -295,6 +331,9 @@ def _copy_object(
     check_alphabet(source, row["alphabet_id"])
     rows = geometry(source, entry.object_id)
     check_cells(target, name, here, rows[tables.cells])
+    texts = (x for found in rows.values() for one in found for x in one.values())
+    if not all(text.isprintable() for text in texts if isinstance(text, str)):
+        raise CopyRefusedError("has names that cannot be shown", _DAMAGED)
     check_readable(source, entry.name)
 
     array_id, alphabet_id = (
@@ -311,9 +350,9 @@ def _copy_object(
     cells = rows[tables.cells]
     at = tuple(np.array([cell[key] for cell in cells], np.int64) for key in ("row", "column"))
     mark_cells(target, array_id, (at[0], at[1]), taken=True)
-    parts = rows_of(source, tables.parts, entry.object_id)
     for part in parts:
-        part["file"] = part_file(homes[1], str(part_path(homes[0], part["file"])))
+        path = part_path(homes[0], part["file"])
+        part["file"] = part_file(homes[1], str(path)) if origin else _sent_along(homes, path)
     insert_rows(target, tables.parts, [part | new for part in parts])
     prints = rows_of(source, tables.as_built, entry.object_id)
     for print_ in prints:
@@ -322,6 +361,19 @@ def _copy_object(
     provenance = rows_of(source, tables.provenance, entry.object_id)
     insert_rows(target, tables.provenance, [row | new | dict(origin or {}) for row in provenance])
     return True
+
+
+def _sent_along(homes: tuple[URL, URL], path: Path) -> str:
+    """Return how an export names the file of a part, which may be sent along: from its own folder.
+
+    One that lies elsewhere keeps its place below the lab's folder, or its name alone.
+    """
+    for url in reversed(homes):
+        if url.get_backend_name() == "sqlite":
+            named = part_file(url, str(path))
+            if not named.startswith(".."):
+                return named
+    return path.name
 
 
 def _refusal(refused: Sequence[RefusedCopy], place: str) -> DatabaseError:

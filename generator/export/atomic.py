@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from generator.errors import WriteError
+from generator.errors import FileThereError, WriteError
 
 _PREFIX = ".encode-object-"
 
@@ -64,7 +64,7 @@ class Staging:
             self.folder.mkdir(parents=True, exist_ok=True)
         try:
             with _named_errors(self.folder, "write into the folder"):
-                _remove_leftovers(self.folder)
+                remove_leftovers(self.folder)
                 self._hidden, self._lock = _locked_folder(self.folder)
         except BaseException:
             self._remove_made()
@@ -106,6 +106,22 @@ class Staging:
         checksum = sha256.hexdigest() if digest else ""
         self.written.append(StagedFile(final, self._hidden / name, size, checksum))
         return self.written[-1]
+
+    def refuse_others(self) -> None:
+        """Refuse to replace files that are other ones than were written here.
+
+        Raises
+        ------
+        FileThereError
+            Names the first of them.
+        """
+        for written in self.written:
+            if written.path.exists() and not _same_bytes(written.staged, written.path):
+                raise FileThereError(
+                    "there is a file of this name, and no object of this database has made it",
+                    fix="move it, choose another folder with -o, or replace it with --replace",
+                    place=str(written.path),
+                )
 
     def commit(self) -> tuple[StagedFile, ...]:
         """Move all files under their final names; files of those names are replaced.
@@ -156,9 +172,19 @@ def _locked_folder(folder: Path) -> tuple[Path, int]:
         os.close(lock)
 
 
-def _remove_leftovers(folder: Path) -> None:
-    """Remove the hidden folders whose owner is gone."""
-    for hidden in sorted(folder.glob(_PREFIX + "*")):
+def _same_bytes(one: Path, other: Path) -> bool:
+    if not other.is_file() or one.stat().st_size != other.stat().st_size:
+        return False
+    with open(one, "rb") as ours, open(other, "rb") as theirs:
+        while piece := ours.read(1 << 20):
+            if piece != theirs.read(1 << 20):
+                return False
+    return True
+
+
+def remove_leftovers(folder: Path, *, below: bool = False) -> None:
+    """Remove the hidden folders whose owner is gone, `below`: of the folders in this one."""
+    for hidden in sorted(folder.glob("*/" * below + _PREFIX + "*")):
         try:
             lock = os.open(hidden, os.O_RDONLY)
         except OSError:

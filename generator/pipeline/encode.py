@@ -20,6 +20,7 @@ from generator.database.cells import occupancy
 from generator.database.lab import lab_key as stored_lab_key
 from generator.database.open import open_database, open_if_there
 from generator.database.transaction import read_transaction
+from generator.export.atomic import remove_leftovers
 from generator.pipeline.choose import ArrayChoice, choose_array, lab_of
 from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
@@ -66,7 +67,8 @@ def encode(
     slice_plates
         Slice the plates with the installed PrusaSlicer: time and filament on the build sheet.
     replace
-        Allow a changed spec under a registered name; its old cells become free.
+        Allow a changed spec under a registered name; its old cells become free. Also files that
+        no object of the database has made.
     jobs
         Processes that make the objects of a set; left out, one for each processor.
 
@@ -95,6 +97,8 @@ def encode(
             )
             for plan in plans
         ]  # fmt: skip
+        for parent in sorted({job.folder.parent for job in to_make}):
+            remove_leftovers(parent, below=True)
         if len(to_make) == 1:
             made = [make_under_lock(engine, to_make[0], rest, dry_build)]
         else:

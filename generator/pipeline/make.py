@@ -8,14 +8,15 @@ chosen before, so that several processes build at once and only the rows wait fo
 from __future__ import annotations
 
 import dataclasses
+import os
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
-from generator.database.open import part_file
-from generator.database.read import find_object
+from generator.database.open import part_file, part_path
+from generator.database.read import find_object, read_parts
 from generator.database.register import ObjectRecord, register
 from generator.database.transaction import WriteConflictError, write_transaction
 from generator.export.atomic import Staging
@@ -62,7 +63,7 @@ def make_under_lock(
                 placed = place_object(connection, plan, job.replace)
             staged = _stage(job, placed, staging, part_of_progress(progress, 0.1, 0.9))
             progress(f"registering {name}", 0.9)
-            _register(connection, plan, placed, staged)
+            _register(connection, job, placed, staged, staging)
         return _commit(job, placed, staged, staging)
 
 
@@ -77,7 +78,7 @@ def make_at(
                 known = find_object(connection, job.plan.spec.name)
                 if (known is not None) != (placed.reused or placed.replaces):
                     raise WriteConflictError("an object of this name came or went meanwhile")
-                _register(connection, job.plan, placed, staged)
+                _register(connection, job, placed, staged, staging)
             return _commit(job, placed, staged, staging)
     except WriteConflictError:
         return make_under_lock(engine, job, progress)
@@ -93,10 +94,22 @@ def _stage(
     )  # fmt: skip
 
 
+def has_files_in(connection: Connection, name: str, folder: Path) -> bool:
+    """Whether an object is registered with files of parts in this folder, which are ours then."""
+    known, url = find_object(connection, name), connection.engine.url
+    here = Path(os.path.normpath(folder.absolute()))
+    return known is not None and any(
+        part_path(url, part.file).parent == here for part in read_parts(connection, known.object_id)
+    )
+
+
 def _register(
-    connection: Connection, plan: ObjectPlan, placed: PlacedObject, staged: StagedObject
-) -> None:
-    url = connection.engine.url
+    connection: Connection, job: MakeJob, placed: PlacedObject, staged: StagedObject,
+    staging: Staging,
+) -> None:  # fmt: skip
+    plan, url = job.plan, connection.engine.url
+    if not (job.replace or has_files_in(connection, plan.spec.name, job.folder)):
+        staging.refuse_others()
     registration = ObjectRecord(
         name=plan.spec.name,
         polyhedron=plan.polyhedron,

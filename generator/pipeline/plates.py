@@ -67,8 +67,15 @@ def write_set(
     progress: Progress,
     *,
     slice_plates: bool = False,
+    replace: bool = False,
 ) -> tuple[Path, ...]:
-    """Write the files of a set; return their paths."""
+    """Write the files of a set; return their paths.
+
+    Raises
+    ------
+    FileThereError
+        Another file has the name of one, and may not be replaced.
+    """
     name = _name(objects)
     measured: list[SetPart] = []
     for number, (job, layout) in enumerate(objects):
@@ -115,6 +122,8 @@ def write_set(
             beds = [plate.printer.bed_mm for plate in plates]
             staging.write(overview[0], overview_pdf(name, packed, beds))
         staging.write(f"{name}-packing.csv", listed)  # last: it says that the others are there
+        if not replace:
+            staging.refuse_others()
         staging.commit()
     return tuple(folder / each for each in names)
 

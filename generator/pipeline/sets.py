@@ -23,7 +23,7 @@ from generator.database.transaction import read_transaction
 from generator.export.formats import EXPORTERS
 from generator.export.set_files import can_draw
 from generator.pipeline.made import MadeObject, describe_object
-from generator.pipeline.make import MakeJob, make_at
+from generator.pipeline.make import MakeJob, has_files_in, make_at
 from generator.pipeline.parallel import ENGINES, Task, Workers, engine_of
 from generator.pipeline.place import PlacedObject, place_in_turn
 from generator.pipeline.plates import build_sheet_path, write_set
@@ -59,6 +59,9 @@ def make_set(
                 progress(f"{skipped.name} is there, with all its files: skipped", 0.0)
         left = {number: job for number, job in enumerate(to_make) if number not in made}
         plans = [job.plan for job in left.values()]
+        ours = to_make[0].replace or any(
+            has_files_in(connection, job.plan.spec.name, job.folder) for job in to_make
+        )
         places = place_in_turn(connection, plans, replace=to_make[0].replace)
         for number, job in left.items():
             name = job.plan.spec.name
@@ -72,6 +75,7 @@ def make_set(
         files = write_set(
             [(job, one.layout) for job, one in zip(to_make, objects, strict=True)],
             folder, workers, part_of_progress(progress, 0.8, 1.0), slice_plates=slice_plates,
+            replace=ours,
         )  # fmt: skip
     if not can_draw():
         notice = f"the set has no overview: matplotlib is not installed; {install_line('report')}"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from encoded_objects.base.document import did_you_mean, suggest
+from encoded_objects.base.files import name_fault
 from encoded_objects.base.settings import (
     Angle,
     Block,
@@ -41,13 +42,11 @@ else:  # those that are registered
 
 SPEC_VERSION = 1
 COPIES_MAX = 1000
-NAME_LENGTH_MAX = 60
 CELLS_MAX = 2**64
 ORDER_MAX = 64  # larger fields have no alphabet in sight
 POLYNOMIAL_LENGTH_MAX = 1000
 SCHEMES = ("sqlite", "postgresql", "postgres", "postgresql+psycopg")  #: of databases
 SUFFIXES = (".yaml", ".yml")  #: of the file of a printer or an alphabet
-_NAME = re.compile(r"[^\W_][\w .()+-]*\Z")
 
 Family = Literal["prbs", "prmvs", "prba", "prmva", "prpa", "prmvpa"]
 ProfileName = Literal[
@@ -125,14 +124,8 @@ def object_name(value: Any) -> str:
     """Return the name of an object: it names files and rows of the database too."""
     if not isinstance(value, str):
         raise refuse(f"a name must be text, not {value!r}", f"put it in quotes: '{value}'")
-    if not value.strip():
-        raise refuse("the name is empty", "write, for example, name: Cube")
-    if len(value) > NAME_LENGTH_MAX:
-        cause = f"the name has {len(value)} characters, {NAME_LENGTH_MAX} are allowed"
-        raise refuse(cause, "shorten it")
-    if not _NAME.match(value) or value[-1] in " .":
-        fix = "use letters, digits, spaces and - _ . ( ) +, a letter or digit first"
-        raise refuse(f"{value!r} cannot be part of a file name", fix)
+    if fault := name_fault(value):
+        raise refuse(*fault)
     return value
 
 

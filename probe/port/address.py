@@ -12,8 +12,6 @@ from urllib.parse import parse_qsl
 
 from probe.errors import PortUrlError
 
-MOST_HZ = 10_000.0  #: frames a second of a probe in software; boards reach 500
-
 
 class Port(Protocol):
     """A byte stream to a probe. Every method raises `PortError` once the device is gone."""

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
-from probe.frame import Frame
-from probe.port.address import MOST_HZ, Address, Port, number, refuse_unknown
+from probe.frame import MOST_HZ, Frame
+from probe.port.address import Address, Port, number, refuse_unknown
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
 

@@ -31,8 +31,7 @@ from encoded_objects.base.sensor_type import choose_sensor_type, usual_force_n
 from probe.contact.contract import Touch
 from probe.contact.press import accuracy_of, level_for
 from probe.errors import ContactError, SurfaceError
-from probe.frame import Frame
-from probe.port.address import MOST_HZ
+from probe.frame import MOST_HZ, Frame
 from probe.simulate.scene import Scene
 from probe.simulate.sensor import SimulatedSensor, simulated_sensor
 from probe.simulate.target import surface_of

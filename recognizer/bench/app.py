@@ -30,6 +30,7 @@ from recognizer.bench.session import Session
 _BAD, _FULL = 1008, 1013  # codes of a line that is closed
 PAGES = 80  #: open at once; 64 that never read leave room for those that do
 MESSAGE = 1024  #: bytes of a message from a page
+FILTER_S = 0.02  #: between two messages of a page, each of which costs an image
 
 
 def application(session: Session, broker: Broker, ports: Ports, parts: Path | None) -> FastAPI:
@@ -103,6 +104,7 @@ async def _listen(line: WebSocket, subscriber: Subscriber) -> None:
         subscriber.filter_name = name
         subscriber.seen.pop("frame", None)
         subscriber.news.set()
+        await asyncio.sleep(FILTER_S)
 
 
 def _filter_name(text: str) -> str | None:

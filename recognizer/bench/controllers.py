@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 from encoded_objects.base.errors import EncodedObjectsError
@@ -35,6 +36,7 @@ from recognizer.sensor.wiring import (
     wiring_named,
 )
 from recognizer.touch.reader import Reader
+from recognizer.touch.sensor_state import SensorState, unknown_state
 from recognizer.touch.source import TouchImage
 
 MOST = 200  #: newest touches to learn from; `recognize-object --learn` takes as many
@@ -100,6 +102,7 @@ def flip_images(session: Session, changes: str) -> None:
     with session.changed():
         session.frames.wiring = wiring
         session.note(f"images are flipped: {changes}" if changes else "images as they come")
+    _use_state(session, session.recognition.state)
 
 
 def check_mounting(session: Session, number: int, object_name: str, face: str) -> dict[str, Any]:
@@ -109,14 +112,26 @@ def check_mounting(session: Session, number: int, object_name: str, face: str) -
     found = find_mounting(_reader(session), counts, (object_name, face), calibration=known)
     if not isinstance(found, FoundMounting):
         return {"found": False, "words": str(found)}
-    both = (*session.frames.wiring.changes, *found.wiring.changes)
+    both = Wiring((*session.frames.wiring.changes, *found.wiring.changes))
+    session.mounting = simplify_turns(both, session.sensor.shape).changes
+    _use_state(session, session.recognition.state)
     return {
         "found": True,
         "as_drawn": not found.wiring.changes,
         "words": f"the sensor is mounted {WORDS[found.wiring.changes]}",
         "turn_deg": round(found.turn_deg, 1),
-        "flip": ",".join(simplify_turns(Wiring(both), session.sensor.shape).changes),
+        "flip": ",".join(session.mounting),
     }
+
+
+def _use_state(session: Session, state: SensorState | None) -> None:
+    """Read by a state, checked where images are flipped as a touch by hand has shown."""
+    shown = session.mounting is not None and session.mounting == session.frames.wiring.changes
+    if state is None and shown:
+        state = unknown_state(session.sensor, name=session.sensor_name())
+    if state is not None:
+        state = replace(state, mounting=session.mounting if shown else None)
+    session.recognition.use_state(state)
 
 
 def learn_from_touches(session: Session) -> None:
@@ -147,7 +162,8 @@ def _learn(session: Session, reader: Reader, images: list[Any]) -> None:
         )  # fmt: skip
         session.folder.mkdir(parents=True, exist_ok=True)
         path = next_free(session.folder, "sensor", STATE)
-        write_state(state, path)
+        checked = None if reader.state is None else reader.state.mounting
+        write_state(replace(state, mounting=checked), path)
         use_learned(session, path.name)
     except EncodedObjectsError as error:
         with session.lock:
@@ -169,7 +185,10 @@ def use_learned(session: Session, name: str) -> None:
         names = tuple(filter(None, (session.sensor_name(), session.sensor.name)))
         state = read_state(find_file(session.folder, name, STATE), sensors=names)
         learned = {"name": name, "words": state_words(state)}
-    session.recognition.use_state(state)
+        if state.mounting is not None:
+            session.mounting = state.mounting
+            session.frames.wiring = Wiring(state.mounting)
+    _use_state(session, state)
     with session.changed():
         session.learned = learned
         session.note(f"read by {name}" if name else "read by the sensor's type alone")

@@ -6,15 +6,15 @@ It runs as the command, since making and reading share the database alone.
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import tempfile
+import threading
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from encoded_objects.base.foreign import run_limited
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
-from recognizer.bench.errors import BenchError
+from recognizer.bench.errors import BenchError, BusyError
 
 EXAMPLE = "Example"
 SPEC = f"""# An example, made by open-bench.
@@ -23,6 +23,11 @@ shape: {{cube: 60 mm}}
 """
 EXAMPLE_S = 120.0  #: longest time to make the example
 PROMISE_S = 60.0  #: longest time that `encode-object show` may take
+MEMORY = 4 * 1024**3  #: bytes of addresses of the command; the example takes 0.6 GB
+WRITTEN = 1024**3  #: bytes of a file that it writes
+
+_TURN = threading.Lock()  #: one command at a time
+_ENDING = threading.Event()
 
 
 def make_example(folder: Path, database: str) -> str:
@@ -40,7 +45,7 @@ def make_example(folder: Path, database: str) -> str:
         if not spec.exists():
             spec.write_text(SPEC, encoding="utf-8")
         code, output = _run(spec.name, "--database", database, folder=folder, longest_s=EXAMPLE_S)
-    except (OSError, subprocess.TimeoutExpired) as error:
+    except (OSError, TimeoutError) as error:
         raise BenchError(f"no example could be made: {error}", fix="see that the folder can be "
                          "written, or make one by encode-object") from error  # fmt: skip
     if code:
@@ -78,7 +83,7 @@ def face_promises(
                 longest_s=PROMISE_S,
             )  # fmt: skip
         found = json.loads(output)
-    except (OSError, ValueError, subprocess.TimeoutExpired) as error:
+    except (OSError, ValueError, TimeoutError) as error:
         raise BenchError(f"the promise of {name} is not known: {error}", fix="try again") from error
     if "error" in found:
         reason = found["error"]
@@ -86,10 +91,24 @@ def face_promises(
     return {face["name"]: face["promise"] for face in found["faces"] if face["promise"]}
 
 
+def end_all() -> None:
+    """End the command that runs, and begin no other: the server ends."""
+    _ENDING.set()
+
+
 def _run(*words: str, longest_s: float, folder: Path | None = None) -> tuple[int, str]:
-    """Run the command in a folder; returns its exit code and what it printed as JSON."""
-    done = subprocess.run(  # noqa: S603, our own command
-        [sys.executable, "-c", "from generator.command import main; main()", *words, "--json"],
-        cwd=folder, capture_output=True, text=True, timeout=longest_s, check=False,
-    )  # fmt: skip
-    return done.returncode, done.stdout
+    """Run the command in a folder; returns its exit code and what it printed as JSON.
+
+    Raises
+    ------
+    BusyError
+        The server ends.
+    """
+    with _TURN:
+        code, printed = run_limited(
+            "generator.command", [*words, "--json"], memory_bytes=MEMORY, cpu_s=longest_s,
+            written_bytes=WRITTEN, folder=folder, ending=_ENDING.is_set,
+        )  # fmt: skip
+    if _ENDING.is_set():
+        raise BusyError("open-bench ends", fix="start it again")
+    return code, printed.decode()

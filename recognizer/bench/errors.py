@@ -21,3 +21,9 @@ class BusyError(BenchError):
     """A thing that cannot be done now: something else is going on."""
 
     status = 409
+
+
+class TooLongError(BenchError):
+    """More bytes than are taken."""
+
+    status = 413

@@ -1,28 +1,35 @@
 """What the page may read and write: recordings and calibrations of one folder, printed parts.
 
-A name is no path, and no link that leads out. Parts are those that the database names and that lie
-in its folder. Uploaded recordings are written as they come, bounded in number, time and space; the
-guard bounds the length of one.
+A name is no path, and no link that leads out. Parts are those that lie in the database's folder
+and have the bytes that it registers. Uploaded recordings are written as they come, bounded in
+number, time and space.
 """
 
 from __future__ import annotations
 
 import asyncio
+import os
 import re
-from collections.abc import AsyncIterator, Callable
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from fastapi.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect
 
 from encoded_objects.base.files import staged_file
-from generator.database.open import normal_url, part_path
+from generator.database.open import normal_url
+from generator.database.part_file import part_state
 from generator.database.registered import RegisteredPart
 from recognizer.bench.convert import convert_recording
-from recognizer.bench.errors import BenchError, BusyError, UnknownError
+from recognizer.bench.errors import BenchError, BusyError, TooLongError, UnknownError
 
 LISTED = 200  #: files of a kind that are offered
 AT_ONCE = 2  #: recordings that are uploaded at the same time
-SILENT_S = 15.0  #: without a byte, after which an upload is given up
+UPLOAD = 64 * 1024 * 1024  #: bytes of a recording that is sent in
+SILENT_S = 10.0  #: without a byte, after which an upload is given up
+SLOWEST = 64 * 1024  #: bytes a second, from `SILENT_S` on: 64 MiB come in 17 minutes
 QUOTA = 2 * 1024**3  #: bytes of all recordings in the folder; beyond, none is taken
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}")
@@ -48,14 +55,19 @@ def checked_name(name: str, suffix: str) -> str:
 
 def list_files(folder: Path, suffix: str) -> list[str]:
     """Return the names of the newest files with this ending, newest first."""
-    if not folder.is_dir():
-        return []
     dated = sorted(
-        (-path.stat().st_mtime, path.name)
-        for path in folder.glob(f"*{suffix}")
+        (-found.st_mtime, path.name)
+        for path, found in _there(folder, suffix)
         if not path.stem.endswith(".part") and _NAME.fullmatch(path.name)
     )
     return [name for _, name in dated[:LISTED]]
+
+
+def _there(folder: Path, suffix: str) -> Iterator[tuple[Path, os.stat_result]]:
+    """Yield the files with this ending; not those that lead nowhere, or went meanwhile."""
+    for path in folder.glob(f"*{suffix}"):
+        with suppress(OSError):
+            yield path, path.stat()
 
 
 def part_folder(database: str) -> Path | None:
@@ -67,12 +79,17 @@ def part_folder(database: str) -> Path | None:
 
 
 def part_to_send(database: str, folder: Path | None, part: RegisteredPart) -> Path:
-    """Return the file of a part; `UnknownError` if it does not lie in the part folder."""
-    path = part_path(normal_url(database), part.file).resolve()
+    """Return the file of a part; `UnknownError` if it is not in the folder as it was written."""
+    found = part_state(normal_url(database), part)
+    path = found.path.resolve()
     if folder is None or not path.is_relative_to(folder) or not path.is_file():
         raise UnknownError(
             f"the file of {part.name} cannot be had from here",
             fix="start open-bench with --parts and the folder in which the parts lie",
+        )
+    if found.state != "ok":
+        raise UnknownError(
+            f"the file of {part.name} is {found.state}", fix="make it again with encode-object"
         )
     return path
 
@@ -122,19 +139,27 @@ class Uploads:
     async def _write(self, draft: Path, chunks: AsyncIterator[bytes]) -> int:
         """Write what comes; returns the bytes that are left for recordings."""
         room = QUOTA - folder_bytes(self._folder)
-        coming = aiter(chunks)
+        began_s, came, coming = time.monotonic(), 0, aiter(chunks)
         with draft.open("wb") as file:
             while True:
+                left_s = SILENT_S + came / SLOWEST - (time.monotonic() - began_s)
                 try:
-                    chunk = await asyncio.wait_for(anext(coming), SILENT_S)
+                    chunk = await asyncio.wait_for(anext(coming), min(left_s, SILENT_S))
                 except StopAsyncIteration:
                     return room
                 except TimeoutError:
                     raise BenchError(
-                        f"nothing came for {SILENT_S:g} s", fix="send it in again"
+                        f"{came:,} bytes came in {time.monotonic() - began_s:.0f} s",
+                        fix=f"send it in again, {SLOWEST // 1024} kB a second or more",
                     ) from None
-                room -= len(chunk)
-                if room < 0:
+                except ClientDisconnect:
+                    raise BenchError(
+                        f"the page left after {came:,} bytes", fix="send it in again"
+                    ) from None
+                came += len(chunk)
+                if came > UPLOAD:
+                    raise TooLongError(f"more than {UPLOAD:,} bytes", fix="send a part of it")
+                if came > room:
                     raise BenchError(
                         f"recordings here take {QUOTA / 1024**3:g} GB already",
                         fix="move old ones elsewhere",
@@ -144,4 +169,4 @@ class Uploads:
 
 def folder_bytes(folder: Path) -> int:
     """Return how much all recordings of a folder take."""
-    return sum(path.stat().st_size for path in folder.glob("*.h5")) if folder.is_dir() else 0
+    return sum(found.st_size for _, found in _there(folder, ".h5"))

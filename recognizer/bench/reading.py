@@ -34,7 +34,6 @@ from recognizer.scan.mosaic.planar import PlacedTouch, decoded_place
 from recognizer.scan.session import Scan
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.sensor_state import SensorState
 from recognizer.touch.signal import Signal, signal_of
@@ -232,7 +231,7 @@ class RecognitionThread:
         self.scan = ScanMode(sensor, broker)
         self._grown = self._fused = 0  #: touches that went into a mosaic, into a scan, last
         self._loaded = False  #: a load of a calibration is still on
-        self._state: SensorState | None = None
+        self.state: SensorState | None = None  #: in use
         self._thread = threading.Thread(target=self._run, name="reading", daemon=True)
         self._thread.start()
 
@@ -252,7 +251,7 @@ class RecognitionThread:
         """
         if self.reader is not None:
             self.reader = replace(self.reader, state=state)
-        self._state = state
+        self.state = state
 
     def reload(self) -> None:
         """Read the database again."""
@@ -260,12 +259,12 @@ class RecognitionThread:
             self._reload = True
             self._news.notify()
 
-    def close(self) -> None:
-        """End the thread."""
+    def close(self, longest_s: float | None = None) -> None:
+        """End the thread; wait no longer than that for it."""
         with self._news:
             self._stop = True
             self._news.notify()
-        self._thread.join()
+        self._thread.join(longest_s)
 
     def _run(self) -> None:
         self._prepare()
@@ -287,7 +286,7 @@ class RecognitionThread:
             return
         self._publish("preparing")
         try:
-            self.reader = Reader(open_lab(self.database), self.sensor, state=self._state)
+            self.reader = Reader(open_lab(self.database), self.sensor, state=self.state)
         except EncodedObjectsError as error:
             self.reader = None
             self._publish("off", cause=error.cause, fix=error.fix)
@@ -308,7 +307,7 @@ class RecognitionThread:
             return
         if phase == "read":
             self.touches.read(pending.frame)
-        answer = recognise(self.reader, signal, pending.frame.seq)
+        answer = self.reader.answer(signal, pending.frame.seq)
         done_s = time.monotonic()
         self._trigger.read(signal.forces, answered=bool(answer), now_s=done_s)
         self._answers += 1

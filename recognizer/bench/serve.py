@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import ipaddress
+import logging
 import os
 import re
 import secrets
 import signal
 import socket
 import sys
+import threading
+import time
 from contextlib import suppress
 from types import FrameType
 from typing import Any
@@ -17,6 +20,7 @@ from typing import Any
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from encoded_objects.base.network import is_loopback
 from encoded_objects.base.sensor_type import choose_sensor_type
 from generator.database import DatabaseError
 from generator.database.open import database_exists
@@ -24,7 +28,7 @@ from probe.errors import ProbeError
 from recognizer.bench.app import application
 from recognizer.bench.broker import Broker
 from recognizer.bench.errors import BenchError
-from recognizer.bench.guard import RequestGuard, access_rules, is_loopback
+from recognizer.bench.guard import RequestGuard, access_rules
 from recognizer.bench.options import LAB, BenchOptions
 from recognizer.bench.session import Session
 
@@ -32,7 +36,9 @@ SOFTWARE = ("sim:touch", "Simulated probe: click on the part")
 PATTERN = ("sim:", "Moving pattern")
 
 CONNECTIONS = 900  #: open at once, below the files that a process may have open
-FIRST_REQUEST_S = 5.0  #: that a connection may take for its first request
+REQUEST_S = 5.0  #: that a connection may take for the head of its next request
+UNREAD_MS = 30_000  #: after which a connection is cut whose other side takes nothing
+ORDERLY_S, CLOSING_S = 1.5, 0.1  #: after a signal: to end in order; then for each thread
 
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{12,200}")
 
@@ -72,11 +78,13 @@ def serve(options: BenchOptions) -> int:
         server = uvicorn.Server(config)
         end = server.handle_exit
 
-        def mark_ending(number: int, frame: FrameType | None) -> None:
-            session.ending = True  # the reading of a recording, which `end` waits for
+        def begin_ending(number: int, frame: FrameType | None) -> None:
+            session.end()
+            logging.getLogger("uvicorn.error").disabled = True  # what is cut off is meant to be
+            threading.Thread(target=_end_by_force, args=(session,), daemon=True).start()
             end(number, frame)
 
-        server.handle_exit = mark_ending
+        server.handle_exit = begin_ending
         sys.stdout.write(_address(options.host, line.getsockname()[1], token) + "\n")
         sys.stdout.flush()
         server.run(sockets=[line])
@@ -89,10 +97,18 @@ def serve(options: BenchOptions) -> int:
     return 0
 
 
-class _IdleTimeout(H11Protocol):  # type: ignore[misc]  # uvicorn has no types
-    """Close connections that send no request within `FIRST_REQUEST_S` (slow loris).
+def _end_by_force(session: Session) -> None:
+    """End the process if it has not ended by itself: a request may be at work for long."""
+    time.sleep(ORDERLY_S)
+    session.close(CLOSING_S)
+    sys.stderr.write("open-bench: ended; what was asked for last was not completed\n")
+    os._exit(0)
 
-    uvicorn bounds the pauses between requests alone.
+
+class _IdleTimeout(H11Protocol):  # type: ignore[misc]  # uvicorn has no types
+    """Close connections on which nothing is answered and no whole request comes (slow loris).
+
+    uvicorn bounds the silence between two requests alone, neither the first nor a slow one.
     """
 
     _deadline: asyncio.TimerHandle | None = None
@@ -100,7 +116,17 @@ class _IdleTimeout(H11Protocol):  # type: ignore[misc]  # uvicorn has no types
     def connection_made(self, transport: Any) -> None:
         """Begin to wait for the first request."""
         super().connection_made(transport)
-        self._deadline = self.loop.call_later(FIRST_REQUEST_S, self._close_idle)
+        self._watch()
+
+    def data_received(self, data: bytes) -> None:
+        """Take what came; a whole request ends the waiting."""
+        super().data_received(data)
+        self._watch()
+
+    def on_response_complete(self) -> None:
+        """Wait for the next request."""
+        super().on_response_complete()
+        self._watch()
 
     def handle_websocket_upgrade(self, event: Any) -> None:
         """Hand the connection on, without a deadline."""
@@ -112,14 +138,16 @@ class _IdleTimeout(H11Protocol):  # type: ignore[misc]  # uvicorn has no types
         self._cancel()
         super().connection_lost(exc)
 
+    def _watch(self) -> None:
+        if self.cycle is not None and not self.cycle.response_complete:
+            self._cancel()
+        elif self._deadline is None and self.transport.get_protocol() is self:
+            self._deadline = self.loop.call_later(REQUEST_S, self.transport.abort)
+
     def _cancel(self) -> None:
         if self._deadline is not None:
             self._deadline.cancel()
             self._deadline = None
-
-    def _close_idle(self) -> None:
-        if self.cycle is None and not self.transport.is_closing():
-            self.transport.close()
 
 
 def _end(_number: int, _frame: FrameType | None) -> None:
@@ -152,7 +180,9 @@ def _open_socket(host: str, port: int) -> socket.socket:
     six = ":" in host
     family = socket.AF_INET6 if six else socket.AF_INET
     try:
-        return socket.create_server((host, port), family=family, backlog=128, dualstack_ipv6=six)
+        line = socket.create_server((host, port), family=family, backlog=128, dualstack_ipv6=six)
+        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNREAD_MS)
+        return line
     except OSError as error:
         raise ProbeError(
             f"cannot listen on {host} port {port}: {os.strerror(error.errno or 0)}",

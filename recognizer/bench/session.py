@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from probe.frame import Frame
 from probe.port.url import address_of
 from probe.recording.read import Recording
 from recognizer.bench.broker import Broker
+from recognizer.bench.encode_object import end_all
 from recognizer.bench.errors import BusyError
 from recognizer.bench.feed import Feed, ProbeFeed, ReplayFeed
 from recognizer.bench.files import find_file, list_files
@@ -59,19 +61,28 @@ class Session:
         self._noted = 0
         self._started_ms = time.time() * 1e3
         self.learning: float | None = None  #: share of the learning that is done; None: none is
+        self.mounting: tuple[str, ...] | None = None  #: changes that a touch by hand has shown
         self.learned: dict[str, str] | None = None  #: name and words of the state in use
         self.ending = False  #: set by a signal: what reads a whole recording ends
+        self._reading = threading.Lock()  #: of a whole recording
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
         self._thread.start()
 
-    def close(self) -> None:
-        """End everything in order; a recording is complete."""
+    def end(self) -> None:
+        """Let what goes on come to an end; from a signal's handler, so that it takes no lock."""
+        self.ending = True
+        end_all()
+
+    def close(self, longest_s: float = -1.0) -> None:
+        """End everything in order; a recording is complete. Waits no longer for other threads."""
+        patience_s = None if longest_s < 0 else longest_s
         self._stop.set()
-        self._thread.join()
-        with self.lock:
+        self._thread.join(patience_s)
+        if self.lock.acquire(timeout=longest_s):
             self._leave()
-        self.recognition.close()
+            self.lock.release()
+        self.recognition.close(patience_s)
 
     @contextmanager
     def changed(self) -> Iterator[None]:
@@ -88,21 +99,30 @@ class Session:
         BenchError, PortError, RecordingError, SensorTypeError
             The URL cannot be read, names no recording, or one of another sensor type.
         """
+        replay = self._read_recording(url) if url.startswith("file:") else None
         with self.changed():
             self._leave()
             if is_simulation(url):
                 self.simulation = TouchProbe(url, self.database, self.sensor)
                 self.feed = ProbeFeed(self.simulation.url, sensor)
-            elif url.startswith("file:"):
-                target = address_of(url).target
-                recording = Recording(target)
-                recording.sensor_type(self.sensor)  # of another shape: refused
-                self.feed = feed = ReplayFeed(recording, lambda: self.ending)
-                self.frames.replayed = (Path(target).name, feed.began_ns)
+            elif replay is not None:
+                self.feed = replay
+                self.frames.replayed = (Path(replay.recording.path).name, replay.began_ns)
             elif url:
                 address_of(url)
                 self.feed = ProbeFeed(url, sensor)
             self._url = url
+
+    def _read_recording(self, url: str) -> ReplayFeed:
+        """Read a recording as a whole, one at a time; others work meanwhile."""
+        if not self._reading.acquire(blocking=False):
+            raise BusyError("another recording is being read", fix="wait for it")
+        try:
+            recording = Recording(address_of(url).target)
+            recording.sensor_type(self.sensor)  # of another shape: refused
+            return ReplayFeed(recording, lambda: self.ending)
+        finally:
+            self._reading.release()
 
     def replay(self, name: str) -> None:
         """Play a recording of the folder."""
@@ -227,7 +247,9 @@ class Session:
                     self.report()
 
     def _leave(self) -> None:
-        """Close what is connected."""
+        """Close what is connected; how another sensor is mounted is not known."""
+        self.mounting, state = None, self.recognition.state
+        self.recognition.use_state(None if state is None else replace(state, mounting=None))
         self.frames.leave()
         feed, self.feed = self.feed, Feed()
         feed.close()

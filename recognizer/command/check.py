@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated
@@ -37,6 +38,15 @@ def check(
         str, Option("Type of the sensor; as the recording tells, fsr-16 by default.", "NAME|FILE")
     ] = "",
     every: Annotated[bool, Option("Every frame is a touch.")] = False,
+    state: Annotated[
+        Path | None,
+        Option(
+            "Keep the verdict in FILE, with what was learned of the sensor: recognize-object "
+            "--sensor-state FILE then reads images as the sensor is mounted.",
+            "FILE",
+            names=("--sensor-state",),
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> int:
     """Check the mounting; `HELP` is what people see."""
@@ -50,7 +60,25 @@ def check(
 
     lab = open_lab(database)
     source, touches = _placed_touches(recording, port, sensor_type, at, every)
-    return _report(Reader(lab, source.sensor), source, touches, (object_name, face), as_json)
+    reader = Reader(lab, source.sensor)
+    agreed = _report(reader, source, touches, (object_name, face), as_json)
+    if state is not None and agreed is not None:
+        _keep(state, reader, source, agreed)
+    return 0 if agreed == () else 1
+
+
+def _keep(path: Path, reader: Reader, source: TouchSource, changes: tuple[str, ...]) -> None:
+    """Keep how the sensor is mounted, with what was learned of it if that is there."""
+    from encoded_objects.base.output import message
+    from recognizer.command.learning import learning_for
+    from recognizer.sensor.file import write_state
+    from recognizer.touch.sensor_state import unknown_state
+
+    known = learning_for(reader, source, path, None).reader.state
+    if known is None:
+        known = unknown_state(source.sensor, name=source.name)
+    write_state(replace(known, mounting=changes), path)
+    message(f"kept in {path}; read with --sensor-state {path}, or go on learning with --learn")
 
 
 def _placed_touches(
@@ -77,8 +105,8 @@ def _placed_touches(
 def _report(
     reader: Reader, source: TouchSource, touches: list[TouchImage], face: tuple[str, str],
     as_json: bool,
-) -> int:  # fmt: skip
-    """Say how the sensor is mounted by these touches; returns the exit code."""
+) -> tuple[str, ...] | None:  # fmt: skip
+    """Say how the sensor is mounted; returns the changes that undo it, None if it is not known."""
     from encoded_objects.base.output import write, write_json
     from recognizer.sensor.wiring import WORDS, FoundMounting, find_mounting
 
@@ -102,4 +130,4 @@ def _report(
             write(str(one) if isinstance(one, FoundMounting) else f"not told: {one}")
         if len(ways) > 1:
             write("the touches disagree: place each as --at says, within 40 degrees")
-    return 0 if agreed == () else 1
+    return agreed

@@ -69,6 +69,8 @@ class SensorLearning:
                 self.reader, images, calibration=self.source.calibration, name=self.source.name,
                 done=bar.show,
             )  # fmt: skip
+        if self.reader.state is not None:
+            state = replace(state, mounting=self.reader.state.mounting)
         write_state(state, self.path)
         message(f"learned of {state_words(state)}; kept in {self.path}")
         self.reader = replace(self.reader, state=state)

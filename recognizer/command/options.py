@@ -121,11 +121,18 @@ class RecognizeOptions(Options):
     publish: Annotated[
         str,
         Option(
-            "Tell images and answers to whoever listens: zenoh://0.0.0.0:7447/touch "
-            "(docs/robot.md).",
+            "Tell images and answers to whoever listens: zenoh://127.0.0.1:7447/touch. Beyond this "
+            "machine it needs --publish-users or --open (docs/robot.md).",
             "URL",
         ),
     ] = ""
+    publish_users: Annotated[
+        Path | None, Option("Who may listen: a line NAME:PASSWORD for each.", "FILE")
+    ] = None
+    open: Annotated[
+        bool,
+        Option("Publish to everybody who reaches the address: no password, nothing encrypted."),
+    ] = False
     replace: Replace = False
     as_json: Annotated[
         bool,

@@ -42,12 +42,17 @@ from recognizer.command.scanning import (
 )
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognition import NO_CONTACT, Recognition
+from recognizer.touch.recognition import NO_CONTACT, UNCHECKED, Recognition
 from recognizer.touch.source import TouchImage, TouchSource, source_of
 
 if TYPE_CHECKING:
+    from recognizer.sensor.wiring import Wiring
     from recognizer.touch.robot import ObjectPose
 
+MOUNTING = (
+    "how this sensor is mounted was never checked, and no touch shows a quarter or half turn: "
+    "recognize-object check --at OBJECT/FACE --sensor-state FILE"
+)
 TRIED = 6  #: refused touches, none answered, after which the wiring is checked
 
 
@@ -82,15 +87,16 @@ def recognize_touches(options: RecognizeOptions) -> int:
             warning(source.notice)
         reader = Reader(lab, source.sensor)
         learning = learning_for(reader, source, options.learn, options.state)
+        wiring = _wiring(options.flip, learning)
         if options.recording is not None:
-            frames = _rewired(options.flip, source, recording.frames())
+            frames = _rewired(wiring, source, recording.frames())
             learning.learn_from(source.touches(frames, learning.reader.options))
             frames = recording.frames()
         else:
             frames = stack.enter_context(
                 listen(source, interrupted, options.sensor, options.calibration)
             )
-        frames = _rewired(options.flip, source, frames)
+        frames = _rewired(wiring, source, frames)
         return _print_answers(options, learning, source, frames, interrupted, origin)
 
 
@@ -108,7 +114,8 @@ def _print_answers(
     kept: list[Answer] = []
     refused: list[TouchImage] = []
     read = answered = 0
-    lines = options.as_json and options.follow
+    hinted, as_json = False, options.as_json
+    lines = as_json and options.follow
     needed = touches_for(learning.reader)
     scan = bool(options.scan_method)
     if scan and needed == 1:
@@ -127,6 +134,9 @@ def _print_answers(
                 refused.append(answer.touch)
                 if len(refused) == TRIED and not answered:
                     _hint_wiring(learning.reader, source, refused)
+            if answer.found and answer.found.mounting == UNCHECKED and not (hinted or as_json):
+                message(MOUNTING)
+                hinted = True
             answered = bool(answer.found) + (0 if scan else answered)
             if options.plot is not None and options.follow:
                 _draw(learning.reader, source, answer, options.plot)
@@ -245,16 +255,37 @@ def _sinks(options: RecognizeOptions, origin: RecordingOrigin) -> Iterator[Answe
     if options.publish:
         from recognizer.command.publish import PublishSink
 
-        yield PublishSink(options.publish)
+        yield PublishSink(options.publish, options.publish_users, to_all=options.open)
 
 
-def _rewired(flip: str, source: TouchSource, frames: Iterator[Frame]) -> Iterator[Frame]:
-    """Return frames as the sensor has them, by the changes on their way."""
+def _wiring(flip: str, learning: SensorLearning) -> Wiring | None:
+    """Return the changes on the way of images: those of `--flip`, else those that `check` found.
+
+    Others than `check` found say that the sensor was mounted anew: it was not checked so.
+    """
+    state = learning.reader.state
+    checked = None if state is None else state.mounting
+    if not flip and not checked:
+        return None
+    from recognizer.sensor.wiring import Wiring, wiring_named
+
     if not flip:
-        return frames
-    from recognizer.sensor.wiring import wiring_named
-
+        return Wiring(checked or ())
     wiring = wiring_named(flip)
+    turned = tuple(change for change in wiring.changes if change != "values")
+    if state is not None and checked is not None and turned != checked:
+        warning(f"--flip {flip} is not what recognize-object check found: "
+                f"{','.join(checked) or 'as drawn'}")  # fmt: skip
+        learning.reader = replace(learning.reader, state=replace(state, mounting=None))
+    return wiring
+
+
+def _rewired(
+    wiring: Wiring | None, source: TouchSource, frames: Iterator[Frame]
+) -> Iterator[Frame]:
+    """Return frames as the sensor has them, by the changes on their way."""
+    if wiring is None:
+        return frames
     return (wiring.frame(frame, source.sensor.full) for frame in frames)
 
 

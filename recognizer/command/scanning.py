@@ -37,7 +37,7 @@ def belief_for(reader: Reader, method: str) -> Scan | ThesisScan:
     if method == "thesis":
         from recognizer.thesis.scan import ThesisScan
 
-        return ThesisScan(reader.lab, reader.sensor)
+        return ThesisScan(reader.lab, reader.sensor, reader.mounting)
     from recognizer.scan.session import Scan
 
     return Scan(reader)

@@ -161,7 +161,7 @@ class Scan:
         if not signal.contact:
             return belief.recognition
         face.places.keep(pose)
-        found = self._join()
+        found = replace(self._join(), mounting=self._reader.mounting)
         withdrawn = before.confirmed_face is not None and belief.confirmed_face is None
         if found or not self._answer or withdrawn:
             self._answer = found

@@ -17,6 +17,7 @@ from encoded_objects.base.files import staged_file
 from encoded_objects.base.foreign import DAMAGE, foreign_json
 from recognizer.errors import SensorStateError
 from recognizer.sensor.learn import LEAST_TOUCHES
+from recognizer.sensor.wiring import WORDS
 from recognizer.touch.sensor_state import ASIDE_SD_MM, SensorState
 
 FORMAT = "tactile sensor state"
@@ -49,6 +50,8 @@ def write_state(state: SensorState, path: str | os.PathLike[str]) -> None:
         "drift": float(f"{state.drift:.{DIGITS}g}"),
         "tactels": ["".join(row) for row in letters],
     }
+    if state.mounting is not None:
+        document["mounting"] = list(state.mounting)
     document |= {name: _round_digits(getattr(state, name).tolist()) for name in _ARRAYS}
     lines = ",\n".join(f"  {json.dumps(key)}: {_text(value)}" for key, value in document.items())
     try:
@@ -89,6 +92,7 @@ def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -
             hot=letters == "H",
             floating=bool(document["floating"]),
             drift=float(document["drift"]),
+            mounting=_mounting(document.get("mounting")),
             **{name: np.array(document[name], np.float64) for name in _ARRAYS},
         )
         for name, (least, most) in _RANGES.items():
@@ -123,6 +127,7 @@ def state_entry(state: SensorState) -> dict[str, Any]:
         if known.any()
         else 0.0,
         "drift": state.drift,
+        "mounting": None if state.mounting is None else WORDS[state.mounting],
     }
 
 
@@ -131,10 +136,10 @@ def state_words(state: SensorState) -> str:
     entry = state_entry(state)
     many = "1 touch" if state.touches == 1 else f"{state.touches:,} touches"
     if state.touches < LEAST_TOUCHES:
-        return (
-            f"{state.sensor}: {many}, too few to learn from; touch {LEAST_TOUCHES} places or more"
-        )
-    parts = []
+        few = f"{many}, too few to learn from; touch {LEAST_TOUCHES} places or more"
+        known = "" if state.mounting is None else f"mounted {WORDS[state.mounting]}; "
+        return f"{state.sensor}: {known}{few}"
+    parts = [] if state.mounting is None else [f"mounted {WORDS[state.mounting]}"]
     for name, what in (("dead", "never answer"), ("hot", "read high with nothing on them")):
         if len(entry[name]):
             parts.append(f"{len(entry[name])} of {state.dead.size} tactels {what}")
@@ -147,6 +152,13 @@ def state_words(state: SensorState) -> str:
     if abs(state.drift) >= (0.05 if state.newtons else 2.0):
         parts.append(f"the background drifted by {state.drift:+.2g} {unit}")
     return f"{state.sensor}, {many}: {'; '.join(parts)}"
+
+
+def _mounting(stored: list[str] | None) -> tuple[str, ...] | None:
+    found = None if stored is None else tuple(stored)
+    if found is not None and found not in WORDS:
+        raise ValueError(f"mounting is one of {[list(known) for known in WORDS]}")
+    return found
 
 
 def _round_digits(value: Any) -> Any:

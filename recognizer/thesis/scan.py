@@ -10,6 +10,7 @@ probe's pose at the last touch. Thesis 4.3, 6.1-6.3.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +22,7 @@ from recognizer.scan.session import TouchPlaces
 from recognizer.thesis.merge import Placing, merge_touches
 from recognizer.thesis.read import ClassicalReading, read_classically
 from recognizer.touch.lab import Lab
-from recognizer.touch.recognition import NO_CONTACT, TOO_FEW, Recognition, refusal
+from recognizer.touch.recognition import NO_CONTACT, TOO_FEW, UNCHECKED, Recognition, refusal
 from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
@@ -66,8 +67,8 @@ class ThesisScan:
     Its interface is that of `recognizer.scan.session.Scan`.
     """
 
-    def __init__(self, lab: Lab, sensor: SensorType) -> None:
-        self._lab, self._unread = lab, 0
+    def __init__(self, lab: Lab, sensor: SensorType, mounting: str = UNCHECKED) -> None:
+        self._lab, self._unread, self._mounting = lab, 0, mounting
         self._mosaic = no_touches(sensor)
         self._places = TouchPlaces()
         self._answer = refusal(0, TOO_FEW)
@@ -113,6 +114,7 @@ class ThesisScan:
             trust=np.min([each.signal.trust for each in touches], axis=0),
             seq=touches[-1].seq,
         ).recognition
+        found = replace(found, mounting=self._mounting)
         if found or not self._answer:
             self._answer = found
         return found

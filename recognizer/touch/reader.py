@@ -15,7 +15,7 @@ from probe.recording.read import Recording
 from recognizer.errors import SensorStateError, TouchError
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognise import recognise
-from recognizer.touch.recognition import Recognition
+from recognizer.touch.recognition import CHECKED, UNCHECKED, Recognition
 from recognizer.touch.sensor_state import SensorState, invert_floating
 from recognizer.touch.signal import Signal, signal_of
 from recognizer.touch.source import source_of
@@ -44,8 +44,9 @@ class Reader(PreparedLab):
     >>> import tempfile
     >>> import numpy as np
     >>> from encoded_objects import Reader, encode, open_lab, simulate
-    >>> lab = tempfile.mkdtemp() + "/lab.db"
-    >>> _ = encode({"name": "Cube", "shape": {"cube": "40 mm"}}, database=lab, formats=())
+    >>> folder = tempfile.mkdtemp()
+    >>> lab, cube = folder + "/lab.db", {"name": "Cube", "shape": {"cube": "40 mm"}}
+    >>> _ = encode(cube, database=lab, folder=folder, formats=())
     >>> touch = simulate(lab + "#Cube/F1", x=20, y=19, theta=23, force=80)
     >>> reader = Reader(open_lab(lab))
     >>> answer = reader.read(next(touch.frames()).counts)
@@ -91,7 +92,16 @@ class Reader(PreparedLab):
         TouchError
             Of another shape than the sensor, or no numbers.
         """
-        return recognise(self, self.signal(counts, calibration=calibration, trust=trust), seq)
+        return self.answer(self.signal(counts, calibration=calibration, trust=trust), seq)
+
+    @property
+    def mounting(self) -> str:
+        """Whether it is known how the sensor is mounted: `CHECKED` or `UNCHECKED`."""
+        return UNCHECKED if self.state is None or self.state.mounting is None else CHECKED
+
+    def answer(self, signal: Signal, seq: int = 0) -> Recognition:
+        """Return the answer of a signal."""
+        return replace(recognise(self, signal, seq), mounting=self.mounting)
 
     def signal(
         self,
@@ -124,7 +134,7 @@ class Reader(PreparedLab):
             found = calibrate_image(values, calibration)
             values = found.values
             known = np.where(found.bad, 0.0, 1.0) * (1.0 if known is None else known)
-        state = self.state
+        state = self.state if self.state is not None and self.state.is_learned else None
         if sensor.wiring == "floating" and not newtons and not (state and state.floating):
             values = invert_floating(values)
         if state is not None:

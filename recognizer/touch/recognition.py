@@ -37,6 +37,9 @@ OTHER_PATTERN = "other_pattern"
 PLAIN = "not_encoded"
 UNCLEAR = "unclear"
 
+# Whether a touch placed by hand has shown how the sensor is mounted.
+UNCHECKED, CHECKED = "unchecked", "checked"
+
 Numbers = Mapping[str, float]
 
 #: What a person does about a reason.
@@ -139,6 +142,9 @@ class Recognition:
     inside_mm: float | None = None
     """How far the sensor's centre lies inside the face's outline; negative outside; None where it
     does not answer, on a round face, and where the thesis's way is read."""
+    mounting: str = UNCHECKED
+    """`CHECKED` where `recognize-object check` has found how the sensor is mounted: a sensor that
+    is turned by quarters gives poses that are turned, and no touch by itself shows it."""
 
     def __bool__(self) -> bool:
         return self.object is not None
@@ -230,6 +236,7 @@ class Recognition:
             "scale": self.scale,
             "stroke_mm": self.stroke_mm,
             "next": None if self.next is None else asdict(self.next),
+            "mounting": self.mounting,
         }
 
 

@@ -46,6 +46,9 @@ class SensorState:
     aside_deviation_mm: Array  #: (rows, columns, 2) standard deviation
     floating: bool = False  #: whether nothing holds a row while another one is read
     drift: float = 0.0  #: by which the background rose from the first touches to the last
+    mounting: tuple[str, ...] | None = None
+    """Changes of `sensor.wiring` that bring images to where the sensor has them, by a touch that
+    was placed by hand; (): as drawn; None: never checked. Images are read with them undone."""
 
     def __post_init__(self) -> None:
         shape = np.shape(self.dead)
@@ -69,6 +72,11 @@ class SensorState:
         """Rows and columns."""
         rows, columns = self.dead.shape
         return rows, columns
+
+    @property
+    def is_learned(self) -> bool:
+        """Whether touches are read by it: it is not there for the mounting alone."""
+        return self.touches > 0 or self.mounting is None
 
     @property
     def masked(self) -> Flags:

@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - a command a line
 """Every page of help, what every command says as text and as JSON, and every sort of error.
 
 Command -> exit code, stdout (as JSON where it is), stderr. Commands run in one folder after
@@ -56,10 +57,11 @@ encode-object cube.yaml --database new.db --format stl --replace --json
 encode-object changed.yaml --database new.db --format stl [twice]
 encode-object changed.yaml --database new.db --format stl --replace
 encode-object set.yaml --database set.db --lab-key F1XT-VRES-0000-000Q --format stl,3mf [twice]
-encode-object set.yaml --database set2.db --lab-key F1XT-VRES-0000-000Q --format stl -j 2 --json
+encode-object set.yaml --database set2.db --lab-key F1XT-VRES-0000-000Q --format stl --replace -j 2 --json
 encode-object blank.yaml --database new.db --format stl [twice]
 encode-object cube.yaml --database other.db --lab-key 0000-0000-0000-0000 --format stl
-encode-object cube.yaml --database verified.db --lab-key F1XT-VRES-0000-000Q --format 3mf --verify
+encode-object cube.yaml --database other.db --lab-key 0000-0000-0000-0000 --format stl --replace
+encode-object cube.yaml --database verified.db --lab-key F1XT-VRES-0000-000Q --format 3mf --replace --verify
 encode-object {lab,list} [twice]
 encode-object show {Cube,Rod} [twice]
 encode-object show Guest --json

@@ -158,6 +158,8 @@ def test_a_wrong_mounting_is_found_and_undone(page, bench):
     assert said.startswith("Cube F1")
     turn = re.search(r"(-?[\d.]+)°", page.locator("#pose").inner_text()).group(1)
     assert float(turn) == pytest.approx(20, abs=1)
+    newest = httpx.get(f"{bench}api/touches").json()["touches"][-1]
+    assert newest["answer"]["mounting"] == "checked"
     httpx.post(f"{bench}api/flip", json={"changes": ""})
     expect(page.get_by_test_id("flip")).to_have_value("")
     assert httpx.post(f"{bench}api/flip", json={"changes": "sideways"}).status_code == 400

@@ -7,13 +7,16 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from reference.emulated_probe import emulated_port
 
 from generator.command import run as encode_object
 from probe.command import run as probe_sensor
+from probe.recording.read import Recording
 from recognizer.command import run as recognize_object
+from recognizer.sensor.file import read_state
 from recognizer.touch.robot import Seating
 
 CUBE = Path(__file__).parents[2] / "fixtures" / "cube.yaml"
@@ -46,6 +49,36 @@ def started(lab, *words):
         finally:
             if process.poll() is None:
                 process.kill()
+
+
+def test_how_the_sensor_is_mounted_is_checked_once_and_known_from_then_on(ask, asked, tmp_path):
+    words = ("lab.db#Cube/F1", "--x", 29, "--y", 31, "--theta", -12, "--force", 80)
+    assert asked(probe_sensor, "simulate", *words, "-o", tmp_path / "drawn.h5")[0] == 0
+    images = np.stack([one.counts for one in Recording(tmp_path / "drawn.h5").frames()])
+    with h5py.File(tmp_path / "turned.h5", "w") as file:
+        file["frames"] = np.rot90(images, axes=(1, 2))
+    state = tmp_path / "sensor.json"
+    read = ("--database", "lab.db", "--sensor-state", state)
+    hint = "was never checked"
+
+    def answer(*more):
+        code, out = asked(recognize_object, tmp_path / "turned.h5", *more, "--json")
+        assert code == 0
+        (entry,) = json.loads(out)
+        return entry["mounting"], round(entry["theta_deg"])
+
+    assert answer("--database", "lab.db") == ("unchecked", -102)  # wrong, and it says so
+    for method in ("--scan", "--every"):
+        _, _, err = ask(recognize_object, tmp_path / "turned.h5", "--database", "lab.db", method)
+        assert err.count(hint) == (method == "--every")  # once; one touch is no scan
+    check = ("check", tmp_path / "turned.h5", "--at", "Cube/F1", *read)
+    assert asked(recognize_object, *check)[0] == 1  # not as drawn
+    assert read_state(state).mounting == ("quarter", "quarter", "quarter")
+    assert answer(*read) == ("checked", -12)  # and undone
+    code, _, err = ask(recognize_object, tmp_path / "turned.h5", *read)
+    assert (code, hint in err) == (0, False)
+    assert answer(*read, "--flip", "quarter,quarter,quarter") == ("checked", -12)
+    assert answer(*read, "--flip", "quarter") == ("unchecked", 168)  # mounted anew
 
 
 def test_touches_of_a_registered_face_are_recognised(asked):

@@ -1,8 +1,11 @@
 """A tactile sensor on the network as a port: each datagram is an image, u16 little endian.
 
     pip install ./udp_probe
-    probe-sensor live 'udp://0.0.0.0:5005?sensor_type=fsr-8x8'
-    recognize-object --port 'udp://0.0.0.0:5005?sensor_type=fsr-8x8' --follow
+    probe-sensor live 'udp://127.0.0.1:5005?sensor_type=fsr-8x8'
+    recognize-object --port 'udp://127.0.0.1:5005?sensor_type=fsr-8x8' --follow
+
+A sensor on another machine sends to an address of this one: give that one, and know that whoever
+reaches it can send images too.
 
 `CommandedProbe` answers commands for a sensor that takes none; what is left to write is `read`.
 """
@@ -38,7 +41,7 @@ class UdpPort(CommandedProbe):
         except (OSError, ValueError) as failed:
             self._socket.close()
             raise PortError(
-                f"cannot listen: {failed}", fix="write udp://0.0.0.0:5005", place=address.url
+                f"cannot listen: {failed}", fix="write udp://127.0.0.1:5005", place=address.url
             ) from failed
         self._seq = 0
 

@@ -3,6 +3,7 @@
 import json
 import shutil
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -114,15 +115,55 @@ def test_objects_come_over_as_they_are(new_database, file, ours, theirs):
     sound(here)
 
 
-def test_files_of_parts_are_named_from_the_other_databases_folder(tmp_path):
+def test_files_of_parts_go_along_with_an_export_and_are_named_from_there(tmp_path):
     here, there = tmp_path / "a", tmp_path / "b"
     here.mkdir()
     there.mkdir()
     make(str(here / "lab.db"), "Cube")
     export_objects(str(here / "lab.db"), there / "exchange.db")
     import_objects(str(tmp_path / "lab.db"), str(there / "exchange.db"))
-    assert held(str(there / "exchange.db"), "Cube").parts[0].file == "../a/out/F1.stl"
-    assert held(str(tmp_path / "lab.db"), "Cube").parts[0].file == "a/out/F1.stl"
+    assert held(str(there / "exchange.db"), "Cube").parts[0].file == "out/F1.stl"
+    assert held(str(tmp_path / "lab.db"), "Cube").parts[0].file == "b/out/F1.stl"
+    export_objects(str(here / "lab.db"), tmp_path / "above.db")
+    assert held(str(tmp_path / "above.db"), "Cube").parts[0].file == "a/out/F1.stl"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("update objects set name = '../../evil'", "may not be called so"),
+        ("update objects set name = 'a/b'", "may not be called so"),
+        ("update objects set name = char(27) || '[2J'", "may not be called so"),
+        ("update objects set name = hex(randomblob(40))", "60 are allowed"),
+        ("update parts set file = '/etc/passwd'", "lies elsewhere or is none: '/etc/passwd'"),
+        ("update parts set file = '/tmp/F1.stl'", "lies elsewhere"),
+        ("update parts set file = 'out/../../F1.stl'", "lies elsewhere"),
+        ("update parts set file = 'lab.db'", "lies elsewhere or is none: 'lab.db'"),
+        ("update parts set file = 'out/F1.step'", "lies elsewhere or is none"),
+        ("update parts set format = 'db', file = 'lab.db'", "lies elsewhere or is none"),
+        ("update parts set name = char(10)", "lies elsewhere or is none"),
+        ("update faces set name = char(27) || '[2J' where name = 'F1'", "cannot be shown"),
+    ],
+)
+def test_names_of_an_export_are_those_that_a_spec_may_give(exported, tmp_path, file, change, said):
+    shutil.copy(exported, file)
+    with closing(sqlite3.connect(file)) as plain:
+        plain.execute(change)
+        plain.commit()
+    with pytest.raises(DatabaseError) as caught:
+        import_objects(str(tmp_path / "lab.db"), str(file))
+    assert said in str(caught.value)
+    assert str(caught.value).replace("\n", "").isprintable()
+    assert not (tmp_path / "lab.db").exists()
+
+
+def test_an_object_of_a_bad_name_comes_over_under_another(exported, tmp_path, file):
+    shutil.copy(exported, file)
+    with closing(sqlite3.connect(file)) as plain:
+        plain.execute("update objects set name = '../Cube'")
+        plain.commit()
+    lab = str(tmp_path / "lab.db")
+    assert import_objects(lab, str(file), renamed={"../Cube": "Cube"}).copied == ("Cube",)
 
 
 def test_an_object_on_cells_that_are_held_is_refused_by_name(new_database, lab_url, file):

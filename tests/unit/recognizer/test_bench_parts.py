@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from hostile_recordings import write_hostile, write_zeros
+from starlette.requests import ClientDisconnect
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.open import open_database
@@ -109,6 +110,8 @@ def test_files_of_the_folder_and_no_others(tmp_path):
         with pytest.raises(UnknownError):
             find_file(folder, name, ".h5")
     (folder / "live.part.h5").write_text("")
+    (folder / "gone.h5").symlink_to(tmp_path / "nowhere.h5")  # ended the thread of the bench
+    assert folder_bytes(folder) == len("secret")
     assert set(list_files(folder, ".h5")) == {"touch-001.h5", "link.h5"}
     assert list_files(tmp_path / "nowhere", ".h5") == []
 
@@ -133,6 +136,16 @@ def test_a_recording_that_is_sent_in_is_kept_only_if_it_is_one(tmp_path):
             taken_in(uploads, "b.h5", bad)
     assert [path.name for path in (tmp_path / "kept").iterdir()] == ["a.h5"]
     assert (tmp_path / "kept" / "a.h5").read_bytes() == content
+
+
+def test_a_page_that_leaves_keeps_nothing(tmp_path):
+    async def leaving():
+        yield b"the first bytes"
+        raise ClientDisconnect
+
+    with pytest.raises(BenchError, match="left after 15 bytes"):
+        asyncio.run(Uploads(tmp_path).take("a.h5", leaving()))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_sent_in_is_read_by_a_process_with_limits(tmp_path, monkeypatch):
@@ -187,7 +200,7 @@ def test_recordings_that_are_sent_in_have_a_quota_a_number_and_a_time(tmp_path, 
         await asyncio.sleep(0)
         with pytest.raises(BusyError):
             await uploads.take("d.h5", pieces(content))
-        with pytest.raises(BenchError, match="nothing came"):
+        with pytest.raises(BenchError, match="came in"):
             await first
         monkeypatch.setattr("recognizer.bench.files.QUOTA", 10**9)
         return await uploads.take("d.h5", pieces(content))
@@ -204,7 +217,8 @@ def test_parts_are_sent_from_their_folder_alone(tmp_path):
     (lab / "link.stl").symlink_to(tmp_path / "secret.stl")
 
     def part(file):
-        return RegisteredPart("p", "stl", file, "", np.eye(4))
+        content = (lab / file).read_bytes() if (lab / file).is_file() else b""
+        return RegisteredPart("p", "stl", file, hashlib.sha256(content).hexdigest(), np.eye(4))
 
     database, folder = str(lab / "lab.db"), lab.resolve()
     assert part_to_send(database, folder, part("ok.stl")) == lab / "ok.stl"
@@ -213,6 +227,10 @@ def test_parts_are_sent_from_their_folder_alone(tmp_path):
             part_to_send(database, folder, part(file))
     with pytest.raises(UnknownError):
         part_to_send(database, None, part("ok.stl"))
+    registered = part("ok.stl")
+    (lab / "ok.stl").write_text("another file")
+    with pytest.raises(UnknownError, match="is changed"):
+        part_to_send(database, folder, registered)
 
 
 # -- when a touch is read

@@ -189,3 +189,82 @@ def test_a_port_that_is_taken_is_refused(published):
     _, port = published
     with pytest.raises(EncodedObjectsError, match="nothing can be published"):
         PublishSink(f"zenoh://127.0.0.1:{port}")
+
+
+FORGER = """
+import json, sys, time, zenoh
+config = zenoh.Config()
+config.insert_json5("mode", json.dumps(sys.argv[2]))
+config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{sys.argv[1]}"]))
+config.insert_json5("scouting/multicast/enabled", "false")
+with zenoh.open(config) as session:
+    publisher = session.declare_publisher("touch/answer")
+    answering = session.declare_queryable("touch/**", lambda q: q.reply(q.key_expr, '{"seq": -3}'))
+    session.liveliness().declare_token("touch/answer/@adv/pub/1/2/_")
+    for _ in range(20):
+        session.put("touch/answer", '{"seq": -1}')
+        publisher.put('{"seq": -2}')
+        time.sleep(0.02)
+    print("sent", flush=True)
+    sys.stdin.readline()
+"""
+
+
+@pytest.mark.parametrize("mode", ["client", "peer"])
+def test_what_a_client_sends_is_passed_on_to_nobody(published, mode):
+    sink, port = published
+    client = Client(port, 3)
+    words = [sys.executable, "-c", FORGER, str(port), mode]
+    pipes = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE)
+    with subprocess.Popen(words, text=True, **pipes) as forger:
+        assert forger.stdout.readline() == "sent\n"
+        for i in range(3):
+            sink.answer(answer_of(i))
+        late = Client(port, 3).told()  # which asks for the answers before
+        assert sorted({seq for seq, _ in client.told()["answers"]}) == [0, 1, 2]
+        assert sorted({seq for seq, _ in late["answers"]}) == [0, 1, 2]
+        forger.communicate("\n", timeout=60)
+
+
+def test_who_is_asked_for_a_password_gives_it(tmp_path):
+    import zenoh
+
+    users, port = tmp_path / "users.txt", free_port()
+    users.write_text("robot:eight or more\n".replace(" ", "-"))
+
+    def let_in(**given):
+        config = zenoh.Config()
+        for path, value in (
+            ("mode", "client"), ("connect/endpoints", [f"tcp/127.0.0.1:{port}"]),
+            ("scouting/multicast/enabled", False),
+            *((f"transport/auth/usrpwd/{name}", value) for name, value in given.items()),
+        ):  # fmt: skip
+            config.insert_json5(path, json.dumps(value))
+        try:
+            zenoh.open(config).close()
+        except zenoh.ZError:
+            return False
+        return True
+
+    with PublishSink(f"zenoh://127.0.0.1:{port}", users):
+        assert let_in(user="robot", password="eight-or-more")
+        assert not let_in(user="robot", password="eight-or-less")
+        assert not let_in(user="human", password="eight-or-more")
+        assert not let_in()
+    for text in ("", "robot", "robot:short", "a:12345678\n\n"):
+        users.write_text(text)
+        with pytest.raises(EncodedObjectsError, match="no list of users"):
+            PublishSink(f"zenoh://127.0.0.1:{port}", users)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "[::]", "192.0.2.7", "bench.example", "localhost.a"])
+def test_others_read_only_where_that_is_said(host):
+    with pytest.raises(EncodedObjectsError, match="others than this machine") as refused:
+        PublishSink(f"zenoh://{host}:7447")
+    assert "--open" in refused.value.fix
+    assert refused.value.exit_code == 2
+
+
+def test_an_open_publisher_says_what_it_opens(capsys):
+    with PublishSink(f"zenoh://0.0.0.0:{free_port()}", to_all=True):
+        assert "everybody who reaches tcp/0.0.0.0" in capsys.readouterr().err

@@ -13,6 +13,7 @@ from probe.contact.press import ENGINE, press
 from probe.contact.tips import Tips
 from probe.simulate.registered import registered_surface
 from recognizer.errors import SensorStateError, WiringError
+from recognizer.scan.session import Scan
 from recognizer.sensor import learn
 from recognizer.sensor.file import read_state, state_entry, state_words, write_state
 from recognizer.sensor.learn import LEAST_TOUCHES, answering_of, learn_sensor
@@ -273,3 +274,27 @@ def test_a_placed_touch_tells_the_mounting(reader, way, changes):
     assert found.answer.x_mm == pytest.approx(29.0, abs=0.3)
     assert ("read with --flip" in str(found)) is bool(changes)
     assert isinstance(find_mounting(reader, image, ("Cube", "F2")), Recognition)
+
+
+def test_the_file_keeps_how_the_sensor_is_mounted(reader, tmp_path):
+    path = tmp_path / "sensor.json"
+    for changes in (None, (), ("quarter",), ("transpose", "quarter", "quarter")):
+        write_state(replace(unknown_state(SENSOR), mounting=changes), path)
+        assert read_state(path).mounting == changes
+    document = json.loads(path.read_text())
+    for wrong in (["sideways"], "columns", [["rows"]], 3, ["quarter"] * 4):
+        path.write_text(json.dumps(document | {"mounting": wrong}))
+        with pytest.raises(SensorStateError, match="is damaged"):
+            read_state(path)
+
+
+def test_answers_say_whether_the_mounting_was_checked(reader):
+    surface = registered_surface(reader.lab.url, "Cube", "F1").surface
+    forces = press(surface, SENSOR, Touch(29.0, 31.0, np.radians(-12), 70.0)).forces_n
+    counts = np.rint(8 + 150 * forces)
+    plain = reader.read(counts)
+    assert (plain.object, plain.mounting) == ("Cube", "unchecked")
+    checked = replace(reader, state=replace(unknown_state(SENSOR), mounting=()))
+    assert checked.read(counts).as_json() == plain.as_json() | {"mounting": "checked"}
+    assert Scan(checked).add(counts).mounting == "checked"
+    assert replace(reader, state=unknown_state(SENSOR)).read(counts).mounting == "unchecked"

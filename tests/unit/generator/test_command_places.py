@@ -1,0 +1,111 @@
+"""Where a spec may write, and what it may replace."""
+
+import json
+import os
+import pty
+import subprocess
+import sys
+
+import pytest
+
+from generator.command import run as encode_object
+
+SPEC = "name: Cube\nshape: {cube: 40 mm}\nprint: {parts: whole}\noutput: {formats: [stl]%s}\n"
+COMMAND = (sys.executable, "-c", "from generator.command import main; main()")
+
+
+@pytest.fixture
+def bench(tmp_path, monkeypatch):
+    """The current folder, with another one for specs beside it."""
+    (tmp_path / "specs").mkdir()
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    return tmp_path
+
+
+def spec(bench, output="", folder="specs"):
+    path = bench / folder / "cube.yaml"
+    path.write_text(SPEC % output)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    "output",
+    ["", ", folder: out", ", folder: ../specs/out", ", database: ../specs/lab.db",
+     ", folder: ./a/../b, database: sqlite:///own.db"],
+)  # fmt: skip
+def test_a_spec_writes_unasked_into_its_folder_and_the_current_one(bench, output, capsys):
+    assert encode_object([spec(bench, output)]) == 0, capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("output", "said"),
+    [
+        (", folder: ../elsewhere", "output: folder writes to {}/elsewhere"),
+        (", folder: {}/elsewhere", "output: folder writes to {}/elsewhere"),
+        (", folder: link/cube", "output: folder writes to {}/elsewhere/cube"),
+        (", database: ../elsewhere.db", "output: database writes to {}/elsewhere.db"),
+        (", database: 'sqlite:///{}/e.db'", "output: database writes to {}/e.db"),
+        (", database: 'postgresql://u:secret@127.0.0.1:1/lab'", "postgresql://u:***@127.0.0.1:1"),
+    ],
+)
+def test_a_spec_that_writes_elsewhere_says_where_and_needs_a_yes(bench, output, said, capsys):
+    (bench / "here" / "link").symlink_to(bench / "elsewhere")
+    path = spec(bench, output.format(bench))
+    before = sorted(bench.rglob("*"))
+    for more in ([], ["--json"]):
+        assert encode_object([path, *more]) == 2
+        out, err = capsys.readouterr()
+        told = json.loads(out)["error"] if more else {"cause": err, "fix": err}
+        assert said.format(bench) in str(told)
+        assert "--yes" in str(told)
+    assert sorted(bench.rglob("*")) == before
+    if "postgresql" not in output:
+        assert encode_object([path, "--dry-run"]) == 0
+        assert encode_object([path, "-o", "out", "--database", "lab.db"]) == 0
+        (bench / "elsewhere").mkdir()
+        assert encode_object([path, "--yes"]) == 0
+
+
+@pytest.mark.parametrize(("answer", "code"), [("n", 1), ("y", 0)])
+def test_at_a_terminal_it_asks(bench, answer, code):
+    path = spec(bench, ", folder: ../elsewhere")
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(
+        [*COMMAND, path], stdin=theirs, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
+        os.write(ours, f"{answer}\n".encode())
+        _, err = process.communicate(timeout=60)
+    os.close(ours)
+    os.close(theirs)
+    assert process.returncode == code, err
+    assert f"cube.yaml:4:34: output: folder writes to {bench}/elsewhere" in err
+    assert "Write there? [y/N]" in err
+    assert (bench / "elsewhere").exists() == (code == 0)
+
+
+def test_files_of_others_are_not_replaced_unasked(bench, capsys):
+    path, out = spec(bench), bench / "here" / "out"
+    out.mkdir()
+    (out / "Cube.png").write_bytes(b"a holiday")
+    assert encode_object([path, "-o", "out"]) == 2
+    err = capsys.readouterr().err
+    assert "Cube.png" in err
+    assert "--replace" in err
+    assert [file.name for file in out.iterdir()] == ["Cube.png"]
+    assert encode_object(["list"]) == 0
+    assert "Cube" not in capsys.readouterr().out  # nothing is registered
+    assert encode_object([path, "-o", "out", "--replace"]) == 0
+    assert (out / "Cube.png").read_bytes() != b"a holiday"
+    (out / "Cube.png").write_bytes(b"an older picture")
+    assert encode_object([path, "-o", "out"]) == 0  # a registered object has its parts there
+    for name in ("Cube.stl", "Cube.png"):  # the same bytes, though nobody knows of them here
+        (bench / name).write_bytes((out / name).read_bytes())
+    assert encode_object([path, "-o", ".."]) == 0
+
+
+def test_the_folders_of_killed_runs_go_with_the_next_run(bench):
+    for name in ("out/cube", "out/other", "out/third"):
+        (bench / "here" / name / ".encode-object-999999").mkdir(parents=True)
+    assert encode_object([spec(bench)]) == 0
+    assert list((bench / "here").rglob(".encode-object-*")) == []
