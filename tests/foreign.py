@@ -880,6 +880,11 @@ def read_model(path: Path, _out: Path) -> None:
         raise WrongValueError("a solid that is none")
 
 
+def load_kernel() -> None:
+    """Load the CAD kernel, before limits and forks."""
+    import OCP.STEPControl  # noqa: F401
+
+
 def read_model_in_fork(path: Path, out: Path) -> None:
     """Read a STEP model with the kernel in a fork of this process, which has it loaded."""
     from generator.polyhedron.read import kernel, step
@@ -901,8 +906,6 @@ def read_model_in_fork(path: Path, out: Path) -> None:
             os.waitpid(child, 0)
             raise
         return os.waitstatus_to_exitcode(status), b""
-
-    import OCP.STEPControl  # noqa: F401 - loaded before the fork
 
     before = step.run_limited
     step.run_limited = run
@@ -1066,7 +1069,7 @@ def read_database(path: Path, _out: Path) -> None:
 def read_exchange(path: Path, out: Path) -> None:
     """Import a database into a new one; its names and parts must be as a spec's are."""
     from generator.database.exchange import import_objects
-    from generator.database.open import open_database
+    from generator.database.open import open_database, part_path
     from generator.database.read import list_objects, read_object, read_parts
     from generator.database.transaction import read_transaction
     from generator.errors import DatabaseError
@@ -1086,6 +1089,9 @@ def read_exchange(path: Path, out: Path) -> None:
                 read_parts(connection, entry.object_id)
             except (ValueError, TypeError, LookupError, DatabaseError) as bad:
                 raise WrongValueError(f"what was imported cannot be read: {bad!r:.60}") from bad
+            for part in read_parts(connection, entry.object_id):
+                if not part_path(engine.url, part.file).is_relative_to(path.parent):
+                    raise LeakError("a part outside the folder of the file")
 
 
 # -- the serial line
@@ -1420,7 +1426,7 @@ KINDS: dict[str, Kind] = {
     "command": Kind(write_spec, read_by_command, (1, 2, 4), longest_s=30.0),
     "stl": Kind(_shape_writer(".stl"), read_model),
     "obj": Kind(_shape_writer(".obj"), read_model),
-    "step": Kind(_shape_writer(".step"), read_model_in_fork),
+    "step": Kind(_shape_writer(".step"), read_model_in_fork, sound=(load_kernel,)),
     "3mf": Kind(write_3mf, read_3mf),
     "database": Kind(write_database, read_database, (4, 2), sound=(labs,)),
     "import": Kind(write_database, read_exchange, (4,), sound=(labs,)),

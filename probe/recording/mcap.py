@@ -16,6 +16,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import struct
+import zlib
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import islice
@@ -60,6 +63,9 @@ Message = dict[str, Any]  #: values by name, `cdr_values`
 
 _MEND: Final = "mend it with `mcap recover`"
 _AT_ONCE: Final = 1024  #: frames read at a time
+_READ_AT_ONCE: Final = 1 << 20  #: bytes
+_FOOTER: Final = struct.Struct("<9xQQI8x")  #: last record: start of the summary, check sum; magic
+_AFTER_SUMMARY: Final = 12  #: bytes that its check sum leaves out: itself and the magic
 _RECORD_HEAD: Final = 9  #: bytes before a record: kind, length
 _PARTS: Final = (("orientation", "xyzw"), ("position", "xyz"))  #: of a pose
 _ENCODINGS: Final = {"32FC1": "f4", "16UC1": "u2", "mono16": "u2", "mono8": "u1", "8UC1": "u1"}
@@ -192,8 +198,10 @@ def _open_mcap(path: Path) -> Iterator[McapReader]:
         stream = open_regular(path)
     with stream:
         try:
-            reader = make_reader(stream, validate_crcs=True)
-            _check_chunks(path, stream, reader.get_summary())
+            reader = make_reader(stream, validate_crcs=True)  # of chunks
+            summary = reader.get_summary()
+            _check_summary(stream)
+            _check_chunks(path, stream, summary)
             yield reader
         except InvalidMagic as error:
             raise RecordingError(
@@ -205,6 +213,20 @@ def _open_mcap(path: Path) -> Iterator[McapReader]:
             raise RecordingError(
                 f"it is damaged ({type(error).__name__}{said})", fix=_MEND, place=str(path)
             ) from error
+
+
+def _check_summary(stream: BinaryIO) -> None:
+    """Refuse a summary of another check sum than its footer says; 0: it says none."""
+    end = stream.seek(-_FOOTER.size, os.SEEK_END)
+    start, _, said = _FOOTER.unpack(stream.read(_FOOTER.size))
+    if not said or not start:
+        return
+    stream.seek(start)
+    left, found = end + _FOOTER.size - _AFTER_SUMMARY - start, 0
+    while left > 0 and (some := stream.read(min(left, _READ_AT_ONCE))):
+        found, left = zlib.crc32(some, found), left - len(some)
+    if found != said:
+        raise ValueError("its summary has another check sum")
 
 
 def _check_chunks(path: Path, stream: BinaryIO, summary: Summary | None) -> None:

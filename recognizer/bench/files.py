@@ -16,6 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from fastapi.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect
 
 from encoded_objects.base.files import staged_file
 from generator.database.open import normal_url
@@ -150,6 +151,10 @@ class Uploads:
                     raise BenchError(
                         f"{came:,} bytes came in {time.monotonic() - began_s:.0f} s",
                         fix=f"send it in again, {SLOWEST // 1024} kB a second or more",
+                    ) from None
+                except ClientDisconnect:
+                    raise BenchError(
+                        f"the page left after {came:,} bytes", fix="send it in again"
                     ) from None
                 came += len(chunk)
                 if came > UPLOAD:

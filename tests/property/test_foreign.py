@@ -77,6 +77,13 @@ def _mcap_of_another_sum():
     return bytes(content)
 
 
+def _mcap_of_another_type():
+    """A file of ours whose summary names a type of messages otherwise."""
+    content = bytearray(foreign.mcap_file())
+    content[content.rindex(b"TouchFrame")] ^= 1
+    return bytes(content)
+
+
 def _lab_where(change):
     """A lab changed by SQL."""
     with tempfile.TemporaryDirectory() as folder:
@@ -107,6 +114,7 @@ FOUND = {
     "an attribute that is nothing": ("mcap", "a.mcap", lambda: _mcap_with({"a": None}), "'a'"),
     "an attribute with a zero": ("mcap", "a.mcap", lambda: _mcap_with({"a": "b\0"}), "'a'"),
     "a chunk of another check sum": ("mcap", "a.mcap", _mcap_of_another_sum, "damaged"),
+    "a summary of another check sum": ("mcap", "a.mcap", _mcap_of_another_type, "check sum"),
     "a plate packed by LZMA": ("3mf", "p.3mf", _packed_by_lzma, "no plate"),
     "glyphs that are a number": (
         "database", "lab.db", lambda: _lab_where("update alphabets set definition = 0"), "damaged",

@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from hostile_recordings import write_hostile, write_zeros
+from starlette.requests import ClientDisconnect
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.database.open import open_database
@@ -135,6 +136,16 @@ def test_a_recording_that_is_sent_in_is_kept_only_if_it_is_one(tmp_path):
             taken_in(uploads, "b.h5", bad)
     assert [path.name for path in (tmp_path / "kept").iterdir()] == ["a.h5"]
     assert (tmp_path / "kept" / "a.h5").read_bytes() == content
+
+
+def test_a_page_that_leaves_keeps_nothing(tmp_path):
+    async def leaving():
+        yield b"the first bytes"
+        raise ClientDisconnect
+
+    with pytest.raises(BenchError, match="left after 15 bytes"):
+        asyncio.run(Uploads(tmp_path).take("a.h5", leaving()))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_sent_in_is_read_by_a_process_with_limits(tmp_path, monkeypatch):
