@@ -45,7 +45,7 @@ from recognizer.touch.symbols.fit import (
     score_cells,
     search_image,
 )
-from recognizer.touch.symbols.image import Image, bend_image
+from recognizer.touch.symbols.image import Image, balanced_gain, bend_image
 
 STEPS = 4  #: of damped least squares, of a place with known symbols
 
@@ -87,8 +87,12 @@ class ArrayImage:
     def fits(self, effort: Effort) -> tuple[Fit, ...]:
         """Return the lattices in the image, best first; without covariances."""
         if effort not in self._fits:
+            bank, searches = self.prepared.bank, self.searches
+            balanced = balanced_gain(self.image) if effort.again else None
+            if balanced is not None:
+                searches += search_image(self.image, bank, [balanced])
             self._fits[effort] = fit_lattices(
-                self.image, self.prepared.bank, effort, self.searches, with_covariance=False
+                self.image, bank, effort, searches, with_covariance=False
             )
         return self._fits[effort]
 
