@@ -15,6 +15,7 @@ from sqlalchemy import Connection, delete, insert, select
 
 from generator.database.read import read_only
 from generator.database.tables import as_built
+from generator.errors import DatabaseError
 
 PARAMETERS = ("scale_x", "scale_y", "skew_rad", "stroke_mm")  #: order in the covariance
 
@@ -43,14 +44,16 @@ def write_as_built(connection: Connection, measured: AsBuilt) -> None:
 
     Raises
     ------
-    ValueError
-        The covariance is not a finite 4x4 matrix.
     DatabaseError
-        There is no such object, or a scale, the stroke or `touches` is not positive.
+        The covariance is not a finite 4x4 matrix, there is no such object, or a scale, the stroke
+        or `touches` is not positive.
     """
     covariance = np.asarray(measured.covariance, np.float64)
     if covariance.shape != (4, 4) or not np.isfinite(covariance).all():
-        raise ValueError("the covariance of an as-built print is a finite 4x4 matrix")
+        raise DatabaseError(
+            "the covariance of an as-built print is a finite 4x4 matrix",
+            fix="measure the print again: recognize-object as-built RECORDING --store",
+        )
     named = ("object_id", "part", "printer", "material")
     row = {name: getattr(measured, name) for name in (*named, *PARAMETERS, "touches")}
     alike = named if measured.object_id is None else ("object_id", "part")

@@ -2,11 +2,11 @@
 
 import json
 import os
-import select
 import shutil
 import signal
 import subprocess
 import sys
+import time
 from contextlib import chdir
 from importlib import import_module
 from pathlib import Path
@@ -57,21 +57,21 @@ def files(database, name="Cube"):
 
 
 def test_interruption_has_exit_code_130():
-    os.mkfifo("c.yaml")
+    Path("c.yaml").write_text("name: Cube\nshape: {cube: 300 mm}\noutput: {formats: [stl]}\n")
     process = subprocess.Popen(
         [sys.executable, "-c", ENTRY, "c.yaml"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
-    with open("c.yaml", "wb") as file:  # opens once the command reads
-        file.write(b"name: ")
-        file.flush()
-        for _ in range(6):  # as a person does: again, where a first one came amid an import
-            process.send_signal(signal.SIGINT)
-            if select.select([process.stderr], [], [], 10)[0]:  # it says so, or has gone
-                break
-        text, messages = process.communicate(timeout=30)
+    until_s = time.monotonic() + 30
+    while not [*Path("out").glob("*/.encode-object-*")]:  # files are being made there
+        assert process.poll() is None
+        assert time.monotonic() < until_s
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    text, messages = process.communicate(timeout=30)
     assert process.returncode == 130
     assert text == b""
     assert messages == b"\nencode-object: interrupted\n"
+    assert not [*Path("out").glob("**/*")]
 
 
 def test_output_into_a_closed_pipe_is_no_traceback():

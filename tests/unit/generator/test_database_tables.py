@@ -195,13 +195,12 @@ def test_a_removed_object_takes_its_prints_with_it_but_not_the_printers(engine):
     ],
 )
 def test_prints_that_cannot_be_are_refused(engine, changes):
-    error = ValueError if "covariance" in changes else DatabaseError
-    with pytest.raises(error), write_transaction(engine) as connection:
+    with pytest.raises(DatabaseError), write_transaction(engine) as connection:
         write_as_built(connection, replace(MEASURED, **changes))
 
 
 def test_prints_go_with_their_object_to_another_lab(engine, new_database, monkeypatch):
-    for check in ("array_here", "check_alphabet", "check_cells"):
+    for check in ("array_here", "check_alphabet", "check_cells", "check_readable"):
         monkeypatch.setattr(f"generator.database.transfer.{check}", lambda *_: None)
     other = open_database(new_database("sqlite"))
     with write_transaction(engine) as connection:

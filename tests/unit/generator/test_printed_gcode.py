@@ -176,7 +176,7 @@ def test_errors_say_file_and_line(text: str, line: int, says: str) -> None:
 def test_files_that_hold_nothing(tmp_path: Path) -> None:
     with pytest.raises(PrintError, match="nothing is printed in 2 lines"):
         toolpath_of("G28\nG1 X5")
-    with pytest.raises(PrintError, match="cannot read"):
+    with pytest.raises(PrintError, match="cannot be read: No such file"):
         read_gcode(tmp_path / "none.gcode")
     (tmp_path / "b.bgcode").write_bytes(b"GCDE\x01\x00")
     with pytest.raises(PrintError, match="binary"):

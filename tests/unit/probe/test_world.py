@@ -372,6 +372,6 @@ def test_what_is_no_stl_is_refused(tmp_path, content, match):
 
 
 def test_missing_files_and_folders_are_refused(tmp_path):
-    for path, match in ((tmp_path / "none.stl", "no such file"), (tmp_path, "is a directory")):
+    for path, match in ((tmp_path / "none.stl", "No such file"), (tmp_path, "Is a directory")):
         with pytest.raises(SurfaceError, match=match):
             written_triangles(path)

@@ -30,10 +30,10 @@ class Stages:
         self.asked = SimpleNamespace(
             images=[], searches=[], efforts=[], refined=[], rivals=[], round=[]
         )
-        self.on_round = []
+        self.on_round, self.balanced = [], None
         for name in (
             "search_image", "fit_lattices", "find_hypotheses", "find_rivals", "refine_lattices",
-            "score_cells", "log_likelihoods_at", "verify_on_round_faces",
+            "score_cells", "log_likelihoods_at", "verify_on_round_faces", "balanced_gain",
         ):  # fmt: skip
             monkeypatch.setattr(recognizer.touch.verify, name, getattr(self, "_" + name))
 
@@ -55,13 +55,17 @@ class Stages:
         self.asked.images.append(image)
         return image
 
-    def _search_image(self, image, bank):
+    def _search_image(self, image, bank, gains=None):
         assert bank == "bank"
         self.asked.searches.append(image)
-        return ("coarse", image)
+        return ("coarse", image) if gains is None else (gains,)
+
+    def _balanced_gain(self, image):
+        return self.balanced
 
     def _fit_lattices(self, image, bank, effort, searches, *, with_covariance):
-        assert (bank, searches, with_covariance) == ("bank", ("coarse", image), False)
+        more = ([self.balanced],) if effort.again and self.balanced else ()
+        assert (bank, searches, with_covariance) == ("bank", ("coarse", image, *more), False)
         self.asked.efforts.append(effort)
         return self.fits
 
@@ -118,6 +122,14 @@ def test_a_touch_is_fitted_once(stages):
     stages.run()  # another touch
     assert (len(asked.images), len(asked.searches)) == (2, 2)
     assert asked.efforts == [OPTIONS.first, OPTIONS.thorough, OPTIONS.first]
+
+
+def test_a_wide_search_near_an_edge_begins_with_a_balanced_plate_too(stages):
+    touch, stages.balanced = stages.touch(), "balanced"
+    verify_hypotheses(touch, OPTIONS.first)
+    assert len(stages.asked.searches) == 1
+    verify_hypotheses(touch, OPTIONS.thorough)
+    assert len(stages.asked.searches) == 2
 
 
 @pytest.mark.parametrize(
