@@ -166,7 +166,8 @@ def unprivileged():
 def cube_lab(tmp_path_factory):
     """Return a database that holds a cube."""
     path = tmp_path_factory.mktemp("lab") / "lab.db"
-    encode("name: Cube\nshape: {cube: 40 mm}\n", database=str(path), formats=())
+    text = "name: Cube\nshape: {cube: 40 mm}\n"
+    encode(text, database=str(path), folder=path.parent, formats=())
     return path
 
 
