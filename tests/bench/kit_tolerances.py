@@ -128,7 +128,7 @@ def main() -> None:
         for name, shape in SHAPES.items():
             spec = {"name": name, "shape": shape, "sensor_type": given.sensor_type}
             encode(spec | {"output": {"lab_key": "VA11-DATE-0000-0002"}}, database=database,
-                   formats=())  # fmt: skip
+                   folder=f"{folder}/{name}", formats=())  # fmt: skip
         reader = Reader(open_lab(database), sensor)
         scenes = [registered_surface(database, n, f"F{k}") for n in SHAPES for k in (1, 2, 3)]
         runner.table(("dimension", "off by", "right", "wrong", "rms mm / degrees", "inside"))

@@ -81,7 +81,7 @@ def _make(database: Path, profile: str, specs: list[dict[str, Any]]) -> None:
     objects = [PITCH | {"profile": profile} | one for one in specs]
     key = np.random.default_rng(list(database.stem.encode())).bytes(16)
     whole = {"version": 1, "objects": objects, "output": {"lab_key": lab_key_of(key)}}
-    encode(whole, database=str(unfinished), formats=())
+    encode(whole, database=str(unfinished), folder=database.with_suffix(""), formats=())
     unfinished.rename(database)
     print(f"{database.name}: {len(objects)} specs", flush=True)
 

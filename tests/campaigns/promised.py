@@ -182,7 +182,8 @@ def touch_faces(folder: Path, rounds: int, seed: int) -> list[runner.Row]:
             unfinished.unlink(missing_ok=True)
             for k, solid in enumerate(solids):  # one by one: each has the pitch that suits it
                 spec = {"name": f"{group} {k + 1}", "output": {"lab_key": LAB_KEY}} | solid
-                encode(spec, database=str(unfinished), formats=())
+                made = folder / group / str(k)
+                encode(spec, database=str(unfinished), folder=made, formats=())
             unfinished.rename(lab)
         readers[group] = Reader(open_lab(lab), USUAL_SENSOR)
         faces += list(faces_of(lab, group))
