@@ -215,10 +215,9 @@ class Receiver:
 
     def counts(self) -> Counter[Damage | str]:
         """Return what came so far: damaged blocks by kind, packets, doubtful frames, bytes."""
-        counted: Counter[Damage | str] = Counter(list[Damage | str]())
+        counted = Counter[Damage | str]()
         counted.update(self.damages)
-        more = {"packets": self.packets, "doubtful": self._order.doubtful, "bytes": self.bytes}
-        counted.update(more)
+        counted.update(packets=self.packets, doubtful=self._order.doubtful, bytes=self.bytes)
         return counted
 
     @property
