@@ -127,11 +127,10 @@ def _is_of_rows(error: BaseException) -> bool:
     names = [frame.f_globals.get("__name__", "") for frame, _ in walk_tb(error.__traceback__)]
     if isinstance(error, GeneratorError):  # a value that nothing can be made from
         return "generator.database.read" in names
-    ours = [name for name in names if name.startswith(("sqlalchemy.", "generator.database."))]
-    ours = [name for name in ours if name != __name__]
-    return (
-        bool(ours) and ours[-1] != "generator.database.register"
-    )  # which refuses what it is given
+    below = ("sqlalchemy.", "generator.database.")
+    ours = [name for name in names if name.startswith(below) and name != __name__]
+    # registering refuses what it is given
+    return bool(ours) and ours[-1] != "generator.database.register"
 
 
 def explain_error(error: Exception, url: URL) -> DatabaseError:
