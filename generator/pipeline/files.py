@@ -23,6 +23,7 @@ from generator.export.preview import preview_png
 from generator.export.threemf import SlicerSettings, slicer_settings
 from generator.layout.placement import Layout, object_code
 from generator.pipeline.faces import FaceReport, face_reports
+from generator.pipeline.made import overhangs
 from generator.pipeline.place import BuiltParts
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
@@ -81,7 +82,8 @@ def stage(
         prove_closed(part)
     meshes = [triangles(part) for part in parts]
     exported = ExportedObject(
-        spec.name, plan.polyhedron, parts, meshes, plan.printer.bed_mm, settings_of(plan),
+        spec.name, plan.polyhedron, parts, meshes, plan.printer.bed_mm,
+        settings_of(plan, layout),
         density_kg_m3=spec.density_kg_m3, symbols_collide=spec.collision == "symbols",
     )  # fmt: skip
     for_robots = any(EXPORTERS[name].robot for name in formats)
@@ -139,12 +141,12 @@ def stage(
     return StagedObject(registered, len(parts), warnings, faces, fit)
 
 
-def settings_of(plan: ObjectPlan) -> SlicerSettings | None:
+def settings_of(plan: ObjectPlan, layout: Layout) -> SlicerSettings | None:
     """Return how a slicer prints the parts of an object."""
     spec = plan.spec
-    panelled = spec.parts == "panels"
-    change = spec.wall_mm if panelled and spec.colours > 1 else 0.0
-    return slicer_settings(plan.printer, supports=not panelled, colour_change_mm=change)
+    change = spec.wall_mm if spec.parts == "panels" and spec.colours > 1 else 0.0
+    supports = overhangs(plan, layout).supports
+    return slicer_settings(plan.printer, supports=supports, colour_change_mm=change)
 
 
 def parts_of(plan: ObjectPlan, layout: Layout) -> BuiltParts:

@@ -25,11 +25,12 @@ from generator.export.sheet import Figure, Mark, Section, sheet_html
 from generator.export.threemf import PrintFile, SlicerSettings, print_file
 from generator.layout.placement import Layout, object_code
 from generator.pipeline.files import parts_of, settings_of
+from generator.pipeline.made import overhangs
 from generator.pipeline.make import MakeJob
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, part_of_progress
-from generator.pipeline.sheet import Rows, cost_text, layers_text, lies_text, material_text
+from generator.pipeline.sheet import Rows, cost_text, layers_text, material_text
 from generator.printers import Printer
 from generator.solid import Part, box, volume
 
@@ -151,7 +152,7 @@ def _measure(number: int, plan: ObjectPlan, layout: Layout) -> list[SetPart]:
 def _plates(objects: Sequence[SetObject], parts: Sequence[SetPart]) -> list[SetPlate]:
     """Arrange all parts: those that one printer prints with the same settings lie together."""
     plates: list[SetPlate] = []
-    ways = [(job.plan.printer, settings_of(job.plan)) for job, _ in objects]
+    ways = [(job.plan.printer, settings_of(job.plan, layout)) for job, layout in objects]
     for printer, settings in dict.fromkeys(ways):
         own = tuple(part for part in parts if ways[part.number] == (printer, settings))
         sizes = [part.size_mm[:2] for part in own]
@@ -277,7 +278,7 @@ def _facts(
         rows += [("layers", layers_text(printer))]
     by_way: dict[str, list[str]] = {}
     for job, layout in objects:
-        by_way.setdefault(lies_text(job.plan, layout), []).append(job.plan.spec.name)
+        by_way.setdefault(overhangs(job.plan, layout).text, []).append(job.plan.spec.name)
     for way, names in by_way.items():
         rows.append(("lies", way if len(by_way) == 1 else f"{', '.join(names)}: {way}"))
     rows.append(("scale", "100 %"))

@@ -98,7 +98,7 @@ def outcome(spec: ObjectSpec) -> runner.Row:
         faults = mesh_faults(glb_bytes(spec.name, parts, meshes))
         if any(faults):
             return row | {"failed": f"GLB: flat, doubled, open: {faults}"}
-        for plate in print_files(spec.name, parts, plan.printer.bed_mm, settings_of(plan)):
+        for plate in print_files(spec.name, parts, plan.printer.bed_mm, settings_of(plan, layout)):
             for content in (plate.content, plate.prusaslicer):
                 if said := model_faults(content, folder):
                     return row | {"failed": f"3MF: {said[0]}"}
