@@ -132,7 +132,7 @@ def describe_object(
 
 @dataclass(frozen=True, slots=True)
 class Overhangs:
-    """How parts lie on the bed, and what hangs over: sheet, advice and slicers take it from here."""
+    """How parts lie, and what hangs over: sheets, advice and slicer projects take it from here."""
 
     text: str
     faces: tuple[str, ...] = ()  #: that hang over
