@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -87,16 +87,15 @@ def write_set(
     packed = [_packing_rows(objects, plate, number) for number, plate in enumerate(plates, 1)]
     rows = sorted((row for some in packed for row in some), key=lambda row: row.order)
     listed = packing_csv(rows)
-    with_models, with_projects = (
-        any(kind in job.formats for job, _ in objects) for kind in ("3mf", "bambu")
-    )
+    with_models = any("3mf" in job.formats for job, _ in objects)
+    of_bambu = {job.plan.printer for job, _ in objects if "bambu" in job.formats}
     models = [
         f"{name}-plate-{number}{kind}.3mf"
         for number in range(1, len(plates) + 1)
         for kind in ("", "-prusaslicer")
         if with_models
     ]
-    projects = _projects(name, plates) if with_projects else []
+    projects = _projects(name, plates, of_bambu)
     models += [project.file for project in projects]
     overview = [f"{name}-overview.pdf"] if can_draw() else []
     names = [f"{name}-packing.csv", f"{name}-build.html", *overview, *models]
@@ -181,15 +180,17 @@ class _Project(NamedTuple):
     plates: Sequence[int]
 
 
-def _projects(name: str, plates: Sequence[SetPlate]) -> list[_Project]:
-    """Return the projects of all plates of filament: of each printer, as many as they need."""
+def _projects(
+    name: str, plates: Sequence[SetPlate], printers: Collection[Printer]
+) -> list[_Project]:
+    """Return the projects of the plates of some printers, as many for each as they need."""
     by_printer: dict[Printer, list[int]] = {}
     for number, plate in enumerate(plates):
-        if plate.printer.nozzle_mm:
-            by_printer.setdefault(plate.printer, []).append(number)
+        by_printer.setdefault(plate.printer, []).append(number)
     batches = [
         own[k : k + PLATES_MAX]
-        for own in by_printer.values()
+        for printer, own in by_printer.items()
+        if printer in printers
         for k in range(0, len(own), PLATES_MAX)
     ]
     return [_Project(*one) for one in zip(project_names(name, len(batches)), batches, strict=True)]

@@ -164,10 +164,11 @@ def test_a_set_has_a_project_for_each_of_its_printers(tmp_path: Path) -> None:
         "  - {name: B, shape: {cylinder: {diameter: 24 mm, height: 24 mm}}, "
         "print: {printer: bambu-a1-mini}}\n"
         "  - {name: C, shape: {cube: 24 mm}, print: {printer: bambu-a1}}\n"
+        "  - {name: D, shape: {cube: 24 mm}, print: {printer: ender-3}, output: {formats: 3mf}}\n"
     )
     url = f"sqlite:///{tmp_path}/l.db"
-    made = encode(read_specs([spec]), folder=tmp_path, database=url, formats=("bambu",), jobs=1)
-    names = sorted(path.name for path in made.set_files if path.suffix == ".3mf")
+    made = encode(read_specs([spec]), folder=tmp_path, database=url, jobs=1)
+    names = sorted(path.name for path in made.set_files if "-bambu" in path.name)
     assert names == ["lab-bambu-1.3mf", "lab-bambu-2.3mf"]
     first, second = (read_project((tmp_path / name).read_bytes()) for name in names)
     held = [{one.name.split("-F")[0] for one in plate} for plate in first.plates]
@@ -178,3 +179,4 @@ def test_a_set_has_a_project_for_each_of_its_printers(tmp_path: Path) -> None:
     ]
     page = (tmp_path / "lab-build.html").read_text()
     assert "lab-bambu-1.3mf, plate 2" in page
+    assert "lab-plate-4.3mf" in page
