@@ -54,8 +54,8 @@ class LabArrays:
     """On which array a lab makes the objects of each profile."""
 
     key: str  #: empty where all arrays are the published ones
-    #: that objects were made on, and their numbers, by profile
-    made: Mapping[str, tuple[int, FoldedArray | ProductArray]]
+    made: Mapping[str, RegisteredArray]  #: that objects were made on, by profile
+    symbols: Mapping[int, FoldedArray | ProductArray]  #: of these, by their numbers
 
     def of_profile(self, profile: Profile) -> FoldedArray | ProductArray:
         """Return the lab's array of a profile; profiles that differ in pitch share one."""
@@ -63,7 +63,7 @@ class LabArrays:
             alike = {name for name, one in PROFILES.items() if one.encoding == profile.encoding}
             kept = [self.made[name] for name in alike | {profile.name} if name in self.made]
             if kept:
-                return min(kept, key=lambda one: one[0])[1]
+                return self.symbols[min(one.array_id for one in kept)]
         return profile.array_of_lab(self.key)
 
     def key_of(self, profile: Profile) -> str:
@@ -78,8 +78,8 @@ def lab_arrays(connection: Connection) -> LabArrays:
     query = select(arrays.c.array_id, arrays.c.profile).order_by(arrays.c.array_id.desc())
     mine = query.where(arrays.c.lab_key.is_not_distinct_from(key or None))
     rows = connection.execute(mine).all()
-    made = {name: (number, make_array(connection, number)) for number, name in rows}
-    return LabArrays(key, made)
+    made = {name: read_array(connection, number) for number, name in rows}
+    return LabArrays(key, made, {number: make_array(connection, number) for number, _ in rows})
 
 
 MOST_FILLED = 0.8  #: share of an array that faces of all shapes fill without a search
