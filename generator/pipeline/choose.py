@@ -132,7 +132,7 @@ def choose_array(
         else:
             made = lab.of_profile(PROFILES[profile]).definition(), lab.key_of(PROFILES[profile])
         return ArrayChoice(plan_objects([_follow(one, profile, *made) for one in specs], solid))
-    kept = other or _array_kept(lab, connection, known)
+    kept = other or _array_kept(lab, known)
     if kept is not None:
         made = kept.definition, kept.lab_key
         pitches = {name: entry.pitch_mm for name, entry in known.items()}
@@ -246,13 +246,10 @@ def _array_of_another_lab(
     return array if keyed and array.lab_key != lab.key else None
 
 
-def _array_kept(
-    lab: LabArrays, connection: Connection | None, known: Mapping[str, ObjectEntry]
-) -> RegisteredArray | None:
+def _array_kept(lab: LabArrays, known: Mapping[str, ObjectEntry]) -> RegisteredArray | None:
     """Return the array of the lab's own that one of the objects is registered on."""
-    names = (entry.profile for entry in known.values() if _of_candidate(entry.profile))
-    found = next((lab.made[name] for name in names if name in lab.made), None)
-    return read_array(connection, found[0]) if found and connection is not None else None
+    arrays = (lab.made.get(entry.profile) for entry in known.values())
+    return next((one for one in arrays if one is not None and _of_candidate(one.profile)), None)
 
 
 def _of_candidate(profile: str) -> bool:
