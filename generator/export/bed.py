@@ -91,8 +91,8 @@ def _arrange(
         small = [p for p in own if _place_part(_Skyline(list(floor), []), p, grown[p], room)]
         for part in own:
             if part not in small and rim_mm:  # it lies on the rim, too
-                (plate,) = _arrange([sizes[part]], bed_mm, None, blocked_mm, 0.0)
-                oversize.append(replace(plate, places=(replace(plate.places[0], part=part),)))
+                (lone,) = _arrange([sizes[part]], bed_mm, None, blocked_mm, 0.0)
+                oversize.append(replace(lone, places=(replace(lone.places[0], part=part),)))
             elif part not in small:
                 oversize.append(_oversize_plate(part, sizes[part], bed_mm, blocked_mm))
         for number, plate in enumerate(open_plates):
