@@ -132,8 +132,9 @@ def stage(
         for face in faces
         if face.promise is not None
     }
-    staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes, shares))
-    page = build_sheet(plan, layout, parts, on_sheet)
+    picture = preview_png(spec.name, size, parts, meshes, shares)
+    staging.write(f"{spec.name}.png", picture)
+    page = build_sheet(plan, layout, parts, on_sheet, picture)
     staging.write(f"{spec.name}-build.html", page.encode())
     staging.write(f"{spec.name}-array.svg", _array_picture(plan, layout).encode())
     return StagedObject(registered, len(parts), warnings, faces, fit)
