@@ -25,7 +25,7 @@ from generator.export.sheet import Figure, Section, picture_html, sheet_html
 from generator.layout.placement import Layout, object_code
 from generator.pipeline.made import overhang_text
 from generator.pipeline.plan import ObjectPlan
-from generator.plane.polygon import face_vector
+from generator.plane.polygon import face_vector, points_inside
 from generator.polyhedron import face_polygon
 from generator.polyhedron.assembly import AssemblyStep, assembly_order, distinct_faces
 from generator.printers import Printer
@@ -237,22 +237,23 @@ def _step_text(plan: ObjectPlan, step: AssemblyStep, names: Sequence[str]) -> st
 
 def _checks(plan: ObjectPlan, layout: Layout) -> Rows:
     round_faces = {surface.carrier for surface in plan.polyhedron.surfaces}
-    encoded = sorted(
-        face.face
-        for face in layout.faces
-        if len(face.labels) and face.face not in round_faces | plan.blank_faces
-    )
+    middles: dict[int, tuple[float, float]] = {}  # of flat faces that have one, face frame
+    for one in layout.faces:
+        if len(one.labels) and one.face not in round_faces | plan.blank_faces:
+            loops = face_polygon(plan.polyhedron, one.face)
+            middle = (loops[0].min(axis=0) + loops[0].max(axis=0)) / 2
+            if points_inside(middle[None], loops).all():  # an L has its middle beside it
+                middles[one.face] = (float(middle[0]), float(middle[1]))
     numbers = {
         (edge.start, edge.end): number + 1 for number, edge in enumerate(plan.polyhedron.edges)
     }
     found: list[tuple[str, ...]] = []
-    for face in distinct_faces(plan.polyhedron, encoded):
+    for face in distinct_faces(plan.polyhedron, sorted(middles)):
         name = plan.polyhedron.faces[face].name
         loop = plan.polyhedron.faces[face].loops[0]
         first = numbers.get((loop[0], loop[1])) or numbers[loop[1], loop[0]]
         where = f"{name} in the middle"
-        outline = face_polygon(plan.polyhedron, face)[0]
-        x, y = ((outline.min(axis=0) + outline.max(axis=0)) / 2 + 0.0).tolist()
+        x, y = middles[face]
         answer = f"{plan.spec.name}/{name} at about ({x:.0f}, {y:.0f}) mm"
         if plan.spec.parts == "panels":
             where += f", the sensor's lower side along edge {first}"

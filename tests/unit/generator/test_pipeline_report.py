@@ -22,6 +22,7 @@ from generator.pipeline.faces import face_reports
 from generator.pipeline.files import outer_size_mm, parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
+from generator.pipeline.sheet import _checks
 from generator.polyhedron import SHAPES
 from generator.polyhedron.assembly import assembly_order, distinct_faces
 from generator.polyhedron.frame import face_area, face_frame
@@ -238,3 +239,12 @@ def test_glue_steps_are_seen_from_one_side_and_name_what_can_be_seen():
     for number, seen in enumerate(named):
         assert glued[number] in seen <= set(glued[: number + 1])
     assert len(named[-1]) == 3  # of six: a cube shows three
+
+
+def test_touches_that_check_a_part_are_on_its_faces(tmp_path):
+    """The middle of an L lies beside it."""
+    wide = re.sub(r"\b12\b", "20", BRACKET)
+    checks = _checks(*laid_out(tmp_path, wide))
+    assert len(checks) == 3
+    assert {"F1", "F2"}.isdisjoint(touch.split()[0] for _, touch, _ in checks)
+    assert all(answer.startswith(f"A/{touch.split()[0]} at about") for _, touch, answer in checks)
