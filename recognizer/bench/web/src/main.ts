@@ -45,18 +45,18 @@ async function begin(): Promise<void> {
   new Tour();
   new Panes();
   let newest: Frame | null = null, painting = false, past = false;
-  let held = false, released = 0; // the image of a lifted touch stays until the next one, or another filter is chosen
+  let held = false, released = 0; // the image of a lifted touch stays until the next one, or until another unit or filter is chosen
+  let strongest: { touch: number; frame: Frame } | null = null; // of the touch that is felt
   let record: TouchRecord | null = null, painted = 0, read = 0, started = 0, ready = false;
 
   const line = new Live({
     frame(frame) {
       figures.frames++;
+      if (held && (frame.newtons !== newest?.newtons || frame.filter !== newest.filter)) [held, released] = [false, record?.number ?? 0];
       if (past || held || element<HTMLInputElement>("freeze").checked) return;
       newest = frame;
-      if (!painting) {
-        painting = true;
-        requestAnimationFrame(paint);
-      }
+      if (record?.contact && !(strongest?.touch === record.number && strongest.frame.largest > frame.largest)) strongest = { touch: record.number, frame };
+      repaint();
     },
     mosaic: (image) => {
       mosaic.show(image);
@@ -71,6 +71,11 @@ async function begin(): Promise<void> {
       else work.gone();
     },
   }, "bias-free");
+
+  function repaint(): void {
+    if (!painting) requestAnimationFrame(paint);
+    painting = true;
+  }
 
   function paint(): void {
     painting = false;
@@ -112,7 +117,7 @@ async function begin(): Promise<void> {
   function take(one: TouchRecord | null, ofPast: boolean): void {
     record = one;
     past = ofPast;
-    const answer = one?.answer ?? null, lifted = !past && ready && answer !== null && !one!.contact && one!.number !== released;
+    const answer = one?.answer ?? null, lifted = !past && answer !== null && !one!.contact && one!.number !== released && one!.number === strongest?.touch;
     if (!ready) read = Math.max(read, answer?.read ?? 0); // it was there before the page
     const fresh = answer !== null && !past && answer.read > read;
     let since: number | null = null;
@@ -130,7 +135,11 @@ async function begin(): Promise<void> {
     answers.tell(one, since, past);
     heat.answer = past || lifted || (one?.contact && !one.moving) ? answer : null;
     objects.map.tell(answer);
-    if (past || (lifted && !held)) void image(one!.number).catch(() => undefined);
+    if (past) void image(one!.number).catch(() => undefined);
+    if (lifted && !held) {
+      newest = strongest!.frame;
+      repaint();
+    }
     held = lifted;
     if (answer?.object && (fresh || past) && answer.object !== part.shape?.name && element<HTMLInputElement>("follow").checked) objects.look(answer.object);
     else lights();
@@ -139,7 +148,7 @@ async function begin(): Promise<void> {
   /** Paint the image of a touch of the past. */
   async function image(number: number): Promise<void> {
     const { counts } = await get<{ counts: number[][] }>(`touches/${number}`);
-    if (!(past || held) || record?.number !== number) return;
+    if (!past || record?.number !== number) return;
     const values = Float32Array.from(counts.flat()), low = Math.min(...values);
     values.forEach((value, i) => { values[i] = value - low; });
     const largest = Math.max(...values);
@@ -164,7 +173,7 @@ async function begin(): Promise<void> {
 
   const filter = element<HTMLSelectElement>("filter");
   choices(filter, info.filters.map((name) => [name, FILTERS[name] ?? name]), "bias-free");
-  filter.addEventListener("change", () => { heat.top = 0; held = false; released = record?.number ?? 0; line.choose(filter.value); });
+  filter.addEventListener("change", () => { heat.top = 0; line.choose(filter.value); });
   element("show-symbols").addEventListener("change", (event) => { heat.symbols = (event.target as HTMLInputElement).checked; });
   element("show-probe").addEventListener("change", (event) => part.withProbe((event.target as HTMLInputElement).checked));
   element("mosaic-clear").addEventListener("click", () => void post("mosaic").catch(() => undefined));
