@@ -23,7 +23,7 @@ from generator.export.drawing import (
 )
 from generator.export.sheet import Figure, Section, picture_html, sheet_html
 from generator.layout.placement import Layout, object_code
-from generator.pipeline.made import overhang_text
+from generator.pipeline.made import overhangs
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import face_vector, points_inside
 from generator.polyhedron import face_polygon
@@ -110,13 +110,6 @@ def layers_text(printer: Printer) -> str:
     return f"{printer.layer_mm:g} mm, the first {printer.first_layer_mm:g} mm"
 
 
-def lies_text(plan: ObjectPlan, layout: Layout) -> str:
-    """Return how the parts of an object lie on the bed, and what supports they need."""
-    if plan.spec.parts == "panels":
-        return "every panel on its back, symbols up; no supports"
-    return overhang_text(plan, layout)
-
-
 def material_text(volume_mm3: float, *, resin: bool) -> str:
     """Return how much material parts of this volume take."""
     cm3 = volume_mm3 / 1000
@@ -149,7 +142,7 @@ def _facts(
     rows = [
         ("printer", f"{printer.name}: {printer.description}"),
         ("layers", layers_text(printer)),
-        ("on the bed", lies_text(plan, layout)),
+        ("on the bed", overhangs(plan, layout).text),
         ("scale", "100 %: never scale a part"),
     ]
     if spec.colours > 1 and is_panel(parts[0]):

@@ -66,14 +66,14 @@ class ObjectSpec:
     wall_mm: float  #: thickness of panels
     gap_mm: float  #: between panels where they meet in the finished object
     printer: Printer
-    formats: tuple[str, ...]  #: of step, stl, 3mf, glb, stpz, mjcf, urdf, sdf, usd
+    formats: tuple[str, ...]  #: of step, stl, 3mf, bambu, glb, stpz, mjcf, urdf, sdf, usd
     folder: Path  #: for the files; relative to the current folder
     database: str  #: URL
     source: Tree = field(repr=False, compare=False)  #: its settings as written, and their places
     lab_key: str = ""  #: of the database, where the spec says it
     colours: int = 1  #: of the filament: 2 where it is changed for the symbols
     density_kg_m3: float = 1240.0  #: of what is printed, for robots and simulators
-    collision: Literal["body", "symbols"] = "body"  #: what other bodies hit there
+    collision: Literal["touch", "body"] = "touch"  #: what other bodies hit there
     sensor: SensorType = USUAL_SENSOR  #: what will touch it
     #: name of the file or set that was given: files of a set bear it
     origin: str = field(default="", compare=False)
@@ -107,4 +107,6 @@ class ObjectSpec:
             known = printer_named(self.printer.name) == self.printer
         except GeneratorError:
             known = False
-        return self.printer.name if known else asdict(self.printer)
+        where = ("blocked_mm", "model")  # only say where parts lie, and older specs had none
+        own = {name: value for name, value in asdict(self.printer).items() if name not in where}
+        return self.printer.name if known else own

@@ -42,11 +42,11 @@ name: {name}
 
 # robot:                 # what mjcf, urdf, sdf and usd files say
 #   density: 1.24 g/cm3
-#   collision: body      # body (the plain shape as convex pieces) | symbols (these too)
+#   collision: touch     # touch (simulators feel the symbols) | body (convex pieces: fast)
 
 # output:
 #   folder: out/{folder}
-#   formats: [step, stl, 3mf]        # and glb, stpz, mjcf, urdf, sdf, usd
+#   formats: [step, stl, 3mf]        # and bambu, glb, stpz, mjcf, urdf, sdf, usd
 #   database: sqlite:///lab.db       # or postgresql://host/name
 """
 
