@@ -13,6 +13,7 @@ from bench_page import made, making, opened_to_make, running, until
 from playwright.sync_api import expect
 
 from generator.command import run as encode_object
+from recognizer.bench import encode_object as bench_commands
 
 KEY = "0123-4567-89AB-CDER"
 CUBE = "name: Die\nshape: {cube: 40 mm}\noutput: {formats: [stl]}\n"
@@ -157,3 +158,11 @@ def test_what_is_made_in_the_lab_is_shown_and_touched(page, own):
     expect(page.locator("#gallery-list")).to_contain_text("Die")
     assert ask(address, CUBE.replace("40", "41"), keep=True).status_code == 400  # its name is taken
     assert ask(address, CUBE.replace("40", "41")).status_code == 200  # but not in a lab of its own
+
+
+def test_a_part_of_very_many_symbols_is_not_drawn(monkeypatch):
+    monkeypatch.setattr(bench_commands, "DRAWN", 10)
+    monkeypatch.setattr(bench_commands, "load_ahead", lambda: None)
+    found = bench_commands.try_part(CUBE, "Die", "", lambda: False)
+    assert found["made"]["objects"][0]["symbols"] > 10
+    assert found["shape"] is None
