@@ -23,6 +23,7 @@ from generator.export.preview import preview_png
 from generator.export.threemf import SlicerSettings, slicer_settings
 from generator.layout.placement import Layout, object_code
 from generator.pipeline.faces import FaceReport, face_reports
+from generator.pipeline.made import stance_of
 from generator.pipeline.place import BuiltParts
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
@@ -151,7 +152,9 @@ def parts_of(plan: ObjectPlan, layout: Layout) -> BuiltParts:
     """Return the parts of an object, panels or the whole body, and what they lack."""
     spec = plan.spec
     if spec.parts == "whole":
-        return (emboss_whole(plan.polyhedron, layout, plan.outlines, spec.name),), ()
+        stance = stance_of(plan, layout)
+        turned = None if stance is None or stance.as_modelled else stance.R_bed_object
+        return (emboss_whole(plan.polyhedron, layout, plan.outlines, spec.name, turned),), ()
     with error_location(plan.spec.source, "print.wall, print, shape"):
         made = panels(
             plan.polyhedron,

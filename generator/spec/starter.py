@@ -38,6 +38,7 @@ name: {name}
 #   parts: panels        # panels (mitred plates, no supports) | whole (one body)
 #   wall: 3 mm           # thickness of the panels
 #   gap: 0.14 mm         # between panels in the finished object
+#   blank: []            # faces without symbols: [F4, F7]; down: F4  is what one body stands on
 #   printer: fdm-0.4     # encode-object printers lists them
 
 # robot:                 # what mjcf, urdf, sdf and usd files say

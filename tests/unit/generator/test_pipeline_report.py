@@ -189,7 +189,7 @@ def test_the_build_sheet_and_the_last_line_say_how_parts_lie(tmp_path):
         ET.fromstring(drawing)
     lying = made.objects[1].lying
     assert re.fullmatch(
-        r"F1 down, supports needed under F1 \(\d+ symbols hang over\), \d+ symbols stand out "
+        r"F1 down, no supports needed below, \d+ symbols stand out "
         r"sideways; with  parts: panels  nothing hangs over",
         lying,
     )
@@ -197,4 +197,4 @@ def test_the_build_sheet_and_the_last_line_say_how_parts_lie(tmp_path):
     line = next_step(made)
     assert "print Course-plate-1" in line
     assert "Course-build.html" in line
-    assert "Whole: F1 down, supports needed under F1 (" in line
+    assert "Whole: F1 down, no supports needed below, " in line
