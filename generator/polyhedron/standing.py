@@ -110,9 +110,11 @@ def bridges(polyhedron: Polyhedron, down: Floats) -> frozenset[int]:
 def _vectors(polyhedron: Polyhedron) -> Floats:
     """Return the outward normal of each face times its area, (F, 3)."""
     return np.array(
-        [face_vector([polyhedron.vertices[list(loop)] for loop in face.loops]) / 2.0
-         for face in polyhedron.faces]
-    )  # fmt: skip
+        [
+            face_vector([polyhedron.vertices[list(loop)] for loop in face.loops])
+            for face in polyhedron.faces
+        ]
+    )
 
 
 def _stance(
