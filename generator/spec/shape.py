@@ -190,6 +190,7 @@ class Shape(Block):
     tag: (
         Annotated[Tag, BeforeValidator(tag_block, json_schema_input_type=Tag | TagSides)] | None
     ) = None
+    """Sides of a flat plate with symbols on one side: [40, 40] or 40 x 40 mm."""
     polyhedron: VerticesAndFaces | None = None
     file: PathText | None = None
     """A model, relative to the spec: a .stl or .obj file, whose curved regions stay blank, or a

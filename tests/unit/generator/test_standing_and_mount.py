@@ -52,6 +52,11 @@ def extruded(outline, depth=30.0):
     return polyhedron("polyhedron", points, [*sides, front, back])
 
 
+def corners_of(stl: Path) -> np.ndarray:
+    kind = np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    return np.frombuffer(stl.read_bytes()[84:], kind)["v"].reshape(-1, 3)
+
+
 TEE = [(0, 0), (0, 20), (-20, 20), (-20, 30), (30, 30), (30, 20), (10, 20), (10, 0)]
 
 
@@ -111,10 +116,7 @@ def test_a_part_lies_on_the_face_that_is_down(tmp_path):
     (part,) = registered(tmp_path).parts
     T = part.T_object_part
     assert T[:3, :3] @ [0, 0, -1] == pytest.approx([0, 1, 0])  # F4 looks along +y
-    corners = np.frombuffer(
-        (tmp_path / "out/Part.stl").read_bytes()[84:],
-        np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")]),
-    )["v"].reshape(-1, 3)
+    corners = corners_of(tmp_path / "out/Part.stl")
     assert corners[:, 2].min() == pytest.approx(0.0, abs=1e-5)
     low, high = corners @ T[:3, :3].T + T[:3, 3], np.array([20, 25, 60])
     assert (low.max(axis=0) > high).tolist() == [True, False, True]  # symbols, but none on F4
@@ -242,6 +244,8 @@ def test_a_tag_of_one_line_is_made_and_read(tmp_path):
     result = made(tmp_path, {"tag": "40 x 40 mm"}, formats=("stl",))
     assert (result.symbols, bearing(tmp_path)) == (49, {"F1"})
     assert result.objects[0].lying == "F2 down, no supports needed below"
+    heights = np.unique(corners_of(tmp_path / "out/Part.stl")[:, 2].round(3))
+    assert heights[:2] == pytest.approx([0.0, 0.32])  # its name, engraved in the back
     reader = Reader(open_lab(f"{tmp_path}/lab.db"))
     answers = [
         reader.read(simulate(f"{tmp_path}/lab.db#Part/F1", x=x, y=20.0, force=40).counts)
