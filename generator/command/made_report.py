@@ -148,6 +148,7 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
                 "parts": made.parts,
                 "reused": made.reused,
                 "skipped": made.skipped,
+                "promise": [line.strip() for line in rate_lines(made.face_reports)],
                 "face_reports": [face_values(face) for face in made.face_reports],
                 "fit": None if made.fit is None else asdict(made.fit),
                 "warnings": list(made.warnings),
