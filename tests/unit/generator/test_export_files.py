@@ -125,6 +125,30 @@ def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size]) -> Non
             assert apart >= 5.0 - 1e-6
 
 
+@given(st.lists(st.tuples(st.floats(1.0, 256.0), st.floats(1.0, 256.0)), max_size=12))
+def test_nothing_lies_on_the_blocked_corner_of_the_bed(sizes: list[Size]) -> None:
+    corner, bed = (18.0, 28.0), (256.0, 256.0)
+    plates = arrange_plates(sizes, bed, blocked_mm=corner)
+    assert sorted(p.part for plate in plates for p in plate.places) == list(range(len(sizes)))
+    for plate in plates:
+        found = boxes(plate, sizes)
+        if not plate.fits:
+            (low,) = {(right - left, back - front) for left, front, right, back in found}
+            assert min(low) > 228.0 - 1e-6
+            continue
+        for left, front, right, back in found:
+            assert left >= corner[0] - 1e-6 or front >= corner[1] - 1e-6
+            assert min(left, front) >= -1e-6
+            assert max(right, back) <= 256.0 + 1e-6
+
+
+def test_a_brim_has_room_where_it_takes_no_more_plates() -> None:
+    tight, wide = (arrange_plates([(60.0, 60.0)] * 9, (side, side)) for side in (195.0, 203.0))
+    assert [len(tight), len(wide)] == [1, 1]
+    assert np.array(boxes(wide[0], [(60.0, 60.0)] * 9)).min() == pytest.approx(6.5)
+    assert np.array(boxes(tight[0], [(60.0, 60.0)] * 9)).min() == pytest.approx(2.5)
+
+
 def test_the_exact_size_of_the_bed_fits_also_turned() -> None:
     (plate,) = arrange_plates([(210.0, 250.0)], BED)
     assert plate.fits

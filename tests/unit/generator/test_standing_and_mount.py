@@ -243,7 +243,7 @@ def test_symbols_keep_clear_of_holes_and_files_read_back(tmp_path, shape, mount)
 def test_a_tag_of_one_line_is_made_and_read(tmp_path):
     result = made(tmp_path, {"tag": "40 x 40 mm"}, formats=("stl",))
     assert (result.symbols, bearing(tmp_path)) == (49, {"F1"})
-    assert result.objects[0].lying == "F2 down, no supports needed below"
+    assert result.objects[0].lying == "F2 down, no supports needed"
     heights = np.unique(corners_of(tmp_path / "out/Part.stl")[:, 2].round(3))
     assert heights[:2] == pytest.approx([0.0, 0.32])  # its name, engraved in the back
     reader = Reader(open_lab(f"{tmp_path}/lab.db"))
