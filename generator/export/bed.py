@@ -9,7 +9,7 @@ more plates. Plate frame: mm, x right, y back, origin at the front left corner o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 Size = tuple[float, float]
 
@@ -89,9 +89,12 @@ def _arrange(
     for kind in dict.fromkeys(kinds):
         own = [part for part in order if kinds[part] == kind]
         small = [p for p in own if _place_part(_Skyline(list(floor), []), p, grown[p], room)]
-        oversize += [
-            _oversize_plate(p, sizes[p], bed_mm, blocked_mm) for p in own if p not in small
-        ]
+        for part in own:
+            if part not in small and rim_mm:  # it lies on the rim, too
+                (lone,) = _arrange([sizes[part]], bed_mm, None, blocked_mm, 0.0)
+                oversize.append(replace(lone, places=(replace(lone.places[0], part=part),)))
+            elif part not in small:
+                oversize.append(_oversize_plate(part, sizes[part], bed_mm, blocked_mm))
         for number, plate in enumerate(open_plates):
             together = _add_parts(plate, small, grown, room)
             if together is not None:

@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from generator.errors import WriteError
@@ -126,6 +126,7 @@ def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size]) -> Non
 
 
 @given(st.lists(st.tuples(st.floats(1.0, 256.0), st.floats(1.0, 256.0)), max_size=12))
+@example([(245.0, 201.0)])  # wider than what a rim leaves
 def test_nothing_lies_on_the_blocked_corner_of_the_bed(sizes: list[Size]) -> None:
     corner, bed = (18.0, 28.0), (256.0, 256.0)
     plates = arrange_plates(sizes, bed, blocked_mm=corner)
