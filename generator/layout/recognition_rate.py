@@ -1,13 +1,16 @@
-"""The expected recognition rate of a face: the share of its touches that a reader would answer.
+"""The expected recognition rate of a part: the share of its touches that a reader would answer.
 
-Outline + symbols of a face (mm, cells) + sensor -> what the sensor meets at many poses: symbols
-seen whole, and the loaded share of its rectangle. Views + a table of measured answers -> the share
-of touches that are answered at once, and within three, each where the answer before says.
+Solid + symbols of a face (mm, cells) + sensor -> what the sensor meets at many poses: symbols seen
+whole, the loaded share of its rectangle, other faces in its way. Views + a table of measured
+answers -> the share of touches that are answered at once, and within three, each where the answer
+before says; of a face, and of the whole surface, on which blank faces answer nothing.
 
 A pose is a place of the sensor's centre on the face, and a turn. They are spread evenly, the same
 every time (an additive recurrence). Seen whole is a symbol whose centre lies at least the symbol's
 half size inside the sensor's rectangle. The loaded share is exact: the rectangle cut by the
-outline, holes and all. Thesis 6.3.
+outline, holes and all. On a round face a plate rests along a line: symbols and surface count down
+to `SAG_MM` under it. Where the sensor meets another face (`obstacle`) nothing is answered. Thesis
+6.3.
 
 `answers.json` is the table, measured (docs/folds.md): flat faces, a sensor of 25.4 mm whose centre
 lies on the face and whose plate rests there, 20 to 120 N, symbols of 4.5 to 7 mm. Of that, other
@@ -21,8 +24,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import resources
 from typing import Any
@@ -31,10 +35,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
+from generator.alphabet.outline import SymbolStyle
 from generator.array.contract import touches_needed
 from generator.layout.footprint import Points
+from generator.layout.obstacle import SolidEdges, solid_edges
 from generator.layout.placement import FaceLayout
 from generator.plane.polygon import points_inside, segments, signed_area
+from generator.polyhedron.development import Development, development
+from generator.polyhedron.frame import face_area, face_frame, face_polygon
+from generator.polyhedron.winged import Developable, Polyhedron
 
 LOW = 0.5  #: share of touches under which a face is named: `validate-set` calls it no use
 NOT_READABLE = 0.15  #: under which it is not readable: of seven touches one is answered
@@ -45,6 +54,8 @@ POSES = 1000
 """On each face: shares within .008 of those of 40,000 on faces of 28 to 60 mm (pitch 7 and 4.5
 mm); 6 to 10 ms a face."""
 AROUND_MM = 20.0  #: of the usual sensor: half its width and a step
+MEETS_MM2 = 1.0  #: of another face inside the sensor's rectangle: less than a tactel
+SAG_MM = 0.6  #: under the line along which a plate touches a round face, down to which it is felt
 _STRIPS = 64  # poses looked at together
 _STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # of x, y and turn: 1.22^4 = 1.22 + 1
 
@@ -53,13 +64,51 @@ Loops = Sequence[Points]  #: outline of a face: outer loop (k, 2) counter-clockw
 
 @dataclass(frozen=True, slots=True)
 class RecognitionRate:
-    """Of one flat face."""
+    """Of one face."""
 
     at_once: float  #: share of touches, the sensor's centre on the face, that are answered
     #: within up to three touches, each where the answer before says; None: not measured
     within_three: float | None
     one_row: bool = False  #: touches show one row of symbols
     remedy: str = ""  #: what would make it answer most touches, where it does not
+    blocked: float = 0.0  #: share of its places where the sensor meets another face
+    meets: tuple[str, ...] = ()  #: which, the one most often met first
+
+    @property
+    def obstacle(self) -> str:
+        """Say what the sensor meets and how often; empty where that is nothing."""
+        if not self.meets:
+            return ""
+        more = f" and {len(self.meets) - 1} more" if len(self.meets) > 2 else ""
+        named = f"{self.meets[0]}{more}" if more else " and ".join(self.meets)
+        return f"the sensor meets {named} at {max(self.blocked, 0.01):.0%} of its places".replace(
+            "%", " %"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class PartRate:
+    """Of touches anywhere on the surface of a whole part; blank faces answer none."""
+
+    at_once: float  #: share of touches that are answered
+    within_three: float | None  #: None: not measured
+    encoded: float  #: share of the surface that faces with symbols have
+
+    @property
+    def text(self) -> str:
+        """Say all of it."""
+        later = "" if self.within_three is None else f", {percent(self.within_three)} within three"
+        return (
+            f"of touches anywhere on the part {percent(self.at_once)} are answered at once{later}; "
+            f"{percent(self.encoded)} of its surface is encoded"
+        )
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent, never as all or none where it is not."""
+    if 0 < share < 0.01:
+        return "under 1 %"
+    return "over 99 %" if 0.99 < share < 1 else f"{share:.0%}".replace("%", " %")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +130,8 @@ class FaceViews:
     lines: NDArray[np.int64]  #: (P,) rows or columns in which these stand, the fewer of both
     loaded: Points  #: (P,) share of the sensor's rectangle that lies on the face
     around: NDArray[np.int64]  #: (P,) symbols that stand within `SensorView.around_mm`
+    blocked: NDArray[np.bool_]  #: (P,) whether the sensor meets another face
+    meets: tuple[str, ...] = ()  #: which, the one most often met first
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,28 +183,69 @@ class AnsweredShare:
 
 
 def face_rates(
-    faces: Iterable[tuple[Loops, FaceLayout]],
+    polyhedron: Polyhedron,
+    faces: Iterable[FaceLayout],
     order: int,
     cells: int,
-    pitch_mm: float,
-    symbol_half_mm: float,
+    style: SymbolStyle,
+    reach: float,
     sensor: SensorType = USUAL_SENSOR,
 ) -> dict[int, RecognitionRate]:
-    """Return the rate of each flat face by its number; equal faces share the work.
+    """Return the rate of each face by its number; equal faces that stand free share the work.
 
     Empty for arrays that are read by a scan: no rate was measured there. `order` and `cells` are
-    those of the array, `symbol_half_mm` is from a symbol's centre to the end of its strokes.
+    those of the array, `reach` is the alphabet's; round faces are the polyhedron's `surfaces`.
     """
-    if touches_needed(order, cells, pitch_mm, sensor_mm=sensor.across_mm) > 1:
+    if touches_needed(order, cells, style.pitch_mm, sensor_mm=sensor.across_mm) > 1:
         return {}
+    solid = solid_edges(polyhedron)
+    view = sensor_view(sensor, symbol_half_mm(reach, style))
+    surfaces = {surface.carrier: surface for surface in polyhedron.surfaces}
     known: dict[bytes, RecognitionRate] = {}
     rates = {}
-    for loops, face in faces:
-        key = _face_key(loops, face)
-        if key not in known:
-            known[key] = face_rate(loops, face, pitch_mm, symbol_half_mm, sensor)
-        rates[face.face] = known[key]
+    for face in faces:
+        surface = surfaces.get(face.face)
+        if not len(face.labels):
+            rates[face.face] = RecognitionRate(0.0, 0.0)
+        elif surface is not None:
+            views = round_views(solid, surface, development(polyhedron, surface), face, style, view)
+            rates[face.face] = _rate(views, style.pitch_mm, sensor)
+        else:
+            loops, frame = face_polygon(polyhedron, face.face), face_frame(polyhedron, face.face)
+            free = solid.rise_mm(frame) <= style.height_mm
+            key = _face_key(loops, face) + (b"" if free else str(face.face).encode())
+            if key not in known:
+                views = face_views(loops, face, style.pitch_mm, view)
+                views = beside_obstacles(views, solid, frame, style.height_mm, view)
+                known[key] = _rate(views, style.pitch_mm, sensor)
+            rates[face.face] = known[key]
     return rates
+
+
+def symbol_half_mm(reach: float, style: SymbolStyle) -> float:
+    """Return the distance from a symbol's centre to the end of its strokes."""
+    return reach * style.pitch_mm + style.stroke_mm / 2
+
+
+def part_rate(
+    polyhedron: Polyhedron, faces: Sequence[FaceLayout], rates: Mapping[str, RecognitionRate | None]
+) -> PartRate | None:
+    """Return the rate of a whole part from those of its faces by name; None: none was measured."""
+    if not any(rates.values()):
+        return None
+    facets = {surface.carrier: surface.facets for surface in polyhedron.surfaces}
+    area = [face_area(polyhedron, face) for face in range(len(polyhedron.faces))]
+    once, within, encoded = 0.0, 0.0, 0.0
+    for face in faces:
+        if len(face.labels):
+            own = sum(area[facet] for facet in facets.get(face.face, (face.face,)))
+            encoded += own
+            rate = rates[polyhedron.faces[face.face].name] or RecognitionRate(0.0, 0.0)
+            once += own * rate.at_once
+            within += own * (math.nan if rate.within_three is None else rate.within_three)
+    whole = sum(area)
+    later = None if math.isnan(within) else round(within / whole, 3)
+    return PartRate(round(once / whole, 3), later, round(encoded / whole, 3))
 
 
 def face_rate(
@@ -164,15 +256,22 @@ def face_rate(
     sensor: SensorType,
     poses: int = POSES,
 ) -> RecognitionRate:
-    """Return the rate of one face, to three places; parameters as for `face_rates`."""
+    """Return the rate of one flat face that stands free, to three places."""
     if not len(face.labels):
         return RecognitionRate(0.0, 0.0)
     views = face_views(loops, face, pitch_mm, sensor_view(sensor, symbol_half_mm), poses)
+    return _rate(views, pitch_mm, sensor)
+
+
+def _rate(views: FaceViews, pitch_mm: float, sensor: SensorType) -> RecognitionRate:
     once, within = answered_shares(views, measured_answers(), pitch_mm, sensor)
+    free = ~views.blocked
     return RecognitionRate(
         round(once, 3),
         None if within is None else round(within, 3),
-        one_row=bool((views.lines <= 1).mean() >= ONE_ROW),
+        one_row=bool(free.any() and (views.lines[free] <= 1).mean() >= ONE_ROW),
+        blocked=round(float(views.blocked.mean()), 3),
+        meets=views.meets,
     )
 
 
@@ -212,15 +311,88 @@ def views_at(
 ) -> FaceViews:
     """Return what a sensor meets at poses (P, 2) mm and (P,) rad of one face, face frame."""
     start, end, *_ = segments(loops)
-    c, s = np.cos(turn_rad)[:, None], np.sin(turn_rad)[:, None]
-    ax, ay = _in_sensor(start, centre_mm, c, s)
-    bx, by = _in_sensor(end, centre_mm, c, s)
-    area = _area_within(ax, ay, bx, by, *view.half_mm)
-    loaded = area / (4 * view.half_mm[0] * view.half_mm[1])
+    loaded = _covered(start, end, centre_mm, turn_rad, view)
     whole = _seen_whole(face, pitch_mm, view, centre_mm, turn_rad)
     rows, columns = whole.any(axis=2).sum(axis=1), whole.any(axis=1).sum(axis=1)
     lines, around = np.minimum(rows, columns), _around(face, centre_mm, view.around_mm)
-    return FaceViews(centre_mm, turn_rad, whole.sum(axis=(1, 2)), lines, loaded, around)
+    seen, blocked = whole.sum(axis=(1, 2)), np.zeros(len(turn_rad), np.bool_)
+    return FaceViews(centre_mm, turn_rad, seen, lines, loaded, around, blocked)
+
+
+def round_views(
+    solid: SolidEdges,
+    surface: Developable,
+    flat: Development,
+    face: FaceLayout,
+    style: SymbolStyle,
+    view: SensorView,
+    poses: int = POSES,
+) -> FaceViews:
+    """Return what a sensor meets on a round face; places are those of the plane it unrolls to.
+
+    A plate stands in the plane of the facet that holds its centre.
+    """
+    centre, turn = _poses_on((flat.outline,), poses)
+    at, on = flat.facets_of(centre), flat.facets_of(face.centres_mm)
+    there = np.c_[face.centres_mm, np.zeros(len(on)), np.ones(len(on))]
+    symbols = np.einsum("nij,nj->ni", flat.T_object_flat[on], there)[:, :3]
+    cells = [
+        np.rint(one).astype(np.int64) for one in _cells_at(face, style.pitch_mm, face.centres_mm)
+    ]
+    stands_in = [(one == np.unique(one)[:, None]).T.astype(np.int64) for one in cells]
+    seen, lines, around = np.zeros((3, poses), np.int64)
+    loaded, blocked, meets = np.zeros(poses), np.zeros(poses, np.bool_), Counter[str]()
+    free = np.array(view.half_mm) - view.symbol_half_mm
+    for facet in np.unique(at):
+        frame, some = flat.T_object_flat[facet], np.flatnonzero(at == facet)
+        local = (symbols - frame[:3, 3]) @ frame[:3, :3]
+        c, s = np.cos(turn[some])[:, None], np.sin(turn[some])[:, None]
+        x, y = _in_sensor(local[:, :2], centre[some], c, s)
+        whole = (np.abs(x) <= free[0]) & (np.abs(y) <= free[1]) & (local[:, 2] >= -SAG_MM)
+        seen[some] = whole.sum(axis=1)
+        lines[some] = np.minimum(*(((whole @ one) > 0).sum(axis=1) for one in stands_in))
+        away = np.sqrt(x * x + y * y + local[:, 2] ** 2)
+        around[some] = (away <= view.around_mm).sum(axis=1)
+        start, end, _ = solid.above(frame, -SAG_MM, surface.facets)
+        loaded[some] = _covered(start, end, centre[some], turn[some], view)
+        if solid.rise_mm(frame) > style.height_mm:
+            blocked[some], found = _obstacles(
+                solid, frame, style.height_mm, centre[some], turn[some], view
+            )
+            meets += found
+    names = tuple(name for name, _ in meets.most_common())
+    return FaceViews(centre, turn, seen, lines, loaded, around, blocked, names)
+
+
+def beside_obstacles(
+    views: FaceViews, solid: SolidEdges, T_object_face: Points, height_mm: float, view: SensorView
+) -> FaceViews:
+    """Return views of a flat face with what the sensor meets that rises higher than this."""
+    if solid.rise_mm(T_object_face) <= height_mm:
+        return views
+    centre, turn = views.centre_mm, views.turn_rad
+    blocked, names = _obstacles(solid, T_object_face, height_mm, centre, turn, view)
+    return replace(views, blocked=blocked, meets=tuple(name for name, _ in names.most_common()))
+
+
+def _obstacles(
+    solid: SolidEdges, frame: Points, height_mm: float, centre: Points, turn: Points,
+    view: SensorView,
+) -> tuple[NDArray[np.bool_], Counter[str]]:  # fmt: skip
+    """Return whether the sensor meets another face at each pose, and how often which."""
+    area = 4 * view.half_mm[0] * view.half_mm[1]
+    start, end, _ = solid.above(frame, height_mm)
+    blocked = area * _covered(start, end, centre, turn, view) > MEETS_MM2
+    return blocked, solid.nearest(frame, height_mm, centre[blocked])
+
+
+def _covered(start: Points, end: Points, centre: Points, turn: Points, view: SensorView) -> Points:
+    """Return the share of the sensor's rectangle inside outlines of edges (n, 2), (P,)."""
+    c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
+    area = _area_within(
+        *_in_sensor(start, centre, c, s), *_in_sensor(end, centre, c, s), *view.half_mm
+    )
+    return area / (4 * view.half_mm[0] * view.half_mm[1])
 
 
 def answered_shares(
@@ -230,10 +402,10 @@ def answered_shares(
 
     The second is known of the usual sensor alone: None of others.
     """
-    once = answered_at_once(table, pitch_mm, views.seen, views.loaded, sensor)
+    once = answered_at_once(table, pitch_mm, views.seen, views.loaded, sensor) * ~views.blocked
     if sensor.name != USUAL_SENSOR.name:
         return float(once.mean()), None
-    within = once + (1 - once) * table.later(views.seen, views.around)
+    within = once + (1 - once) * table.later(views.seen, views.around) * ~views.blocked
     return float(once.mean()), float(within.mean())
 
 

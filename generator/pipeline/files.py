@@ -22,7 +22,7 @@ from generator.export.formats import EXPORTERS, ExportedObject, stage_formats
 from generator.export.preview import preview_png
 from generator.export.threemf import SlicerSettings, slicer_settings
 from generator.layout.placement import Layout, object_code
-from generator.pipeline.faces import FaceReport, face_reports
+from generator.pipeline.faces import FaceReport, face_reports, whole_rate
 from generator.pipeline.place import BuiltParts
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
@@ -127,13 +127,17 @@ def stage(
     progress("drawing", 0.85)
     size = outer_size_mm(plan.polyhedron, parts).tolist()
     faces = face_reports(plan, layout)
-    shares = {
+    promise = whole_rate(plan, layout, faces)
+    shares: dict[str, tuple[float, float | None]] = {}
+    if promise is not None:  # faces of which nothing is said are blank
+        shares = dict.fromkeys([face.name for face in plan.polyhedron.faces], (0.0, None))
+    shares |= {
         face.name: (face.promise.at_once, face.promise.within_three)
         for face in faces
         if face.promise is not None
     }
     staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes, shares))
-    page = build_sheet(plan, layout, parts, on_sheet)
+    page = build_sheet(plan, layout, parts, on_sheet, promise)
     staging.write(f"{spec.name}-build.html", page.encode())
     staging.write(f"{spec.name}-array.svg", _array_picture(plan, layout).encode())
     return StagedObject(registered, len(parts), warnings, faces, fit)

@@ -13,6 +13,7 @@ from generator.export.bed import Plate
 from generator.export.drawing import draw_back, draw_front, draw_plate, draw_step, is_panel
 from generator.export.sheet import Figure, Section, sheet_html
 from generator.layout.placement import FaceLayout, Layout, object_code
+from generator.layout.recognition_rate import PartRate
 from generator.pipeline.made import overhang_text
 from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon
@@ -53,12 +54,19 @@ class SheetPlate:
 
 
 def build_sheet(
-    plan: ObjectPlan, layout: Layout, parts: Sequence[Part], plates: Sequence[SheetPlate]
+    plan: ObjectPlan,
+    layout: Layout,
+    parts: Sequence[Part],
+    plates: Sequence[SheetPlate],
+    promise: PartRate | None,
 ) -> str:
-    """Return the page of one object."""
+    """Return the page of one object, with what it promises."""
     panelled = is_panel(parts[0])
     code = object_code(layout, plan.array.rows, plan.array.columns)
-    sections = [Section(rows=_facts(plan, layout, code, parts, plates))]
+    rows = _facts(plan, layout, code, parts, plates)
+    if promise is not None:
+        rows = (*rows, ("promise", promise.text))
+    sections = [Section(rows=rows)]
     if plates:
         figures = [
             Figure(
