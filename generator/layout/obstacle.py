@@ -10,7 +10,6 @@ Only faces that look up cast it, since the solid is closed. mm.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +19,10 @@ from generator.layout.footprint import Points
 from generator.plane.polygon import face_vector
 from generator.polyhedron.winged import Polyhedron
 
+Box = tuple[Points, Points]  #: lowest and highest x and y, mm
+
 UPRIGHT = 1e-9  #: cosine to the normal up to which a face has no shadow
+NAMED = 200  #: places for which it is said which face is met
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,20 +46,17 @@ class SolidEdges:
         return float(((self.starts - T_object_plane[:3, 3]) @ T_object_plane[:3, 2]).max())
 
     def above(
-        self, T_object_plane: Points, height_mm: float, some: Collection[int] = ()
+        self, T_object_plane: Points, height_mm: float, box: Box
     ) -> tuple[Points, Points, NDArray[np.int64]]:
         """Return starts, ends (k, 2) and faces (k,) of what rises higher over a plane, from above.
 
-        `some`: of these faces alone. Faces that are cut in two keep a closed outline: what is lower
-        is moved onto the line where the face has that height.
+        `box`: lowest and highest x and y of what is looked at. Faces that are cut in two keep a
+        closed outline: what is lower is moved onto the line where the face has that height.
         """
         R = T_object_plane[:3, :3]
         normals, owner = self.normals @ R, self.owner
         a, b = ((points - T_object_plane[:3, 3]) @ R for points in (self.starts, self.ends))
-        kept = np.maximum.reduceat(a[:, 2], self.first) > height_mm
-        kept &= normals[:, 2] > UPRIGHT
-        if some:
-            kept &= np.isin(np.arange(len(kept)), list(some))
+        kept = self._rising(a, height_mm, box) & (normals[:, 2] > UPRIGHT)
         of = owner[kept[owner]]
         a, b = a[kept[owner]], b[kept[owner]]
         slope = -normals[of, :2] / normals[of, 2:]
@@ -71,7 +70,17 @@ class SolidEdges:
         middle = np.where(crosses, a[:, :2] + share * (b - a)[:, :2], start)
         return np.concatenate([start, middle]), np.concatenate([middle, end]), np.r_[of, of]
 
-    def nearest(self, T_object_plane: Points, height_mm: float, places_mm: Points) -> Counter[str]:
+    def _rising(self, points: Points, height_mm: float, box: Box) -> NDArray[np.bool_]:
+        """Return which faces reach higher and into the box, (faces,)."""
+        high = np.maximum.reduceat(points, self.first)
+        low = np.minimum.reduceat(points[:, :2], self.first)
+        inside = (low < box[1]).all(axis=1) & (high[:, :2] > box[0]).all(axis=1)
+        found: NDArray[np.bool_] = inside & (high[:, 2] > height_mm)
+        return found
+
+    def nearest(
+        self, T_object_plane: Points, height_mm: float, box: Box, places_mm: Points
+    ) -> Counter[str]:
         """Return how many places (n, 2) of a plane have each face nearest that rises higher.
 
         Of two that are as near, a wall and its top, the one that reaches down farther.
@@ -79,21 +88,21 @@ class SolidEdges:
         R = T_object_plane[:3, :3]
         a, b = ((points - T_object_plane[:3, 3]) @ R for points in (self.starts, self.ends))
         lowest, owner = np.minimum.reduceat(a[:, 2], self.first), self.owner
-        upright = (self.normals @ R)[owner, 2] <= UPRIGHT
-        walls = np.flatnonzero(upright & (np.maximum(a, b)[:, 2] > height_mm))
+        upright = self._rising(a, height_mm, box) & ((self.normals @ R)[:, 2] <= UPRIGHT)
+        walls = np.flatnonzero(upright[owner] & (np.maximum(a, b)[:, 2] > height_mm))
         a, b = a[walls], b[walls]
         rise = np.where(a[:, 2] == b[:, 2], 1.0, b[:, 2] - a[:, 2])
         level = ((height_mm - a[:, 2]) / rise)[:, None]
         first = np.where(a[:, 2:] < height_mm, level, 0.0)
         last = np.where(b[:, 2:] < height_mm, level, 1.0)
-        starts, ends, of = self.above(T_object_plane, height_mm)
+        starts, ends, of = self.above(T_object_plane, height_mm, box)
         starts = np.concatenate([starts, (a + first * (b - a))[:, :2]])
         ends, of = np.concatenate([ends, (a + last * (b - a))[:, :2]]), np.r_[of, owner[walls]]
         order = np.argsort(lowest[of], kind="stable")
         start, along, of = starts[order], (ends - starts)[order], of[order]
         square = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
         found: Counter[str] = Counter()
-        for place in places_mm:
+        for place in places_mm[:NAMED]:
             away = place - start
             share = np.clip((away * along).sum(axis=1) / square, 0.0, 1.0)
             gap = np.hypot(*(away - share[:, None] * along).T)

@@ -93,6 +93,7 @@ def solids(folder: Path) -> dict[str, Solid]:
     channel = [(0, 0), (80, 0), (80, 40), (60, 40), (60, 15), (20, 15), (20, 40), (0, 40)]
     ramp = [(0, 0), (110, 0), (110, 50), (60, 20), (0, 20)]
     rounds: dict[str, Solid] = {
+        "can 26": {"cylinder": {"diameter": "26 mm", "height": "60 mm"}},
         "can 40": {"cylinder": {"diameter": "40 mm", "height": "60 mm"}},
         "can 60": {"cylinder": {"diameter": "60 mm", "height": "80 mm"}},
         "can 100": {"cylinder": {"diameter": "100 mm", "height": "50 mm"}},
