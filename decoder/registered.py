@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decoder.errors import DecoderError
-from generator.array import FoldedArray, ProductArray, array_from
+from generator.array import FoldedArray, ProductArray
 from generator.array.contract import Labels
 from generator.array.lab_key import read_lab_key
 from generator.database.cells import faces_at, occupied_cells
 from generator.database.lab import lab_key as stored_lab_key
 from generator.database.open import open_database
-from generator.database.read import list_objects, read_array, read_object
+from generator.database.read import list_objects, make_array, read_array, read_object
 from generator.database.registered import RegisteredArray
 from generator.database.transaction import read_transaction
 
@@ -52,7 +52,7 @@ def read_registered(url: str, profile: str = "", lab_key: str = "") -> Registere
         if len(named) != 1:
             raise _no_array(url, arrays, profile, lab_key, len(named))
         number = named[0].array_id
-        array = array_from(named[0].definition)
+        array = make_array(connection, number)
         return Registered(url, number, array, np.stack(occupied_cells(connection, number), axis=1))
 
 

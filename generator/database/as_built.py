@@ -15,6 +15,7 @@ from sqlalchemy import Connection, delete, insert, select
 
 from generator.database.read import read_only
 from generator.database.tables import as_built
+from generator.database.transaction import of_rows
 from generator.errors import DatabaseError
 
 PARAMETERS = ("scale_x", "scale_y", "skew_rad", "stroke_mm")  #: order in the covariance
@@ -63,6 +64,7 @@ def write_as_built(connection: Connection, measured: AsBuilt) -> None:
     connection.execute(insert(as_built).values(row))
 
 
+@of_rows
 def read_as_built(connection: Connection, object_id: int | None = None) -> tuple[AsBuilt, ...]:
     """Return what is kept of an object, or, with None, of printers and materials.
 

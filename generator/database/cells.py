@@ -19,6 +19,7 @@ from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.registered import canonical, digest
 from generator.database.rows import insert_rows
+from generator.database.transaction import of_rows
 from generator.layout.occupancy import Cells, Occupancy, Tiles, cells_of_tiles, tiles_of
 
 _CHUNK = 64  #: cells looked up in one statement
@@ -33,6 +34,7 @@ def array_key(array: SymbolArray) -> str:
     return digest(canonical(kept))
 
 
+@of_rows
 def find_array(connection: Connection, array: SymbolArray) -> int | None:
     """Return the number of an array that objects were registered on, None for a new one."""
     arrays = tables.arrays.c
@@ -47,11 +49,13 @@ def occupancy(connection: Connection, array: SymbolArray) -> Occupancy:
     return Occupancy.from_tiles(taken_tiles(connection, array_id), array)
 
 
+@of_rows
 def occupied_cells(connection: Connection, array_id: int | None) -> Cells:
     """Return the taken cells of an array, sorted: rows (n,) and columns (n,); none for None."""
     return cells_of_tiles(taken_tiles(connection, array_id))
 
 
+@of_rows
 def cells_of(connection: Connection, object_id: int, array_id: int) -> Cells:
     """Return the cells of an array that an object holds: rows (n,) and columns (n,)."""
     cells = tables.cells.c
@@ -64,6 +68,7 @@ def cells_of(connection: Connection, object_id: int, array_id: int) -> Cells:
     return flat[0::2].copy(), flat[1::2].copy()
 
 
+@of_rows
 def held_cells(connection: Connection, array_id: int) -> NDArray[np.int64]:
     """Return every registered cell of an array, sorted (n, 5): row, column, object, face, label."""
     cells = tables.cells.c
@@ -106,6 +111,7 @@ def faces_at(
 _TILE_CHUNK = 256  # tile rows looked up in one statement
 
 
+@of_rows
 def taken_tiles(connection: Connection, array_id: int | None) -> Tiles:
     """Return the tiles of an array in which cells are taken, or were; none for None."""
     if array_id is None:
@@ -121,6 +127,7 @@ def taken_tiles(connection: Connection, array_id: int | None) -> Tiles:
     }
 
 
+@of_rows
 def mark_cells(connection: Connection, array_id: int, cells: Cells, *, taken: bool) -> None:
     """Note that cells (n,) of an array are taken from now on, or free again."""
     changed = tiles_of(*cells)

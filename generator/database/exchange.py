@@ -58,9 +58,9 @@ def export_objects(
     partial = file.with_name(f".{file.name}.{os.getpid()}")
     try:
         made = open_database(str(partial))
-        homes = (engine.url, normal_url(str(file)))
+        made.update_execution_options(home=normal_url(str(file)))
         with read_transaction(engine) as source, write_transaction(made) as target:
-            carried = copy_objects(source, target, names=names, homes=homes)
+            carried = copy_objects(source, target, names=names)
         if force:
             partial.replace(file)
         else:
@@ -117,7 +117,7 @@ def import_objects(
         def work(target: Connection) -> CopyReport:
             carried = copy_objects(
                 source, target, names=names, renamed=renamed, origin=origin,
-                skip_refused=skip_refused, homes=(home, engine_home),
+                skip_refused=skip_refused,
             )  # fmt: skip
             if dry_run:
                 target.rollback()
@@ -125,7 +125,9 @@ def import_objects(
 
         if not database_exists(url):  # what is refused leaves no database behind
             with tempfile.TemporaryDirectory() as folder:
-                carried = retry_on_conflict(open_database(str(Path(folder) / "lab.db")), work)
+                trial = open_database(str(Path(folder) / "lab.db"))
+                trial.update_execution_options(home=engine_home)
+                carried = retry_on_conflict(trial, work)
             if dry_run:
                 return carried
         return retry_on_conflict(open_database(url), work)
@@ -157,7 +159,9 @@ def _open_unchanged(home: URL) -> Iterator[Engine]:
                 f"the file is damaged: {said if said != 'ok' else f'rows of {lost[0]} are lost'}"
             )
             raise DatabaseError(cause, fix="export it once more", place=str(path))
-        yield open_database(str(copy), writable=False, keep_older=False)
+        engine = open_database(str(copy), writable=False, keep_older=False)
+        engine.update_execution_options(home=home)
+        yield engine
 
 
 def _same_database(one: URL, other: URL) -> bool:

@@ -18,18 +18,19 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, func, select
 
-from generator.array import PROFILES, FoldedArray, ProductArray, Profile, array_from
+from generator.array import PROFILES, FoldedArray, ProductArray, Profile
 from generator.array.contract import symbols_seen, touches_needed
 from generator.array.lab_key import read_lab_key
-from generator.database.read import read_array
+from generator.database.read import make_array, read_array
 from generator.database.registered import RegisteredArray
 from generator.database.tables import arrays, cells, meta, objects
-from generator.database.transaction import place_of
+from generator.database.transaction import of_rows, place_of
 from generator.errors import LabKeyError
 
 META = "lab_key"  #: in `meta`
 
 
+@of_rows
 def lab_key(connection: Connection) -> str:
     """Return the key of a database; empty where its arrays are the published ones."""
     found = connection.execute(select(meta.c.value).where(meta.c.key == META))
@@ -54,6 +55,7 @@ class LabArrays:
 
     key: str  #: empty where all arrays are the published ones
     made: Mapping[str, RegisteredArray]  #: that objects were made on, by profile
+    symbols: Mapping[int, FoldedArray | ProductArray]  #: of these, by their numbers
 
     def of_profile(self, profile: Profile) -> FoldedArray | ProductArray:
         """Return the lab's array of a profile; profiles that differ in pitch share one."""
@@ -61,7 +63,7 @@ class LabArrays:
             alike = {name for name, one in PROFILES.items() if one.encoding == profile.encoding}
             kept = [self.made[name] for name in alike | {profile.name} if name in self.made]
             if kept:
-                return array_from(min(kept, key=lambda one: one.array_id).definition)
+                return self.symbols[min(one.array_id for one in kept)]
         return profile.array_of_lab(self.key)
 
     def key_of(self, profile: Profile) -> str:
@@ -69,13 +71,15 @@ class LabArrays:
         return self.key if profile.keyed else ""
 
 
+@of_rows
 def lab_arrays(connection: Connection) -> LabArrays:
     """Return the key of a database and the arrays that its own objects were made on."""
     key = lab_key(connection)
     query = select(arrays.c.array_id, arrays.c.profile).order_by(arrays.c.array_id.desc())
     mine = query.where(arrays.c.lab_key.is_not_distinct_from(key or None))
-    made = {name: read_array(connection, number) for number, name in connection.execute(mine)}
-    return LabArrays(key, made)
+    rows = connection.execute(mine).all()
+    made = {name: read_array(connection, number) for number, name in rows}
+    return LabArrays(key, made, {number: make_array(connection, number) for number, _ in rows})
 
 
 MOST_FILLED = 0.8  #: share of an array that faces of all shapes fill without a search
@@ -128,6 +132,7 @@ class Fullness:
     pitches: tuple[PitchUse, ...]
 
 
+@of_rows
 def read_fullness(connection: Connection) -> Fullness:
     """Return how full the arrays of a database are; arrays without objects are left out."""
     key = lab_key(connection)

@@ -19,7 +19,7 @@ from urllib.parse import quote
 from sqlalchemy import Connection, Engine, update
 
 from generator.database.tables import SCHEMA_VERSION, meta
-from generator.database.transaction import place_of, write_transaction
+from generator.database.transaction import of_rows, place_of, write_transaction
 from generator.errors import DatabaseError
 
 _log = logging.getLogger(__name__)  # without settings of its own, warnings go to stderr
@@ -58,6 +58,7 @@ def migrate(engine: Engine, version_of: Callable[[Connection], int | None], *, k
         )
 
 
+@of_rows
 def upgrade(connection: Connection, version: int) -> None:
     """Carry out all migrations after `version`, in the transaction of the connection."""
     for number in range(version + 1, SCHEMA_VERSION + 1):

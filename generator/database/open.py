@@ -36,6 +36,7 @@ from generator.database.transaction import (
     WAIT_S,
     begin_sqlite,
     note_engine,
+    of_rows,
     place_of,
     read_transaction,
     write_transaction,
@@ -289,6 +290,7 @@ def _update_schema(engine: Engine, wait_s: float, keep_older: bool) -> bool:
     return version is not None
 
 
+@of_rows
 def _schema_version(connection: Connection) -> int | None:
     """Return the schema's version, None in an empty database; refuse any other content."""
     url = connection.engine.url

@@ -18,6 +18,7 @@ from sqlalchemy import Connection, Select, Table, func, literal, select
 
 from generator.alphabet.known import alphabet_from
 from generator.alphabet.outline import SymbolStyle
+from generator.array import FoldedArray, ProductArray, array_from
 from generator.database import tables
 from generator.database.registered import (
     ObjectEntry,
@@ -28,19 +29,21 @@ from generator.database.registered import (
     RegisteredStyle,
 )
 from generator.database.round_face import round_face
-from generator.database.transaction import place_of
+from generator.database.transaction import of_rows, place_of
 from generator.errors import DatabaseError
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.frame import face_frame, face_polygon
 from generator.polyhedron.winged import Developable, Face, Polyhedron, WingedEdge, developable_from
 
 
+@of_rows
 def list_objects(connection: Connection) -> tuple[ObjectEntry, ...]:
     """Return one entry per object, in the order of their names."""
     entries = _entries(connection, _select_entries())
     return tuple(sorted(entries, key=lambda entry: natural_key(entry.name)))
 
 
+@of_rows
 def object_names(connection: Connection) -> tuple[str, ...]:
     """Return the names of all objects, in order; without the counts of `list_objects`."""
     names = tables.objects.c.name
@@ -57,6 +60,7 @@ def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
     return tuple((0, int(run), run) if run[0] in "0123456789" else (1, 0, run) for run in runs)
 
 
+@of_rows
 def find_object(connection: Connection, name: str) -> ObjectEntry | None:
     """Return the entry of the object called `name`, None if there is none."""
     found = _entries(connection, _select_entries().where(tables.objects.c.name == name))
@@ -122,6 +126,7 @@ def _entries(connection: Connection, query: Select[Any]) -> Iterable[ObjectEntry
     return (ObjectEntry(*row) for row in connection.execute(query))
 
 
+@of_rows
 def read_object(connection: Connection, name: str) -> RegisteredObject:
     """Return everything about the object called `name`; all numbers bit for bit.
 
@@ -161,6 +166,7 @@ def surfaces_of(spec: Any) -> tuple[Developable, ...]:
     return tuple(developable_from(one) for one in known)
 
 
+@of_rows
 def read_surfaces(connection: Connection) -> dict[int, tuple[Developable, ...]]:
     """Return the round faces of all objects that have some, by their numbers."""
     known = tables.provenance.c
@@ -169,6 +175,7 @@ def read_surfaces(connection: Connection) -> dict[int, tuple[Developable, ...]]:
     return {number: surfaces for number, surfaces in found.items() if surfaces}
 
 
+@of_rows
 def read_layout(connection: Connection, name: str) -> Layout:
     """Return the layout of the object called `name`, bit for bit what was registered."""
     return _layout_of(connection, object_entry(connection, name))
@@ -215,6 +222,7 @@ def _layout_of(connection: Connection, entry: ObjectEntry) -> Layout:
     )
 
 
+@of_rows
 def read_styles(connection: Connection) -> tuple[RegisteredStyle, ...]:
     """Return array and style of every object, by its number."""
     objects = tables.objects.c
@@ -236,6 +244,7 @@ def read_styles(connection: Connection) -> tuple[RegisteredStyle, ...]:
     )
 
 
+@of_rows
 def read_array(connection: Connection, array_id: int) -> RegisteredArray:
     """Return the array with this number."""
     row = connection.execute(
@@ -253,6 +262,13 @@ def read_array(connection: Connection, array_id: int) -> RegisteredArray:
     )
 
 
+@of_rows
+def make_array(connection: Connection, array_id: int) -> FoldedArray | ProductArray:
+    """Return the symbols of the array with this number, made from its definition."""
+    return array_from(read_array(connection, array_id).definition)
+
+
+@of_rows
 def read_parts(connection: Connection, object_id: int) -> tuple[RegisteredPart, ...]:
     """Return the parts of an object in the order in which they were written."""
     parts = tables.parts.c

@@ -14,8 +14,8 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from traceback import walk_tb
-from typing import TypeVar
+from functools import wraps
+from typing import Concatenate, NoReturn, ParamSpec, TypeVar
 
 import numpy as np
 from sqlalchemy import URL, Connection, Engine, ExceptionContext, text
@@ -23,8 +23,6 @@ from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
 from encoded_objects.base.foreign import DAMAGE
 from generator.errors import DatabaseError, GeneratorError
-
-_FAILURES = (*DAMAGE, SQLAlchemyError, GeneratorError)
 
 WAIT_S = 60.0  #: how long a writer waits for its turn, and a reader for a commit to end
 
@@ -65,21 +63,12 @@ def read_transaction(engine: Engine) -> Iterator[Connection]:
 
 
 @contextmanager
-def explain_failures(
-    engine: Engine, home: URL | None = None, *, alone: bool = True
-) -> Iterator[None]:
-    """Explain what fails in a database, by its place `home`, if that is not the engine's.
-
-    Not `alone`: another database takes part, whose own errors pass. Raises DatabaseError: the
-    driver reports an error, or rows hold what was never written.
-    """
+def explain_failures(engine: Engine) -> Iterator[None]:
+    """Raise what an engine's driver reports as a DatabaseError; what others report passes."""
     try:
         yield
-    except _FAILURES as error:
-        theirs = isinstance(error, DBAPIError) and getattr(error, "engine", engine) is not engine
-        if (theirs and not alone) or not _is_of_rows(error):
-            raise
-        raise explain_error(error, home or engine.url) from error
+    except SQLAlchemyError as error:
+        _explain(error, engine)
 
 
 def note_engine(context: ExceptionContext) -> None:
@@ -88,15 +77,37 @@ def note_engine(context: ExceptionContext) -> None:
         context.sqlalchemy_exception.engine = context.engine  # type: ignore[attr-defined]
 
 
-@contextmanager
-def rows_explained(url: URL) -> Iterator[None]:
-    """Turn what comes of rows that were never written into a DatabaseError about this database."""
-    try:
-        yield
-    except (*DAMAGE, GeneratorError) as error:
-        if isinstance(error, DatabaseError):
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
+
+
+def of_rows(
+    read: Callable[Concatenate[Connection, Given], Result],
+) -> Callable[Concatenate[Connection, Given], Result]:
+    """Decorate what makes values of rows; rows that were never written raise a DatabaseError."""
+
+    @wraps(read)
+    def reader(connection: Connection, /, *given: Given.args, **named: Given.kwargs) -> Result:
+        try:
+            return read(connection, *given, **named)
+        except DatabaseError:
             raise
-        raise explain_error(error, url) from error
+        except (*DAMAGE, SQLAlchemyError, GeneratorError) as error:
+            _explain(error, connection.engine)
+
+    return reader
+
+
+def _explain(error: Exception, engine: Engine) -> NoReturn:
+    if getattr(error, "engine", engine) is not engine:  # of another database that takes part
+        raise error
+    raise explain_error(error, home_of(engine)) from error
+
+
+def home_of(engine: Engine) -> URL:
+    """Return where people have a database; a copy in its place has the execution option `home`."""
+    home: URL = engine.get_execution_options().get("home", engine.url)
+    return home
 
 
 def take_turn(connection: Connection) -> None:
@@ -118,19 +129,6 @@ def place_of(url: URL) -> str:
     if url.get_backend_name() == "sqlite":
         return url.database or "sqlite"
     return url.set(drivername=url.get_backend_name()).render_as_string(hide_password=True)
-
-
-def _is_of_rows(error: BaseException) -> bool:
-    """Tell whether an error came up where rows are read, not in the work of a transaction."""
-    if isinstance(error, SQLAlchemyError | DatabaseError):
-        return isinstance(error, SQLAlchemyError)
-    names = [frame.f_globals.get("__name__", "") for frame, _ in walk_tb(error.__traceback__)]
-    if isinstance(error, GeneratorError):  # a value that nothing can be made from
-        return "generator.database.read" in names
-    below = ("sqlalchemy.", "generator.database.")
-    ours = [name for name in names if name.startswith(below) and name != __name__]
-    # registering refuses what it is given
-    return bool(ours) and ours[-1] != "generator.database.register"
 
 
 def explain_error(error: Exception, url: URL) -> DatabaseError:
@@ -206,8 +204,6 @@ _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
     ),
 )
 
-
-Result = TypeVar("Result")
 
 TRIES = 8
 FIRST_PAUSE_S = 0.02  #: doubled after every conflict, shortened by chance to half at most

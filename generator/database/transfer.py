@@ -20,7 +20,6 @@ from sqlalchemy import URL, Connection, Table, insert, select
 
 from encoded_objects.base.files import name_fault
 from encoded_objects.base.foreign import DAMAGE
-from generator.array import array_from
 from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.cells import array_key, faces_at, find_array, mark_cells, occupied_cells
@@ -28,13 +27,13 @@ from generator.database.open import part_file, part_path
 from generator.database.read import (
     find_object,
     list_objects,
+    make_array,
     object_entry,
-    read_array,
     read_object,
 )
 from generator.database.registered import ObjectEntry, digest
 from generator.database.rows import definition_number, definition_of, insert_rows
-from generator.database.transaction import explain_failures, place_of
+from generator.database.transaction import home_of, of_rows, place_of
 from generator.errors import DatabaseError, GeneratorError
 
 Rows = list[dict[str, Any]]
@@ -78,7 +77,7 @@ def array_here(source: Connection, target: Connection, array_id: int) -> ArrayHe
     """Return an array of `source` as it is in `target`; refuse one that was changed."""
     stored = source.execute(select(tables.arrays).where(tables.arrays.c.array_id == array_id)).one()
     try:
-        array = array_from(read_array(source, array_id).definition)
+        array = make_array(source, array_id)
     except (GeneratorError, ValueError, KeyError, TypeError) as error:
         cause = f"stands on an array that cannot be made: {error}"
         raise CopyRefusedError(cause, _DAMAGED) from error
@@ -256,7 +255,6 @@ def copy_objects(
     renamed: Mapping[str, str] | None = None,
     origin: Mapping[str, str] | None = None,
     skip_refused: bool = False,
-    homes: tuple[URL, URL] | None = None,
 ) -> CopyReport:
     """Copy objects with cells, provenance, names of files, and how their prints came out.
 
@@ -272,9 +270,6 @@ def copy_objects(
         `imported_from` and `imported_utc` of each object; without it, their own are kept.
     skip_refused
         Copy the others where some are refused.
-    homes
-        Where people have the two databases, if not where the connections are: from there
-        the files of parts are named.
 
     Raises
     ------
@@ -282,29 +277,28 @@ def copy_objects(
         An object is refused (unless `skip_refused`), or no object has a name asked for.
     """
     new_names = dict(renamed or {})
-    homes = homes or (source.engine.url, target.engine.url)
     arrays: dict[int, ArrayHere] = {}
     copied, known, refused = [], [], []
-    with explain_failures(source.engine, homes[0], alone=False):
-        for name in (*names, *new_names):
-            object_entry(source, name)
-        for entry in list_objects(source):
-            if names and entry.name not in names:
-                continue
-            name = new_names.get(entry.name, entry.name)
-            try:
-                if _copy_object(source, target, entry, name, arrays, origin, homes):
-                    copied.append(name)
-                else:
-                    known.append(name)
-            except CopyRefusedError as error:
-                shown = name if name.isprintable() else repr(name)
-                refused.append(RefusedCopy(shown, error.cause, error.fix))
+    for name in (*names, *new_names):
+        object_entry(source, name)
+    for entry in list_objects(source):
+        if names and entry.name not in names:
+            continue
+        name = new_names.get(entry.name, entry.name)
+        try:
+            if _copy_object(source, target, entry, name, arrays, origin):
+                copied.append(name)
+            else:
+                known.append(name)
+        except CopyRefusedError as error:
+            shown = name if name.isprintable() else repr(name)
+            refused.append(RefusedCopy(shown, error.cause, error.fix))
     if refused and not skip_refused:
-        raise _refusal(refused, place_of(homes[1]))
+        raise _refusal(refused, place_of(home_of(target.engine)))
     return CopyReport(tuple(copied), tuple(known), tuple(refused))
 
 
+@of_rows
 def _copy_object(
     source: Connection,
     target: Connection,
@@ -312,9 +306,12 @@ def _copy_object(
     name: str,
     arrays: dict[int, ArrayHere],
     origin: Mapping[str, str] | None,
-    homes: tuple[URL, URL],
 ) -> bool:
-    """Copy one object, if it is new; check all of it before the first row is written."""
+    """Copy one object, if it is new; check all of it before the first row is written.
+
+    Files of parts are named from where people have the two databases.
+    """
+    homes = home_of(source.engine), home_of(target.engine)
     parts = rows_of(source, tables.parts, entry.object_id)
     if origin:
         check_names(name, entry.name, parts, homes[0])

@@ -83,7 +83,7 @@ def lab_of(
     """
     wanted = read_lab_key(lab_key) if lab_key else specs[0].lab_key
     if connection is None:
-        return LabArrays(wanted or draw_lab_key(), {})
+        return LabArrays(wanted or draw_lab_key(), {}, {})
     if lab_key:
         require_lab_key(connection, wanted)
     elif wanted:

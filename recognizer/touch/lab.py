@@ -21,11 +21,11 @@ from sqlalchemy import Connection, Engine
 from encoded_objects.base.compiled import addresses
 from encoded_objects.base.output import count_of
 from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
-from generator.array import FoldedArray, ProductArray, array_from
+from generator.array import FoldedArray, ProductArray
 from generator.database.as_built import AsBuilt, read_as_built
 from generator.database.cells import held_cells
 from generator.database.open import open_database
-from generator.database.read import read_array, read_object, read_styles, read_surfaces
+from generator.database.read import make_array, read_object, read_styles, read_surfaces
 from generator.database.registered import (
     Developable,
     RegisteredObject,
@@ -33,7 +33,7 @@ from generator.database.registered import (
     RegisteredStyle,
     RoundFace,
 )
-from generator.database.transaction import read_transaction, rows_explained
+from generator.database.transaction import of_rows, read_transaction
 from probe.surface.polygon import FaceRegion, polygon
 from recognizer.errors import LabError
 from recognizer.touch.as_built import PrintedFace, print_of, usual_print
@@ -154,13 +154,10 @@ class EmbossedArray:
         if number not in self.known:
             object_id = int(self.faces[number, 0])
             numbers = np.flatnonzero(self.faces[:, 0] == object_id)
-            with rows_explained(self.engine.url):
-                with read_transaction(self.engine) as connection:
-                    found = read_object(connection, self.names[object_id])
-                    prints = (*read_as_built(connection, object_id), *read_as_built(connection))
-                encoded = dict(_encoded_faces(found, prints))
-                for near in numbers.tolist():
-                    self.known[near] = encoded[int(self.faces[near, 1])]
+            with read_transaction(self.engine) as connection:
+                wanted = self.faces[numbers, 1].tolist()
+                found = _read_faces(connection, object_id, self.names[object_id], wanted)
+            self.known.update(zip(numbers.tolist(), found, strict=True))
         return self.known[number]
 
 
@@ -207,8 +204,8 @@ def open_lab(database: str | Path) -> Lab:
     """
     url = str(database)
     engine = open_database(url, writable=False)
-    with rows_explained(engine.url), read_transaction(engine) as connection:
-        arrays = tuple(_embossed_arrays(connection, engine))
+    with read_transaction(engine) as connection:
+        arrays = _embossed_arrays(connection, engine)
     if not arrays:
         raise LabError(
             "the database holds no encoded object",
@@ -218,7 +215,9 @@ def open_lab(database: str | Path) -> Lab:
     return Lab(url, arrays)
 
 
-def _embossed_arrays(connection: Connection, engine: Engine) -> Iterable[EmbossedArray]:
+@of_rows
+def _embossed_arrays(connection: Connection, engine: Engine) -> tuple[EmbossedArray, ...]:
+    found = []
     styles: dict[tuple[int, str, SymbolStyle], list[RegisteredStyle]] = {}
     for entry in read_styles(connection):
         styles.setdefault((entry.array_id, entry.alphabet, entry.style), []).append(entry)
@@ -231,14 +230,14 @@ def _embossed_arrays(connection: Connection, engine: Engine) -> Iterable[Embosse
         mine = mine[np.isin(mine[:, 2], [entry.object_id for entry in objects])]
         if len(mine) == 0:
             continue
-        array = array_from(read_array(connection, array_id).definition)
+        array = make_array(connection, array_id)
         faces, owners = np.unique(mine[:, 2:4], axis=0, return_inverse=True)
         keys = cell_keys(array.columns, mine[:, 0], mine[:, 1])
         dense = None
         if array.rows * array.columns <= DENSE_CELLS:
             dense = np.full(array.rows * array.columns, len(mine), np.int32)
             dense[keys] = np.arange(len(mine))
-        yield EmbossedArray(
+        one = EmbossedArray(
             array=array,
             alphabet=alphabet_from(json.loads(alphabet)),
             style=style,
@@ -250,9 +249,11 @@ def _embossed_arrays(connection: Connection, engine: Engine) -> Iterable[Embosse
             names={entry.object_id: entry.name for entry in objects},
             engine=engine,
             radii_mm=radii_of(
-                one for entry in objects for one in surfaces.get(entry.object_id, ())
+                bent for entry in objects for bent in surfaces.get(entry.object_id, ())
             ),
         )
+        found.append(one)
+    return tuple(found)
 
 
 def radii_of(surfaces: Iterable[Developable]) -> tuple[float, ...]:
@@ -269,6 +270,16 @@ def radii_of(surfaces: Iterable[Developable]) -> tuple[float, ...]:
         last = round(math.log(min(max(largest, least), MOST_RADIUS_MM) / least) / math.log(finer))
         steps |= set(range(last + 1)) if surface.half_angle_rad else {last}
     return tuple(least * finer**step for step in sorted(steps))
+
+
+@of_rows
+def _read_faces(
+    connection: Connection, object_id: int, name: str, wanted: Sequence[int]
+) -> list[EncodedFace]:
+    """Return encoded faces of an object; `wanted` are their numbers in it."""
+    prints = (*read_as_built(connection, object_id), *read_as_built(connection))
+    encoded = dict(_encoded_faces(read_object(connection, name), prints))
+    return [encoded[number] for number in wanted]
 
 
 def _encoded_faces(

@@ -3,7 +3,7 @@
     python tests/campaigns/fuzz.py [--kinds recording mcap ...] [--minutes 10] [--cases 20000]
                                    [--seed 1] -o DIR
 
-The kinds and the damage are those of `tests/foreign.py`; without `--kinds` all of them, each for
+The kinds and the damage are those of `tests/foreign`; without `--kinds` all of them, each for
 so many minutes or cases, whichever ends first. Cases run in a forked worker of their own, with 5 s
 and 512 MB each; a worker that dies or hangs is replaced. `DIR/KIND.jsonl` holds a row a batch, so a
 campaign goes on where it was, and what was found: each fault with the numbers of its cases, which
@@ -28,11 +28,12 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import foreign
 import runner
+from foreign.case import FAULTS, READ, REFUSED, scratch
 
 BATCH = 250  #: cases of a worker
 LATE_S = 60.0  #: after which a worker without a word is killed
 LISTED = 5  #: cases of a fault that are kept by number
-HEADS = ("kind", "cases", foreign.READ, foreign.REFUSED, *foreign.FAULTS, "ms a case", "MB")
+HEADS = ("kind", "cases", READ, REFUSED, *FAULTS, "ms a case", "MB")
 
 
 def worker(kind: str, first: int, last: int, root: Path, out: int) -> None:
@@ -88,7 +89,7 @@ def campaign(kind: str, asked: Any) -> list[dict[str, Any]]:
     end_s = time.monotonic() + 60 * asked.minutes - sum(row["seconds"] for row in rows)
     done = sum(row["cases"] for row in rows)
     with (
-        tempfile.TemporaryDirectory(prefix="fuzz-", dir=foreign.scratch()) as folder,
+        tempfile.TemporaryDirectory(prefix="fuzz-", dir=scratch()) as folder,
         file.open("a") as out,
     ):
         if done < asked.cases:
@@ -102,7 +103,7 @@ def campaign(kind: str, asked: Any) -> list[dict[str, Any]]:
             ):
                 counts[what] += 1
                 most = max(most, megabytes)
-                if what in foreign.FAULTS:
+                if what in FAULTS:
                     found.setdefault(f"{what}: {detail}", []).append(number)
             row = {"cases": cases, "counts": counts, "megabytes": most, "found": found,
                    "seconds": time.monotonic() - start}  # fmt: skip

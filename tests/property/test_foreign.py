@@ -15,6 +15,7 @@ from pathlib import Path
 
 import foreign
 import pytest
+from foreign import case, databases, lines, page, recordings
 
 from encoded_objects.base.errors import EncodedObjectsError
 from probe.recording.ros import DEFINITIONS, IMAGE
@@ -32,10 +33,10 @@ USUAL = 150
 @pytest.fixture(scope="module")
 def root():
     """A folder of cases; the page's session, if there is one, ends with it."""
-    with tempfile.TemporaryDirectory(prefix="foreign-", dir=foreign.scratch()) as folder:
+    with tempfile.TemporaryDirectory(prefix="foreign-", dir=case.scratch()) as folder:
         yield Path(folder)
-        while foreign._PAGE:
-            foreign._PAGE.pop().close()
+        while page.PAGE:
+            page.PAGE.pop().close()
 
 
 @pytest.mark.parametrize("kind", foreign.KINDS)
@@ -44,9 +45,9 @@ def test_what_comes_from_outside_is_read_or_refused(kind, root):
     seen = set()
     for number in range(CASES.get(kind, USUAL)):
         outcome = foreign.attempt(kind, number, root)
-        assert outcome.what not in foreign.FAULTS, (kind, number, outcome)
+        assert outcome.what not in case.FAULTS, (kind, number, outcome)
         seen.add(outcome.what)
-    assert foreign.REFUSED in seen or kind in ("packets", "line")  # whose damage is counted
+    assert case.REFUSED in seen or kind in ("packets", "line")  # whose damage is counted
 
 
 # -- what was found, each by its least case
@@ -59,7 +60,7 @@ def _mcap_with(more):
     writer = Writer(out)
     writer._writer.add_metadata("recording", {"more": json.dumps(more)})
     schema = writer.register_msgdef(IMAGE, DEFINITIONS[IMAGE])
-    writer.write_message("/t", schema, foreign.IMAGE_OF_ZEROS, log_time=5, sequence=0)
+    writer.write_message("/t", schema, recordings.IMAGE_OF_ZEROS, log_time=5, sequence=0)
     writer.finish()
     return out.getvalue()
 
@@ -69,7 +70,7 @@ def _mcap_of_another_sum():
     from mcap.records import Chunk
     from mcap.stream_reader import StreamReader
 
-    content = bytearray(foreign.mcap_file())
+    content = bytearray(recordings.mcap_file())
     records = StreamReader(io.BytesIO(content), emit_chunks=True).records
     chunk = next(one for one in records if isinstance(one, Chunk))
     at = content.index(chunk.uncompressed_size.to_bytes(8, "little")) + 8
@@ -79,7 +80,7 @@ def _mcap_of_another_sum():
 
 def _mcap_of_another_type():
     """A file of ours whose summary names a type of messages otherwise."""
-    content = bytearray(foreign.mcap_file())
+    content = bytearray(recordings.mcap_file())
     content[content.rindex(b"TouchFrame")] ^= 1
     return bytes(content)
 
@@ -88,7 +89,7 @@ def _lab_where(change):
     """A lab changed by SQL."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "lab.db"
-        path.write_bytes(foreign.labs()["lab"])
+        path.write_bytes(databases.labs()["lab"])
         with closing(sqlite3.connect(path)) as base:
             base.execute(change)
             base.commit()
@@ -128,9 +129,9 @@ FOUND = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", FOUND)
-def test_what_was_found_is_refused(case, tmp_path):
-    kind, name, content, said = FOUND[case]
+@pytest.mark.parametrize("least", FOUND)
+def test_what_was_found_is_refused(least, tmp_path):
+    kind, name, content, said = FOUND[least]
     path, out = tmp_path / "in" / name, tmp_path / "out"
     path.parent.mkdir()
     out.mkdir()
@@ -145,5 +146,5 @@ def test_what_was_found_is_refused(case, tmp_path):
 @pytest.mark.parametrize("url", [f"sim:?sensor_type={LONG}", f"file:{LONG}", f"serial:///{LONG}"])
 def test_names_that_are_too_long_are_refused(url, tmp_path):
     with pytest.raises(EncodedObjectsError) as caught:
-        foreign.read_url(url, tmp_path)
+        lines.read_url(url, tmp_path)
     assert caught.value.exit_code in (2, 3)
