@@ -186,6 +186,7 @@ def _faces(held: RegisteredObject, sensor: SensorType) -> tuple[list[_Face], Par
 
     Layouts may be in another order.
     """
+    from generator.alphabet import alphabet_from
     from generator.layout.recognition_rate import face_rates, part_rate
 
     layouts = {layout.face: layout for layout in held.layout.faces}
@@ -194,8 +195,8 @@ def _faces(held: RegisteredObject, sensor: SensorType) -> tuple[list[_Face], Par
     facets = {facet for surface in surfaces.values() for facet in surface.facets[1:]}
     solid = replace(held.polyhedron, surfaces=tuple(surfaces.values()))
     array, bearing = held.array, [face for face in held.layout.faces if len(face.labels)]
-    cells, reach = array.rows * array.columns, held.alphabet["reach"]
-    rates = face_rates(solid, bearing, array.order, cells, held.style, reach, sensor)
+    cells, letters = array.rows * array.columns, alphabet_from(held.alphabet)
+    rates = face_rates(solid, bearing, array.order, cells, held.style, letters, sensor)
     names = {face.face_id: face.name for face in held.faces}
     part = part_rate(solid, bearing, {names[face]: rate for face, rate in rates.items()})
     found = []

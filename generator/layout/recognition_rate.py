@@ -13,7 +13,8 @@ to `SAG_MM` under it. Where the sensor meets another face (`obstacle`) nothing i
 6.3.
 
 `answers.json` is the table, measured (docs/folds.md): flat faces, a sensor of 25.4 mm whose centre
-lies on the face and whose plate rests there, 20 to 120 N, symbols of 4.5 to 7 mm. Of that, other
+lies on the face and whose plate rests there, 20 to 120 N, letters made for tactels of 4.5 to 7 mm
+(`answers_dense-4.json`: the letters of the published arrays, which are read less). Of that, other
 sensor types answer a share that was measured too (`answers_of_types.json`,
 `tests/campaigns/promised.py --types`).
 
@@ -35,6 +36,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
+from generator.alphabet.known import Alphabet
 from generator.alphabet.outline import SymbolStyle
 from generator.array.contract import touches_needed
 from generator.layout.footprint import Points
@@ -55,7 +57,10 @@ POSES = 1000
 mm); 6 to 10 ms a face."""
 AROUND_MM = 20.0  #: of the usual sensor: half its width and a step
 MEETS_MM2 = 1.0  #: of another face inside the sensor's rectangle: less than a tactel
-SAG_MM = 0.4  #: under the line along which a plate touches a round face, down to which it is felt
+SAG_MM = 0.3
+"""Under the line along which a plate touches a round face, down to which symbols are seen: .25 to
+.3 mm makes 600 touches of cans of 26 to 100 mm and cones the likeliest."""
+TACTEL = "tactel"  #: how the names of alphabets begin that are made for tactels
 _STRIPS = 64  # poses looked at together
 _PAIRS = 1 << 18  # of poses and edges looked at together
 _STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # of x, y and turn: 1.22^4 = 1.22 + 1
@@ -184,9 +189,9 @@ class AnsweredShare:
         return np.asarray(1 / (1 + np.exp(-(self.constant + self.by_loaded * loaded))))
 
 
-ROUND = AnsweredShare(USUAL_SENSOR.across_mm, 5.0, -13.0, 19.0)
-"""Of round faces: a plate that hangs over a rim or the seam of the symbols, touching along a line,
-is read less than on a flat face (`tests/campaigns/promised_parts.py`)."""
+ROUND = AnsweredShare(USUAL_SENSOR.across_mm, 5.0, -9.1, 13.3)
+"""Of round faces: a plate that touches along a line and hangs over a rim, or over the seam of the
+symbols, is read less than on a flat face; the likeliest numbers for the same touches."""
 
 
 def face_rates(
@@ -195,18 +200,19 @@ def face_rates(
     order: int,
     cells: int,
     style: SymbolStyle,
-    reach: float,
+    alphabet: Alphabet,
     sensor: SensorType = USUAL_SENSOR,
 ) -> dict[int, RecognitionRate]:
     """Return the rate of each face by its number; equal faces that stand free share the work.
 
     Empty for arrays that are read by a scan: no rate was measured there. `order` and `cells` are
-    those of the array, `reach` is the alphabet's; round faces are the polyhedron's `surfaces`.
+    those of the array; round faces are the polyhedron's `surfaces`.
     """
     if touches_needed(order, cells, style.pitch_mm, sensor_mm=sensor.across_mm) > 1:
         return {}
     solid = solid_edges(polyhedron)
-    view = sensor_view(sensor, symbol_half_mm(reach, style))
+    view = sensor_view(sensor, symbol_half_mm(alphabet, style))
+    table = measured_answers(alphabet.name)
     surfaces = {surface.carrier: surface for surface in polyhedron.surfaces}
     known: dict[bytes, RecognitionRate] = {}
     rates = {}
@@ -216,7 +222,7 @@ def face_rates(
             rates[face.face] = RecognitionRate(0.0, 0.0)
         elif surface is not None:
             views = round_views(solid, surface, development(polyhedron, surface), face, style, view)
-            rates[face.face] = _rate(views, style.pitch_mm, sensor)
+            rates[face.face] = _rate(views, table, style.pitch_mm, sensor)
         else:
             loops, frame = face_polygon(polyhedron, face.face), face_frame(polyhedron, face.face)
             free = solid.rise_mm(frame) <= style.height_mm
@@ -224,14 +230,14 @@ def face_rates(
             if key not in known:
                 views = face_views(loops, face, style.pitch_mm, view)
                 views = beside_obstacles(views, solid, frame, style.height_mm, view)
-                known[key] = _rate(views, style.pitch_mm, sensor)
+                known[key] = _rate(views, table, style.pitch_mm, sensor)
             rates[face.face] = known[key]
     return rates
 
 
-def symbol_half_mm(reach: float, style: SymbolStyle) -> float:
+def symbol_half_mm(alphabet: Alphabet, style: SymbolStyle) -> float:
     """Return the distance from a symbol's centre to the end of its strokes."""
-    return reach * style.pitch_mm + style.stroke_mm / 2
+    return alphabet.reach * style.pitch_mm + style.stroke_mm / 2
 
 
 def part_rate(
@@ -251,31 +257,39 @@ def part_rate(
             once += own * rate.at_once
             within += own * (math.nan if rate.within_three is None else rate.within_three)
     whole = sum(area)
-    later = None if math.isnan(within) else round(within / whole, 3)
-    return PartRate(round(once / whole, 3), later, round(encoded / whole, 3))
+    later = None if math.isnan(within) else _to_three_places(within / whole)
+    return PartRate(_to_three_places(once / whole), later, _to_three_places(encoded / whole))
 
 
 def face_rate(
     loops: Loops,
     face: FaceLayout,
-    pitch_mm: float,
-    symbol_half_mm: float,
+    style: SymbolStyle,
+    alphabet: Alphabet,
     sensor: SensorType,
     poses: int = POSES,
 ) -> RecognitionRate:
     """Return the rate of one flat face that stands free, to three places."""
     if not len(face.labels):
         return RecognitionRate(0.0, 0.0)
-    views = face_views(loops, face, pitch_mm, sensor_view(sensor, symbol_half_mm), poses)
-    return _rate(views, pitch_mm, sensor)
+    view = sensor_view(sensor, symbol_half_mm(alphabet, style))
+    views = face_views(loops, face, style.pitch_mm, view, poses)
+    return _rate(views, measured_answers(alphabet.name), style.pitch_mm, sensor)
 
 
-def _rate(views: FaceViews, pitch_mm: float, sensor: SensorType) -> RecognitionRate:
-    once, within = answered_shares(views, measured_answers(), pitch_mm, sensor)
+def _to_three_places(share: float) -> float:
+    """Return a share rounded, but never to all where it is not."""
+    return min(round(share, 3), 0.999) if share < 1 - 1e-9 else 1.0
+
+
+def _rate(
+    views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorType
+) -> RecognitionRate:
+    once, within = answered_shares(views, table, pitch_mm, sensor)
     free = ~views.blocked
     return RecognitionRate(
-        round(once, 3),
-        None if within is None else round(within, 3),
+        _to_three_places(once),
+        None if within is None else _to_three_places(within),
         one_row=bool(free.any() and (views.lines[free] <= 1).mean() >= ONE_ROW),
         blocked=round(float(views.blocked.mean()), 3),
         meets=views.meets,
@@ -473,10 +487,11 @@ def measured_types() -> dict[str, AnsweredShare]:
     }
 
 
-@lru_cache(maxsize=1)
-def measured_answers() -> AnswerTable:
-    """Return the table that was measured with the reader and sensor of this version."""
-    text = (resources.files("generator.layout") / "answers.json").read_text(encoding="utf-8")
+@lru_cache(maxsize=2)
+def measured_answers(letters: str = TACTEL) -> AnswerTable:
+    """Return the table of an alphabet's letters, measured with the reader and the usual sensor."""
+    name = "answers.json" if letters.startswith(TACTEL) else "answers_dense-4.json"
+    text = (resources.files("generator.layout") / name).read_text(encoding="utf-8")
     values = json.loads(text)
     pitch, seen, loaded = (tuple(values[name]) for name in ("pitch_mm", "seen", "loaded"))
     again = tuple(values["again"])

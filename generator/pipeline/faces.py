@@ -30,7 +30,6 @@ from generator.layout.recognition_rate import (
     face_rate,
     face_rates,
     part_rate,
-    symbol_half_mm,
 )
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import is_convex, signed_area
@@ -132,7 +131,7 @@ def _rates(plan: ObjectPlan, layout: Layout) -> dict[int, RecognitionRate]:
     array, sensor = plan.array, plan.spec.sensor
     cells = array.rows * array.columns
     rates = face_rates(
-        plan.polyhedron, faces, array.order, cells, plan.spec.style, plan.alphabet.reach, sensor
+        plan.polyhedron, faces, array.order, cells, plan.spec.style, plan.alphabet, sensor
     )
     remedies: dict[tuple[float, float, bool, float], str] = {}
     for face, rate in list(rates.items()):
@@ -221,5 +220,4 @@ def _rate_of(plan: ObjectPlan, loops: Loops, region: Region, style: SymbolStyle)
     """Return the share of touches answered at once on a face that is laid out in a style."""
     half = footprint_half_mm(plan.alphabet, style)
     face = lay_out_face(region, plan.array, style.pitch_mm, half)
-    reach = symbol_half_mm(plan.alphabet.reach, style)
-    return face_rate(loops, face, style.pitch_mm, reach, plan.spec.sensor, TRIES).at_once
+    return face_rate(loops, face, style, plan.alphabet, plan.spec.sensor, TRIES).at_once

@@ -376,7 +376,7 @@ def _seen(row: dict[str, Any], held: Any, sensor: SensorType) -> tuple[float, fl
     view = sensor_view(sensor, held.alphabet["reach"] * pitch + held.style.stroke_mm / 2)
     at, turn = np.array([[row["x_mm"], row["y_mm"]]]), np.radians([row["theta_deg"]])
     views = views_at(face.polygon_mm, layout, pitch, view, at, turn)
-    table = measured_answers()
+    table = measured_answers(held.alphabet["name"])
     usual = table.at(pitch / sensor.coarseness, views.seen, views.loaded)
     return float(usual[0]), float(views.loaded[0]), row["verdict"] == "right"
 

@@ -1,12 +1,14 @@
 """What a face promises, against geometry done one pose and one edge at a time."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
+from generator.alphabet import ALPHABETS
 from generator.alphabet.outline import SymbolStyle
 from generator.array import profile
 from generator.layout.layout import lay_out
@@ -14,6 +16,7 @@ from generator.layout.obstacle import solid_edges
 from generator.layout.placement import FaceLayout, Placement
 from generator.layout.recognition_rate import (
     MEETS_MM2,
+    ROUND,
     SAG_MM,
     AnswerTable,
     SensorView,
@@ -23,6 +26,7 @@ from generator.layout.recognition_rate import (
     beside_obstacles,
     face_rates,
     face_views,
+    felt_band,
     measured_answers,
     measured_types,
     part_rate,
@@ -241,27 +245,42 @@ def test_a_round_face_shows_what_lies_near_the_line_that_it_is_touched_along():
     width = float(np.ptp(flat.outline[:, 0]))
     at = np.stack(np.meshgrid(np.arange(4, width, 7), np.arange(4, height, 7)), -1).reshape(-1, 2)
     none = np.zeros(len(at), np.int64)
-    face = FaceLayout(surface.carrier, Placement(0, 0, 0.0, 0.5, 0.5), none, none, none, at, 1)
+    face = FaceLayout(surface.carrier, Placement(0, 0, 0.0, -0.5, -0.5), none, none, none, at, 1)
     style = SymbolStyle(pitch_mm=7.0)
     views = round_views(solid_edges(solid), surface, flat, face, style, VIEW, 200)
-    exact, coarse = [], []
+    half = radius * math.acos(1 - SAG_MM / radius)
     for k in range(200):
-        angle = (at[:, 0] - views.centre_mm[k, 0]) / radius
-        there = np.stack([radius * np.sin(angle), at[:, 1] - views.centre_mm[k, 1]])
         c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
-        x, y = np.array([[c, s], [-s, c]]) @ there
-        inside = (abs(x) <= 12.7 - 2.52) & (abs(y) <= 9.0 - 2.52)
-        exact.append((inside & (radius * (1 - np.cos(angle)) <= SAG_MM)).sum())
-        half = math.sqrt(2 * radius * SAG_MM - SAG_MM**2)  # of the strip that is felt
-        strip = np.array([[-half, -99], [half, -99], [half, 99], [-half, 99]])
-        strip[:, 1] = np.clip(strip[:, 1], -views.centre_mm[k, 1], height - views.centre_mm[k, 1])
-        for normal, limit in (((c, s), 12.7), ((-c, -s), 12.7), ((-s, c), 9), ((s, -c), 9)):
-            strip = cut(strip, np.array(normal), limit)
-        coarse.append(area(strip) / (4 * 12.7 * 9.0))
-    assert views.seen.mean() == pytest.approx(np.mean(exact), abs=0.15)
-    assert np.abs(views.seen - exact).mean() < 0.4  # the plate stands in the plane of a facet
-    assert views.loaded.mean() == pytest.approx(np.mean(coarse), abs=0.005)
+        axes, there = np.array([[c, s], [-s, c]]), at - views.centre_mm[k]
+        x, y = axes @ there.T
+        inside = (abs(x) <= 12.7 - 2.52) & (abs(y) <= 9.0 - 2.52) & (abs(there[:, 0]) <= half)
+        assert views.seen[k] == inside.sum()
+        part = flat.outline - views.centre_mm[k]
+        for normal, limit in zip((*axes, *-axes), (12.7, 9, 12.7, 9), strict=True):
+            part = cut(part, normal, limit)
+        assert views.loaded[k] == pytest.approx(area(part) / (4 * 12.7 * 9.0), abs=1e-9)
     assert not views.blocked.any()
+    at_rim = [lies < 4 for lies in np.minimum(views.centre_mm[:, 1], 80 - views.centre_mm[:, 1])]
+    table, flat_face = measured_answers(), replace(views, round=False)
+    assert answered_shares(views, table, 7.0)[0] < answered_shares(flat_face, table, 7.0)[0] - 0.05
+    assert ROUND.at(views.loaded)[at_rim].mean() < 0.4 < 0.9 < ROUND.at(np.ones(1))[0]
+
+
+def test_a_cone_is_felt_along_its_lines_the_narrower_the_nearer_its_tip():
+    solid = shapes.cone(80.0, 90.0)
+    (surface,) = solid.surfaces
+    flat = development(solid, surface)
+    tip, slant = flat.high[0], math.hypot(40, 90)
+    middles = (flat.low[:-1] + flat.low[1:]) / 2
+    for away in (0.9, 0.5, 0.1):  # of the way from the tip to the base
+        at = tip + away * (middles - tip)
+        assert np.array_equal(flat.facets_of(at), np.arange(len(middles)))
+        band = felt_band(surface, flat, at)
+        towards = (tip - at) / np.hypot(*(tip - at).T)[:, None]
+        assert np.c_[np.cos(band.along_rad), np.sin(band.along_rad)] == pytest.approx(towards)
+        radius = away * slant * 40 / 90  # across the line: how far the axis lies along the normal
+        half = radius * math.acos(1 - SAG_MM / radius)
+        assert band.half_mm == pytest.approx(np.full(len(at), half), rel=1e-3)
 
 
 def test_the_rate_of_a_part_counts_all_of_its_surface():
@@ -270,7 +289,7 @@ def test_the_rate_of_a_part_counts_all_of_its_surface():
     layout = lay_out(solid, array, 7.0, 2.73, clearances, NONE, blank_faces=[0, 1],
                      allow_blank_faces=True)  # fmt: skip
     cells, style = array.rows * array.columns, SymbolStyle(pitch_mm=7.0)
-    rates = face_rates(solid, layout.faces, array.order, cells, style, 0.29)
+    rates = face_rates(solid, layout.faces, array.order, cells, style, ALPHABETS["dense-4"])
     assert rates[4].blocked > 0.2 > rates[8].blocked == 0
     assert rates[4].obstacle == f"the sensor meets F6 at {rates[4].blocked:.0%}".replace(
         "%", " % of its places"

@@ -93,13 +93,13 @@ def test_a_large_cube_promises_more_than_a_small_one_and_names_no_face(tmp_path)
         shares.append(faces[0].promise.at_once)
         if side > 20:
             (line,) = rate_lines(faces, whole_rate(*laid, faces))
-            said = f"  of touches anywhere on the part {shares[-1]:.0%}".replace("%", " %")
+            said = "over 99" if shares[-1] > 0.99 else f"{100 * shares[-1]:.0f}"
             assert line == (
-                f"{said} are answered at once, over 99 % within three; 100 % of its surface is "
-                "encoded"
+                f"  of touches anywhere on the part {said} % are answered at once, over 99 % "
+                "within three; 100 % of its surface is encoded"
             )
             assert faces[0].promise.within_three > 0.99
-    assert shares[0] < 0.7 < shares[1] < 0.95 < shares[2] < 1
+    assert shares[0] < 0.9 < shares[1] < 0.99 < shares[2] < 1
 
 
 def test_a_can_is_as_wide_as_it_is_round(tmp_path):
@@ -147,7 +147,8 @@ def test_the_database_gives_the_rates_that_were_reported(made, name, capsys):
     }
     assert shown(folder, name, capsys) == reported
     assert bool(reported) == (name != "Old")
-    assert (name == "Can") == (reported.get("F2", {}).get("at_once", 0.0) > 0.3)
+    if name == "Can":  # the mantle, with the seam of its symbols
+        assert 0.5 < reported["F2"]["at_once"] < reported["F3"]["at_once"]
     run(["show", name, "--database", f"{folder}/{name}.db", "--json"])
     part = json.loads(capsys.readouterr().out)["promise"]
     assert part == (made_object.promise and asdict(made_object.promise))
