@@ -1,12 +1,14 @@
 """Build hook: the C files of a folder -> its `kernels.so`, by the compiler that `ziglang` brings.
 
-No compiler is needed on the machine. The code is for any processor of its kind, so that a wheel
-may be kept and moved; products and sums are not contracted, so that it rounds as numpy does. The
-same text and compiler give the same bytes, wherever they are built.
+No compiler is needed on the machine. The code is for any processor of its kind and any Linux of the
+last ten years, and no part of Python's, so that one wheel serves all; products and sums are not
+contracted, so that it rounds as numpy does. The same text and compiler give the same bytes,
+wherever they are built.
 """
 
 from __future__ import annotations
 
+import platform
 import subprocess
 import sys
 import zlib
@@ -15,6 +17,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
+GLIBC = "2.17"  #: the oldest that a wheel runs on: manylinux2014, as numpy's
 FOLDERS = ("probe/surface", "recognizer/touch")
 OPTIONS = [
     "-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC", "-mcpu=baseline",
@@ -31,7 +34,8 @@ class CompiledKernels(BuildHookInterface):  # type: ignore[misc, type-arg]
             compile_folder(Path(self.root) / name)
             build_data["artifacts"].append(f"{name}/kernels.so")
         build_data["pure_python"] = False
-        build_data["infer_tag"] = True
+        machine = platform.machine()
+        build_data["tag"] = f"py3-none-manylinux_{GLIBC.replace('.', '_')}_{machine}"
 
 
 def compile_folder(folder: Path) -> None:
@@ -43,6 +47,7 @@ def compile_folder(folder: Path) -> None:
     compiled = [str(source.relative_to(folder)) for source in sources if source.suffix == ".c"]
     arguments = [*OPTIONS, made_of, *compiled, "-lm", "-o", draft.name]
     # From its own folder, so that no name of a folder comes into the library.
-    command = [sys.executable, "-m", "ziglang", "cc", *arguments]
+    target = f"{platform.machine()}-linux-gnu.{GLIBC}"
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *arguments]
     subprocess.run(command, check=True, cwd=folder)  # noqa: S603
     draft.replace(made)

@@ -48,7 +48,12 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module 'encoded_objects' has no attribute '{name}'")
     from importlib import import_module  # `__init__.pyi` has the types: typing alone takes 10 ms
 
-    value: object = getattr(import_module(HOMES[name]), name)
+    try:
+        value: object = getattr(import_module(HOMES[name]), name)
+    except ModuleNotFoundError as error:
+        from encoded_objects.base.errors import without_touch
+
+        raise without_touch(error, f"encoded_objects.{name}") or error from error
     globals()[name] = value
     return value
 

@@ -87,7 +87,7 @@ def main(
 def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) -> int:
     """Run one command; returns its exit code. Errors are reported, not raised."""
     from encoded_objects.base import output
-    from encoded_objects.base.errors import EncodedObjectsError, UsageError
+    from encoded_objects.base.errors import EncodedObjectsError, UsageError, without_touch
 
     as_json = "--json" in arguments
     unsaid = not (arguments or bare)
@@ -110,6 +110,11 @@ def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) 
             code, problem = BAD_INPUT, _misuse(error, name, app, arguments)
     except BrokenPipeError:
         raise
+    except ModuleNotFoundError as error:
+        absent = without_touch(error, name)
+        if absent is None:
+            raise
+        code, problem = absent.exit_code, absent
     except OSError as error:
         what = f"cannot write '{error.filename}'" if error.filename else "cannot write"
         problem = EncodedObjectsError(

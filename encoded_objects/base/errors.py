@@ -116,6 +116,18 @@ installed; pip install 'encoded-objects[report]'
             ) from error
 
 
+TOUCH_LIBRARIES = ("cobs", "h5py", "scipy", "serial")  #: of the extra `touch`
+
+
+def without_touch(error: ModuleNotFoundError, purpose: str) -> MissingExtraError | None:
+    """Return what to say where a library of the extra `touch` is not installed; else None."""
+    module = (error.name or "").partition(".")[0]
+    if module not in TOUCH_LIBRARIES:
+        return None
+    cause = f"{purpose} needs {module}, which is not installed"
+    return MissingExtraError(cause, fix=install_line("touch"))
+
+
 def install_line(extra: str) -> str:
     """Return the line that installs an extra."""
     return f"pip install 'encoded-objects[{extra}]'"

@@ -48,7 +48,8 @@ PROGRAMS = {
     ),
     "scene": (
         SCENE,
-        """scipy matplotlib pandas OCP trimesh multiprocessing.pool generator.polyhedron.read
+        """scipy h5py cobs serial matplotlib pandas OCP trimesh multiprocessing.pool
+        generator.polyhedron.read
         generator.export.check generator.export.robot.model generator.printed
         generator.pipeline.sets""",
     ),
@@ -66,3 +67,16 @@ def test_nothing_is_loaded_that_is_not_used(what, tmp_path):
     )
     assert done.stderr == ""
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize(
+    "program",
+    ["from probe.command import main; main(['list'])", "from encoded_objects import validate"],
+)
+def test_what_a_plain_install_lacks_is_said(program):
+    lacks = "import sys; sys.modules.update(dict.fromkeys(('cobs', 'h5py', 'scipy', 'serial')))"
+    program = f"{lacks}\n{program}"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode != 0
+    assert "pip install 'encoded-objects[touch]'" in done.stderr
+    assert "probe.command" in program or "encoded_objects.validate needs " in done.stderr
