@@ -24,13 +24,13 @@ from generator.layout.placement import Layout
 from generator.layout.places import rank_test
 from generator.layout.recognition_rate import (
     LOW,
-    Loops,
     PartRate,
     RecognitionRate,
     face_rate,
     face_rates,
     part_rate,
 )
+from generator.layout.sensor_view import Loops
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import is_convex, signed_area
 from generator.polyhedron import Polyhedron, face_normal, face_polygon

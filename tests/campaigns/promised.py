@@ -8,7 +8,7 @@ A table that is made from the first of two sets of solids is checked on 60 faces
 second; `--save` keeps a table of both (`generator/layout/answers.json`). In each round every face
 is touched once, anywhere, and in every third round again where the answer's `next` says, up to
 three times; so any number of rounds is a fair sample. A touch is looked at as
-`generator.layout.recognition_rate` sees it; places where the sensor meets another face are left
+`generator.layout.sensor_view` sees it; places where the sensor meets another face are left
 out, since nothing is promised there. A step over a re-entrant edge may end on another face, which
 counts as not answered. What is there is kept, and an interrupted run goes on.
 
@@ -42,11 +42,13 @@ from generator.layout.obstacle import SolidEdges, solid_edges
 from generator.layout.placement import FaceLayout
 from generator.layout.recognition_rate import (
     AnswerTable,
-    SensorView,
     answered_at_once,
     answered_share,
-    beside_obstacles,
     measured_answers,
+)
+from generator.layout.sensor_view import (
+    SensorView,
+    beside_obstacles,
     sensor_view,
     views_at,
 )

@@ -15,21 +15,23 @@ from generator.layout.layout import lay_out
 from generator.layout.obstacle import solid_edges
 from generator.layout.placement import FaceLayout, Placement
 from generator.layout.recognition_rate import (
-    MEETS_MM2,
     ROUND,
-    SAG_MM,
     AnswerTable,
-    SensorView,
     answered_at_once,
     answered_share,
     answered_shares,
-    beside_obstacles,
     face_rates,
-    face_views,
-    felt_band,
     measured_answers,
     measured_types,
     part_rate,
+)
+from generator.layout.sensor_view import (
+    MEETS_MM2,
+    SAG_MM,
+    SensorView,
+    beside_obstacles,
+    face_views,
+    felt_band,
     round_views,
 )
 from generator.polyhedron import face_polygon, polyhedron, shapes
