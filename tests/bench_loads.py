@@ -29,6 +29,7 @@ UPGRADE = (
     "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
 )
 CLOCK = "GET /api/clock HTTP/1.1\r\nHost: {0}\r\n\r\n"
+LARGE = "name: Can\nshape: {cylinder: {diameter: 200 mm, height: 240 mm}}\n"  #: 10 s of CPU
 TOUCH = {"object": "Cube", "face": "F1", "x_mm": 30, "y_mm": 30}
 
 
@@ -126,6 +127,12 @@ def example(load: Load) -> None:
     load.ask(4, "POST", "/api/example")
 
 
+def making(load: Load) -> None:
+    body = {"name": "Can", "spec": LARGE, "keep": False}
+    load.ask(4, "POST", "/api/make", json=body)
+    load.ask(20, "POST", "/api/make/try", json=body)
+
+
 def touches(load: Load) -> None:
     load.ask(60, "POST", "/api/touch", json=TOUCH)
 
@@ -171,7 +178,7 @@ LOADS: dict[str, Callable[[Load], None]] = {
     "nothing": lambda _: None, "half-open": half_open, "dripping heads": dripping_heads,
     "dripping bodies": dripping_bodies, "dripping uploads": dripping_uploads,
     "uploads": uploads, "replays": replays, "playing": playing, "promises": promises,
-    "example": example, "touches": touches, "loads": loads, "sockets": sockets,
+    "example": example, "making": making, "touches": touches, "loads": loads, "sockets": sockets,
     "messages": messages, "downloads": downloads, "pictures": pictures, "silent port": silent,
 }  # fmt: skip
 EMPTY = ("example",)  #: loads of a server without objects

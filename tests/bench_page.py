@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 import time
+import zipfile
 from contextlib import contextmanager
 from weakref import WeakKeyDictionary
 
@@ -111,6 +112,42 @@ def touched(page, x=0.42, y=0.55):
     page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
     until(page, f"bench.answers > {before}")
     return page.get_by_test_id("answer").inner_text()
+
+
+def opened_to_make(browser, address):
+    """Open the page to make a part, or at a link to one; it has been tried."""
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    page.add_init_script("localStorage.setItem('toured', 'yes')")
+    page.goto(address)
+    if "#" not in address:
+        page.get_by_test_id("make-open").click()
+    until(page, "bench.tried > 0")
+    return page
+
+
+def making(page, settings, state="sound"):
+    """Fill in the form, the shape first; wait until it is tried, or refused."""
+    page.get_by_test_id("make-form").evaluate(
+        "form => form.querySelectorAll('details').forEach((one) => { one.open = true; })"
+    )
+    for setting, value in settings.items():
+        field = page.get_by_test_id(f"make-{setting}")
+        if field.evaluate("one => one.tagName") == "SELECT":
+            field.select_option(value)
+        else:
+            field.fill(value)
+    dialog = page.get_by_test_id("make")
+    expect(dialog).not_to_have_attribute("aria-busy", "true")
+    expect(dialog).to_have_attribute("data-state", state)
+
+
+def made(page):
+    """Let it be made; return the name of the zip, and its files by their names."""
+    with page.expect_download(timeout=PATIENCE_MS) as download:
+        page.get_by_test_id("make-go").click()
+    with zipfile.ZipFile(download.value.path()) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    return download.value.suggested_filename, files
 
 
 def press_known_loads(page, loads_n=(80, 200, 600)):

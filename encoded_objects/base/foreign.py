@@ -4,9 +4,7 @@ Only a regular file is opened, or a link to one; its size is checked before its 
 more than was allowed is read. What is refused becomes an error of the reader's own, with the file,
 the cause and the way out. A file that a library opens by its name (SQLite, MATLAB) passes
 `regular_size` first. What only a library can parse, and may crash or never end on, is read in a
-process of its own (`run_limited`)::
-
-    python -m encoded_objects.base.foreign MEMORY_BYTES CPU_S WRITTEN_BYTES MODULE ARGUMENT...
+process of its own (`run_limited`).
 """
 
 from __future__ import annotations
@@ -25,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Final
 from encoded_objects.base.errors import EncodedObjectsError
 
 if TYPE_CHECKING:
+    import subprocess
     from io import BufferedReader
     from zipfile import ZipFile
 
@@ -39,6 +38,7 @@ DAMAGE: Final = (
 )  # fmt: skip
 _MOST_FILES: Final = 64  #: open at once in a process of its own; ours take a dozen
 _LOOK_S: Final = 0.05  #: between two looks at such a process
+_IDLE_S: Final = 120.0  #: that one waits to be used
 
 _KINDS: Final = (
     (stat.S_ISFIFO, "a named pipe"),
@@ -144,6 +144,24 @@ def foreign_member(archive: ZipFile, name: str, most: int) -> bytes:
         raise ValueError(str(error)) from error
 
 
+def waiting_process(*loads: str) -> subprocess.Popen[bytes]:
+    """Start a process that loads some modules and waits for `run_limited`, at most `_IDLE_S`.
+
+    It ends with this one.
+    """
+    import subprocess
+
+    path = os.pathsep.join(entry for entry in sys.path if entry)
+    one_thread = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
+    return subprocess.Popen(  # noqa: S603 - our own module, no shell
+        [sys.executable, "-m", __name__, *loads],
+        env={**os.environ, **one_thread, "PYTHONPATH": path, "PYTHONSAFEPATH": "1"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+
+
 def run_limited(
     module: str,
     arguments: Sequence[str],
@@ -153,32 +171,31 @@ def run_limited(
     written_bytes: int,
     folder: str | os.PathLike[str] | None = None,
     ending: Callable[[], bool] = lambda: False,
+    waiting: subprocess.Popen[bytes] | None = None,
 ) -> tuple[int, bytes]:
     """Run a module of ours in a process of its own; return its exit code and what it printed.
 
-    It works in `folder`, the current one by default.
+    It works in `folder`, the current one by default; in the process that is `waiting`, if it is.
 
     The system ends it where it takes more memory (address space), time or room of one file; the
     code is negative then: the number of the signal. `ending` ends it at any time.
 
     Raises `TimeoutError` where it waits longer than `cpu_s` without working.
     """
+    import json
     import subprocess
 
-    limits = (str(memory_bytes), str(max(1, round(cpu_s))), str(written_bytes))
-    command = [sys.executable, "-m", __name__, *limits, module, *arguments]
-    path = os.pathsep.join(entry for entry in sys.path if entry)
-    one_thread = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
-    with subprocess.Popen(  # noqa: S603 - our own module, no shell
-        command,
-        cwd=folder,
-        env={**os.environ, **one_thread, "PYTHONPATH": path},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-    ) as process:
+    there = waiting is not None and waiting.poll() is None
+    limits = (memory_bytes, max(1, round(cpu_s)), written_bytes)
+    with waiting if waiting is not None and there else waiting_process() as process:
         until_s = time.monotonic() + 2 * cpu_s + 10.0
         try:
+            assert process.stdin is not None
+            process.stdin.write(
+                json.dumps([os.fspath(folder or "."), limits, module, *arguments]).encode()
+            )
+            process.stdin.close()
+            process.stdin = None
             while not ending():
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     printed, _ = process.communicate(timeout=_LOOK_S)
@@ -194,14 +211,22 @@ def _size_words(size: int) -> str:
     return f"{size / 2**20:.0f} MB" if size >= 10 << 20 else f"{-(-size // 1024)} KiB"
 
 
-def _main(memory_bytes: str, cpu_s: str, written_bytes: str, module: str, *arguments: str) -> None:
+def _main(*loads: str) -> None:
+    import json
     import resource
     import runpy
+    from importlib import import_module
+    from select import select
 
+    for name in loads:
+        import_module(name)
+    if not select([sys.stdin], [], [], _IDLE_S)[0] or not (told := sys.stdin.buffer.read()):
+        return
+    folder, (memory_bytes, cpu_s, written_bytes), module, *arguments = json.loads(told)
     for limit, most in (
-        (resource.RLIMIT_AS, int(memory_bytes)),
-        (resource.RLIMIT_CPU, int(cpu_s)),
-        (resource.RLIMIT_FSIZE, int(written_bytes)),
+        (resource.RLIMIT_AS, memory_bytes),
+        (resource.RLIMIT_CPU, cpu_s),
+        (resource.RLIMIT_FSIZE, written_bytes),
         (resource.RLIMIT_NOFILE, _MOST_FILES),
         (resource.RLIMIT_CORE, 0),
     ):
@@ -209,6 +234,7 @@ def _main(memory_bytes: str, cpu_s: str, written_bytes: str, module: str, *argum
         if allowed != resource.RLIM_INFINITY:
             most = min(most, allowed)
         resource.setrlimit(limit, (most, most))
+    os.chdir(folder)
     sys.argv = [module, *arguments]
     runpy.run_module(module, run_name="__main__", alter_sys=True)
 

@@ -12,6 +12,7 @@ import re
 import typing
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Annotated, Any
 
 from pydantic import (
@@ -19,6 +20,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     ValidationError,
+    ValidationInfo,
     WithJsonSchema,
     model_validator,
 )
@@ -41,6 +43,11 @@ DENSITY_MAX_KG_M3 = 25_000.0
 SHOWN_UNITS = {
     "a length": "mm, cm, m, um, in", "an angle": "deg, rad", "a density": "kg/m3, g/cm3",
 }  # fmt: skip
+NO_FILES = MappingProxyType({"files": False})  #: context of settings that a stranger wrote
+FILES_REFUSED = (
+    "names of files and folders are not taken here",
+    "leave it out, or make it with encode-object",
+)  #: cause and fix
 _QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,4})?)\s*"
     r"(?P<unit>[^\s0-9.,+-][^\s]{0,40})?\s*\Z"
@@ -155,6 +162,18 @@ def path_text(value: Any) -> str:
     return value
 
 
+def refuse_files(value: Any, info: ValidationInfo) -> Any:
+    """Refuse a setting that names a file or a folder, where settings are a stranger's."""
+    if may_name_files(info):
+        return value
+    raise refuse(*FILES_REFUSED)
+
+
+def may_name_files(info: ValidationInfo) -> bool:
+    """Whether what is read may lead to files: not with the context `NO_FILES`."""
+    return info.context is not NO_FILES
+
+
 def whole_number(low: int, high: int, what: str) -> BeforeValidator:
     """Return a validator of whole numbers from `low` to `high`."""
 
@@ -244,7 +263,12 @@ Angle = Annotated[float, BeforeValidator(angle_rad), _schema({}, _ANGLE_TEXT)]
 Density = Annotated[
     float, BeforeValidator(density_kg_m3), _schema({"exclusiveMinimum": 0}, _DENSITY_TEXT)
 ]
-PathText = Annotated[str, BeforeValidator(path_text)]
+PathText = Annotated[
+    str,
+    BeforeValidator(path_text),
+    BeforeValidator(refuse_files),
+    WithJsonSchema({"type": "string", "format": "path"}),
+]
 
 
 def explain_settings(

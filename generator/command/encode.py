@@ -72,6 +72,11 @@ def encode(
                "pitch that auto takes, and what faces promise.", "NAME|FILE"),
     ] = "",
     dry_run: Annotated[bool, Option("Say what would be made; write nothing.")] = False,
+    trial: Annotated[
+        Path | None,
+        Option("With --dry-run: a new database with what would be made, to touch it in "
+               "simulation (open-bench --database FILE).", "FILE"),
+    ] = None,
     verify: Annotated[
         bool, Option("Read every file back and prove it (needs the cad and mesh extras).")
     ] = False,
@@ -87,6 +92,9 @@ def encode(
     ] = False,
     yes: Annotated[
         bool, Option("Write where a spec says without a question, also outside its folder.")
+    ] = False,
+    no_files: Annotated[
+        bool, Option("Refuse specs that name files or folders: those of strangers.")
     ] = False,
     printed_check: Annotated[
         bool,
@@ -111,6 +119,8 @@ def encode(
         raise UsageError("no spec is named")
     if not printed_check and (print_profile or print_faults):
         raise UsageError("print profile and faults need --printed-check")
+    if trial and not dry_run:
+        raise UsageError("--trial needs --dry-run")
     from encoded_objects.base.output import progress_bar
     from generator.spec import read_specs
     from generator.spec.option import database_option, format_option, sensor_type_option
@@ -118,7 +128,7 @@ def encode(
     wanted = format_option(formats) if formats and not printed_check else None
     url = database_option(database) if database else None
     sensor = sensor_type_option(sensor_type) if sensor_type else ""
-    found = read_specs(specs, database=url, sensor_type=sensor)
+    found = read_specs(specs, database=url, sensor_type=sensor, files=not no_files)
     if not (yes or dry_run):
         _confirm_places(found, folder, url, as_json=as_json)
     with progress_bar("reading", 1) as bar:
@@ -141,8 +151,8 @@ def encode(
 
             made = make(
                 found, folder=folder, formats=wanted, database=url, lab_key=lab_key,
-                dry_run=dry_run, verify=verify, slice_plates=slice_plates, replace=replace,
-                progress=progress, jobs=jobs,
+                dry_run=dry_run, trial=trial, verify=verify, slice_plates=slice_plates,
+                replace=replace, progress=progress, jobs=jobs,
             )  # fmt: skip
     if printed_check:
         print_printed(checked, as_json=as_json)

@@ -38,7 +38,8 @@ class ExportedObject:
     bed_mm: Size = (250.0, 210.0)
     slicer: SlicerSettings | None = None  #: None for a printer without a nozzle
     density_kg_m3: float = 1240.0
-    symbols_collide: bool = False
+    stroke_mm: float = 1.0  #: of the symbols
+    touch: bool = True  #: simulators feel them
 
     @cached_property
     def plates(self) -> tuple[PrintFile, ...]:
@@ -49,12 +50,12 @@ class ExportedObject:
 
     @cached_property
     def robot(self) -> RobotModel:
-        """One rigid body; raises `SolidError` if symbols on a round face are to collide."""
+        """One rigid body."""
         from generator.export.robot.model import robot_model
 
         return robot_model(
             self.name, self.polyhedron, self.parts, self.meshes,
-            density_kg_m3=self.density_kg_m3, symbols_collide=self.symbols_collide,
+            density_kg_m3=self.density_kg_m3, stroke_mm=self.stroke_mm, touch=self.touch,
         )  # fmt: skip
 
 
@@ -91,7 +92,7 @@ EXPORTERS = {
                  verify=f"{_ROBOT}.xml_files:verify_urdf", robot=True),
         Exporter("sdf", ".sdf", write=f"{_ROBOT}.xml_files:write_sdf",
                  verify=f"{_ROBOT}.xml_files:verify_sdf", robot=True),
-        Exporter("usd", ".usda", write=f"{_ROBOT}.usd:write", verify=f"{_ROBOT}.usd:verify",
+        Exporter("usd", ".usdc", write=f"{_ROBOT}.usd:write", verify=f"{_ROBOT}.usd:verify",
                  robot=True),
     )
 }  # fmt: skip

@@ -19,13 +19,14 @@ from sqlalchemy import Connection, Engine
 from generator.database.cells import occupancy
 from generator.database.lab import lab_key as stored_lab_key
 from generator.database.open import open_database, open_if_there
-from generator.database.transaction import read_transaction
+from generator.database.register import register
+from generator.database.transaction import read_transaction, write_transaction
 from generator.export.atomic import remove_leftovers
 from generator.pipeline.choose import ArrayChoice, choose_array, lab_of
 from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
 from generator.pipeline.made import Encoded, MadeObject, describe_object
-from generator.pipeline.make import MakeJob, make_under_lock
+from generator.pipeline.make import MakeJob, make_under_lock, object_record
 from generator.pipeline.place import PlacedObject, place_in_turn, place_object
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
@@ -41,6 +42,7 @@ def encode(
     database: str | None = None,
     lab_key: str = "",
     dry_run: bool = False,
+    trial: Path | None = None,
     verify: bool = False,
     slice_plates: bool = False,
     replace: bool = False,
@@ -61,6 +63,8 @@ def encode(
         Of a new database, in place of the specs' own; drawn where neither says one.
     dry_run
         Plan, lay out and build, but write nothing: no file, no row, no new database.
+    trial
+        Of a dry run: a new database file that takes the objects down, to touch them in simulation.
     verify
         Read STEP and STL back through the CAD kernel and the mesh library before anything
         is kept; needs the extras `cad` and `mesh`.
@@ -88,6 +92,10 @@ def encode(
     if engine is None or dry_run:
         with read_transaction(engine) if engine else nullcontext() as connection:
             made, used = _dry_run(connection, plans, replace, rest)
+        if trial is not None:
+            with write_transaction(open_database(f"sqlite:///{trial}")) as connection:
+                for plan, one in zip(plans, made, strict=True):
+                    register(connection, object_record(plan, one.layout), replace=False)
     else:
         to_make = [
             MakeJob(

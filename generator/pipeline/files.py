@@ -2,7 +2,7 @@
 
 `NAME-F1.step`, `NAME-F1.stl`, ... one per part in its local origin; `NAME.step`, the panels as an
 assembly (`.stpz`: gzipped); `NAME.3mf` and `NAME-prusaslicer.3mf` for each plate of the printer;
-`NAME.glb` assembled; `NAME.xml`, `NAME.urdf`, `NAME.sdf` with their meshes and `NAME.usda` for
+`NAME.glb` assembled; `NAME.xml`, `NAME.urdf`, `NAME.sdf` with their meshes and `NAME.usdc` for
 robots; the picture `NAME.png`, the build sheet `NAME-build.html`, and `NAME-array.svg`.
 """
 
@@ -82,12 +82,9 @@ def stage(
     meshes = [triangles(part) for part in parts]
     exported = ExportedObject(
         spec.name, plan.polyhedron, parts, meshes, plan.printer.bed_mm, settings_of(plan),
-        density_kg_m3=spec.density_kg_m3, symbols_collide=spec.collision == "symbols",
+        density_kg_m3=spec.density_kg_m3, stroke_mm=spec.style.stroke_mm,
+        touch=spec.collision == "touch",
     )  # fmt: skip
-    for_robots = any(EXPORTERS[name].robot for name in formats)
-    if for_robots:
-        with error_location(plan.spec.source, "robot.collision, robot"):
-            _ = exported.robot
     staged = stage_formats(exported, formats, staging, verify=verify, progress=progress)
     registered = tuple(
         RegisteredPart(part.name, kind, str(file.path), file.sha256, part.T_object_part)
@@ -122,7 +119,7 @@ def stage(
             width, depth = plan.printer.bed_mm
             bed = f"the bed of {plan.printer.name}, {width:g} x {depth:g} mm"
             warnings += (f"plate {', '.join(large)}: larger than {bed}; print it elsewhere",)
-    if for_robots:
+    if any(EXPORTERS[name].robot for name in formats):
         warnings += exported.robot.warnings
     progress("drawing", 0.85)
     size = outer_size_mm(plan.polyhedron, parts).tolist()

@@ -18,8 +18,10 @@ from sqlalchemy import Connection, Engine
 from generator.database.open import part_file, part_path
 from generator.database.read import find_object, read_parts
 from generator.database.register import ObjectRecord, register
+from generator.database.registered import RegisteredPart
 from generator.database.transaction import WriteConflictError, write_transaction
 from generator.export.atomic import Staging
+from generator.layout.placement import Layout
 from generator.pipeline.files import StagedObject, parts_of, stage
 from generator.pipeline.made import MadeObject, describe_object
 from generator.pipeline.place import PlacedObject, occupancy_of, place_object
@@ -110,10 +112,21 @@ def _register(
     plan, url = job.plan, connection.engine.url
     if not (job.replace or has_files_in(connection, plan.spec.name, job.folder)):
         staging.refuse_others()
-    registration = ObjectRecord(
+    parts = tuple(
+        dataclasses.replace(part, file=part_file(url, part.file)) for part in staged.registered
+    )
+    record = object_record(plan, placed.layout, parts)
+    register(connection, record, replace=placed.replaces)
+
+
+def object_record(
+    plan: ObjectPlan, layout: Layout, parts: tuple[RegisteredPart, ...] = ()
+) -> ObjectRecord:
+    """Return what a database takes down of an object."""
+    return ObjectRecord(
         name=plan.spec.name,
         polyhedron=plan.polyhedron,
-        layout=placed.layout,
+        layout=layout,
         array=plan.array,
         profile=plan.spec.profile,
         lab_key=plan.spec.array_key,
@@ -121,11 +134,8 @@ def _register(
         style=plan.spec.style,
         spec=plan.meaning,
         tool_version=version("encoded-objects"),
-        parts=tuple(
-            dataclasses.replace(part, file=part_file(url, part.file)) for part in staged.registered
-        ),
+        parts=parts,
     )
-    register(connection, registration, replace=placed.replaces)
 
 
 def _commit(

@@ -27,6 +27,7 @@ DEPTH_MM = 0.1
 _MOST = 128  # pieces, after which nothing is cut: simulators slow down with each
 _THIN_MM = 0.02  # a thinner piece is left out: no simulator feels it
 _FLAT = 1e-6  # of the body's size: less is rounding
+_DIGITS = 5  # of mm: a hull of points that are almost in a plane may turn triangles inside out
 _APART = 1e-3  # of that: how far pieces are cut apart
 
 
@@ -38,10 +39,11 @@ class ConvexPieces:
     depth_mm: float  #: how far one of them stands out of the body, at most
 
 
-def convex_pieces(vertices: Points, triangles: Index) -> ConvexPieces:
+def convex_pieces(vertices: Points, triangles: Index, upon: Points | None = None) -> ConvexPieces:
     """Return the convex pieces of a closed mesh, the largest first.
 
-    Raises `SolidError` if the triangles close no body.
+    `upon` (n, 3) mm are points of what stands on it: every piece reaches to those that are nearer
+    to it than to the others. Raises `SolidError` if the triangles close no body.
     """
     body = Manifold(Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(triangles)))
     if body.status() != Error.NoError or body.is_empty():
@@ -67,6 +69,12 @@ def convex_pieces(vertices: Points, triangles: Index) -> ConvexPieces:
             heapq.heappush(waiting, entry(half))
     hulls = sorted((piece.hull() for *_, piece in waiting), key=_order)
     hulls = [hull for hull in hulls if _thickness(hull) > _THIN_MM] or hulls[:1]
+    if upon is not None:
+        heights = np.stack([_heights(hull, upon) for hull in hulls])
+        nearest, outside = heights.argmin(axis=0), heights.min(axis=0) > 0
+        reach = [np.concatenate([_mesh(hull)[0], upon[outside & (nearest == number)]])
+                 for number, hull in enumerate(hulls)]  # fmt: skip
+        hulls = [Manifold.hull_points(points.round(_DIGITS)) for points in reach]
     return ConvexPieces(tuple(map(_mesh, hulls)), -waiting[0][0])
 
 
@@ -122,6 +130,15 @@ def _sides(hull: Manifold) -> tuple[Points, Points]:
     size = np.linalg.norm(normals, axis=1)
     normals = normals[size > 0] / size[size > 0, None]
     return normals, np.einsum("ij,ij->i", normals, sides[size > 0, 0])
+
+
+def _heights(hull: Manifold, points: Points) -> Points:
+    """Return how far points (n, 3) stand out of a convex body, beyond its farthest plane; (n,)."""
+    normals, offsets = _sides(hull)
+    highest = np.full(len(points), -np.inf)
+    for normal, offset in zip(normals, offsets, strict=True):
+        np.maximum(highest, points @ normal - offset, out=highest)
+    return highest
 
 
 def _thickness(hull: Manifold) -> float:

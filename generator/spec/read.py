@@ -16,6 +16,7 @@ import yaml
 from pydantic import ValidationError
 
 from encoded_objects.base.document import Problem
+from encoded_objects.base.settings import FILES_REFUSED, NO_FILES
 from encoded_objects.base.yaml_tree import Place, Tree, read_tree, tree_of
 from generator.array.profiles import PROFILES, family_of
 from generator.spec.explain import explain_errors
@@ -31,7 +32,11 @@ SHARED_BLOCKS = ("symbols", "print", "output")  # merged setting by setting
 
 
 def read_specs(
-    paths: Sequence[Path | str | Tree], *, database: str | None = None, sensor_type: str = ""
+    paths: Sequence[Path | str | Tree],
+    *,
+    database: str | None = None,
+    sensor_type: str = "",
+    files: bool = True,
 ) -> tuple[ObjectSpec, ...]:
     """Read all objects of one run: one ObjectSpec for each object and copy, in the order of files.
 
@@ -43,6 +48,8 @@ def read_specs(
         URL in place of those in the files, which may then name different ones.
     sensor_type
         Name or file in place of what the specs say; empty: as they say.
+    files
+        Whether specs may name files and folders; those of strangers may not.
 
     Raises
     ------
@@ -56,6 +63,7 @@ def read_specs(
     """
     problems: list[Problem] = []
     found: list[ObjectSpec] = []
+    context = None if files else NO_FILES
     for path in paths:
         try:
             source = path if isinstance(path, Tree) else read_tree(Path(path), SPEC)
@@ -64,12 +72,12 @@ def read_specs(
             continue
         problems += source.problems
         origin = _origin(path, source)
-        for written in list(_objects(source, problems)):
+        for written in list(_objects(source, problems, files)):
             tree = written
             if sensor_type and isinstance(tree.value, dict):
                 tree = replace(tree, value={**tree.value, "sensor_type": sensor_type})
             try:
-                settings = ObjectSettings.model_validate(tree.value)
+                settings = ObjectSettings.model_validate(tree.value, context=context)
                 if len(found) + settings.copies <= OBJECTS_MAX:
                     found += [replace(spec, origin=origin) for spec in resolve(settings, tree)]
                 else:
@@ -203,7 +211,7 @@ def _problems_of_read_blocks(error: ValidationError, tree: Tree) -> list[Problem
     return []
 
 
-def _objects(tree: Tree, problems: list[Problem]) -> Iterable[Tree]:
+def _objects(tree: Tree, problems: list[Problem], files: bool) -> Iterable[Tree]:
     """Yield the objects of a file; those of a set with the set's defaults merged in."""
     if not isinstance(tree.value, dict) or "objects" not in tree.value:
         yield tree
@@ -222,7 +230,9 @@ def _objects(tree: Tree, problems: list[Problem]) -> Iterable[Tree]:
         return
     for own in tree.parts()["objects"].parts().values():
         entry = own.value
-        if isinstance(entry, str):
+        if isinstance(entry, str) and not files:
+            problems.append(Problem(*FILES_REFUSED, own.value_mark(())))
+        elif isinstance(entry, str):
             if file := _object_file(tree.folder / entry, own, problems):
                 yield _merge(shared, file)
         elif isinstance(entry, dict):

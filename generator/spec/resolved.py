@@ -73,7 +73,7 @@ class ObjectSpec:
     lab_key: str = ""  #: of the database, where the spec says it
     colours: int = 1  #: of the filament: 2 where it is changed for the symbols
     density_kg_m3: float = 1240.0  #: of what is printed, for robots and simulators
-    collision: Literal["body", "symbols"] = "body"  #: what other bodies hit there
+    collision: Literal["touch", "body"] = "touch"  #: what other bodies hit there
     sensor: SensorType = USUAL_SENSOR  #: what will touch it
     #: name of the file or set that was given: files of a set bear it
     origin: str = field(default="", compare=False)

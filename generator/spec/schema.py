@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import yaml
 from pydantic import TypeAdapter
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
 from encoded_objects.base.json_schema import DescribedSchema
 from generator.spec.settings import ObjectSettings, SetSettings
-from generator.spec.shape import Shape
+from generator.spec.shape import EXAMPLES, Shape
 
 
 class _SpecSchema(DescribedSchema):
@@ -28,6 +29,9 @@ def spec_schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of a spec file: an object, or a set."""
     schema = TypeAdapter(ObjectSettings | SetSettings).json_schema(schema_generator=_SpecSchema)
     shape = schema["$defs"][Shape.__name__]
+    for kind, text in EXAMPLES.items():
+        if "..." not in text:
+            shape["properties"][kind]["examples"] = [yaml.safe_load(text)[kind]]
     one_kind = {"minProperties": 1, "maxProperties": 1}
     file_with_scale = {"required": ["file"], "maxProperties": 2}
     shape |= {"if": {"required": ["scale"]}, "then": file_with_scale, "else": one_kind}

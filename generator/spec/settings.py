@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
 from encoded_objects.base.document import did_you_mean, suggest
 from encoded_objects.base.files import name_fault
@@ -23,7 +23,9 @@ from encoded_objects.base.settings import (
     Length,
     LengthOrZero,
     PathText,
+    may_name_files,
     refuse,
+    refuse_files,
     whole_number,
 )
 from generator.alphabet.known import ALPHABETS
@@ -103,10 +105,15 @@ def database_url(value: Any) -> str:
     return value
 
 
-def sensor_type_name(value: Any) -> str:
+def sensor_type_name(value: Any, info: ValidationInfo) -> str:
     """Return the name of a sensor type, or of its file; unknown names are refused later."""
     if not isinstance(value, str) or not value.strip() or not value.isprintable():
         raise refuse("a sensor type is a name or a file", "write, for example, gel-24x32")
+    if not may_name_files(info):
+        from encoded_objects.base.sensor_type_file import shipped_names  # costs start-up
+
+        if value not in shipped_names():
+            raise refuse(f"'{value}' is no sensor type", f"take {', '.join(shipped_names())}")
     return value
 
 
@@ -220,7 +227,12 @@ FormatList = Annotated[
     BeforeValidator(format_list, json_schema_input_type=list[Format] | str),
 ]
 SensorTypeName = Annotated[str, BeforeValidator(sensor_type_name)]
-DatabaseUrl = Annotated[str, BeforeValidator(database_url)]
+DatabaseUrl = Annotated[
+    str,
+    BeforeValidator(database_url),
+    BeforeValidator(refuse_files),
+    WithJsonSchema({"type": "string", "format": "path"}),
+]
 LabKey = Annotated[str, BeforeValidator(lab_key)]
 ObjectName = Annotated[str, BeforeValidator(object_name)]
 Order = Annotated[int, Field(ge=2, le=ORDER_MAX), whole_number(2, ORDER_MAX, "order")]
@@ -404,8 +416,9 @@ class Robot(Block):
 
     density: Density | None = None
     """Of what is printed; the printer's plastic, all solid, if left out."""
-    collision: Literal["body", "symbols"] = "body"
-    """What other bodies hit: body, the plain shape as convex pieces; symbols, these too."""
+    collision: Literal["touch", "body"] = "touch"
+    """What collides: touch, all parts with their symbols as one closed mesh, which simulators
+    feel; body, a few convex pieces to the tops of the symbols: fast, and nothing to read."""
 
 
 class Output(Block):

@@ -42,7 +42,7 @@ name: {name}
 
 # robot:                 # what mjcf, urdf, sdf and usd files say
 #   density: 1.24 g/cm3
-#   collision: body      # body (the plain shape as convex pieces) | symbols (these too)
+#   collision: touch     # touch (simulators feel the symbols) | body (convex pieces: fast)
 
 # output:
 #   folder: out/{folder}

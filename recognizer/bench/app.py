@@ -3,7 +3,7 @@
     GET   /                          the page        /static/...
     WS    /live                      frames, mosaics (bytes) and topics (JSON); takes {"filter"}
 
-What is refused is `{"error": {"cause", "fix", "place"}}`.
+What is refused is `{"error": {"cause", "fix", "place", ...}}`.
 """
 
 from __future__ import annotations
@@ -120,8 +120,7 @@ def _filter_name(text: str) -> str | None:
 
 async def _error_response(_request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, EncodedObjectsError)
-    values = {"cause": error.cause, "fix": error.fix, "place": error.place}
-    return JSONResponse({"error": values}, status_code=getattr(error, "status", 400))
+    return JSONResponse({"error": error.as_json()}, status_code=getattr(error, "status", 400))
 
 
 async def _invalid_response(_request: Request, error: Exception) -> JSONResponse:

@@ -3,7 +3,7 @@
 What a stranger wrote is opened by the HDF5 library there alone, with limits of memory, time, room
 and open files; the server opens the copy. Prints `{"frames": N}`, or the error, as JSON::
 
-    python -m encoded_objects.base.foreign ... recognizer.bench.convert SENT COPY
+    python -m recognizer.bench.convert SENT COPY
 """
 
 from __future__ import annotations

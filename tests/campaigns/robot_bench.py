@@ -2,7 +2,7 @@
 
     python tests/campaigns/robot_bench.py -o OUT.jsonl --trials 67 --seed 1
 
-Three objects a trial in the world of `docs/examples/mujoco_bench.py`. In every eighth trial each is
+Three objects a trial in the world of `robot_world.py`. In every eighth trial each is
 touched `--more` times again at other places of its face, then moved (1, 2, 5, 10 mm, 1, 2, 5
 degrees in turn) and touched once more. A line of JSON a trial; trials that are in OUT are not run
 again. Prints errors and covariances after 1, 2, 3 ... touches, and how often a move was noticed.
@@ -11,19 +11,15 @@ again. Prints errors and covariances after 1, 2, 3 ... touches, and how often a 
 from __future__ import annotations
 
 import math
-import sys
 from functools import partial
-from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
+import robot_world as world
 import runner
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "examples"))
-import mujoco
-import mujoco_bench as world
 
 from probe.arm import SensorPose
 from probe.errors import PoseError

@@ -79,7 +79,7 @@ OPTIONS: Cases = (
     ("whole-cylinder", "step,3mf", _ROD + "print: {parts: whole}"),
     ("whole-bracket", "step,stl", "shape: {file: SHAPES/l_bracket.stl}\nprint: {parts: whole}"),
     ("two-colours", "3mf,glb,step", _SMALL + "print: {colours: 2}"),
-    ("collision-symbols", "mjcf,urdf,sdf,usd", _SMALL + "robot: {collision: symbols}"),
+    ("collision-body", "mjcf,urdf,sdf,usd", _SMALL + "robot: {collision: body}"),
     ("density", "mjcf,urdf,sdf,usd", _SMALL + "robot: {density: 2.7 g/cm3}"),
     ("layout-net", "step,stl", _SMALL + "layout: net"),
     ("layout-faces", "step,stl", _SMALL + "layout: faces"),
@@ -101,7 +101,7 @@ OPTIONS: Cases = (
     ("set", "step,stl,3mf,glb", _SHELF),
 )  # fmt: skip
 
-GEOMETRY = {"step", "stl", "glb", "obj", "xml", "urdf", "sdf", "usda", "mtl"}
+GEOMETRY = {"step", "stl", "glb", "obj", "xml", "urdf", "sdf", "usdc", "mtl"}
 PACKED = {"3mf", "stpz", "png"}
 _SAMPLE = b"".join(b"%d " % (k * k % 9973) for k in range(20_000))
 DEFLATE = "a65a"  #: how the zlib of the stored corpus packs `_SAMPLE`

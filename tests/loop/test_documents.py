@@ -86,6 +86,7 @@ def said_by():
 SAID = {
     "decode_windows": r"row 1, column 61 \(t = 2206\)\n.*\n2206\n.*Cube/F1\n",
     "encode_set": r"Cube:.*\nBox-1:.*\nBox-2:(?s:.*)\n\d+ of 262143 cells in use\n(?s:.*)",
+    "mujoco_press": r"Cube/F6 at \(.*\n",
     "follow_port": r"(?s:.*)Cube/F1(?s:.*)",
     "report": r"40 touches: \d+ right, 0 wrong, (?s:.*)True\n",
     "scan": r"(?s:.*)touches: Plate\n",
@@ -149,9 +150,18 @@ def test_trimesh_part(tmp_path, said_by):
     assert 320 < int(symbols) < 350  # of 5 mm; how faces are laid out depends on the lab's array
 
 
-def test_mujoco_bench(tmp_path, said_by):
+def test_mujoco_arm(tmp_path, said_by):
+    """Two parts in MuJoCo, found by what MuJoCo's own tactile sensor feels of their files."""
+    told = re.findall(r"^(\w+) lies at .* with F\d up, found by touch alone, ([\d.]+) mm",
+                      said_by("mujoco_arm", tmp_path), re.MULTILINE)  # fmt: skip
+    assert [name for name, _ in told] == ["Cube", "Prism"]
+    assert max(float(off) for _, off in told) < 1.0
+
+
+def test_robot_world(tmp_path, said_by):
     """Three objects on a table, found by touch alone; poses as the simulator has them."""
-    told = [json.loads(line) for line in said_by("mujoco_bench", tmp_path).splitlines()]
+    said = said_by("../../tests/campaigns/robot_world", tmp_path)
+    told = [json.loads(line) for line in said.splitlines()]
     assert [one["answer"] for one in told] == [one["object"] for one in told]
     assert {one["object"] for one in told} == {"Cube", "Box", "Prism"}
     assert max(one["position_mm"] for one in told) < 2.0
@@ -162,7 +172,7 @@ def test_mujoco_bench(tmp_path, said_by):
 def test_examples_are_short_and_all_shown_and_run():
     scripts = {path.stem: path.read_text() for path in EXAMPLES.glob("*.py")}
     long = {stem for stem, text in scripts.items() if text.count("\n") > 30}
-    assert long == {"mujoco_bench"}  # a world
+    assert long == {"mujoco_arm"}  # a world
     shown = re.findall(r"examples/(\w+)\.py", (EXAMPLES.parent / "examples.md").read_text())
     assert sorted(shown) == sorted(scripts)
     assert {f"test_{stem}" for stem in scripts if stem not in SAID} <= set(globals())

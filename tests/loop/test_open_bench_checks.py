@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
+import io
 import random
 import re
 
 import httpx
+import numpy as np
 import pytest
 from bench_page import (
     PATIENCE_MS,
@@ -18,6 +19,7 @@ from bench_page import (
     until,
     until_redrawn,
 )
+from PIL import Image
 from playwright.sync_api import expect
 
 from generator.database.as_built import read_as_built
@@ -98,8 +100,11 @@ def test_what_is_promised_colours_the_faces_and_is_said(page, bench):
     )
     told = httpx.get(f"{bench}api/promise/Cube").json()["faces"]
     assert len(told) == 6
-    expect(faces).to_contain_text(f"F1: {math.floor(100 * told['F1']['at_once'] + 0.5)} %")
+    expect(faces).to_contain_text(f"F1: {told['F1']['at_once']:.0%}".replace("%", " %"))
     until_redrawn(page.get_by_test_id("part"), plain)
+    with Image.open(io.BytesIO(page.get_by_test_id("part").screenshot())) as picture:
+        _, green, blue = np.moveaxis(np.asarray(picture.convert("RGB"), int), 2, 0)
+    assert np.mean(green - blue > 80) > 0.05  # 92 % are nearly yellow
     shown(page, "Cylinder")
     round_face = re.compile(r"F2: \d+ % of touches answered at once")
     expect(faces).to_contain_text(round_face, timeout=PATIENCE_MS)

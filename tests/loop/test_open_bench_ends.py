@@ -12,7 +12,8 @@ SOON_S = 4.0  #: alone it takes half of that at most; other tests run beside it
     ("load", "number"),
     [
         ("dripping bodies", signal.SIGINT),
-        ("promises", signal.SIGTERM), ("example", signal.SIGINT), ("loads", signal.SIGTERM),
+        ("promises", signal.SIGTERM), ("example", signal.SIGINT),
+        ("making", signal.SIGTERM), ("loads", signal.SIGTERM),
         ("messages", signal.SIGINT),
         ("silent port", signal.SIGINT),
     ],

@@ -10,6 +10,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 POSE = {"pose": "?"}
+DRAKE = "{http://drake.mit.edu}proximity_properties"  # elements of other namespaces are allowed
 SPECIFICATION: dict[str, tuple[dict[str, bool], dict[str, str]]] = {
     "sdf": ({"version": True}, {"model": "?", "world": "*"}),
     "model": (
@@ -24,7 +25,8 @@ SPECIFICATION: dict[str, tuple[dict[str, bool], dict[str, str]]] = {
     "inertial": ({}, {"mass": "?", "inertia": "?", **POSE}),
     "inertia": ({}, dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "1")),
     "visual": ({"name": True}, {"geometry": "1", "material": "?", "transparency": "?", **POSE}),
-    "collision": ({"name": True}, {"geometry": "1", "surface": "?", **POSE}),
+    "collision": ({"name": True}, {"geometry": "1", "surface": "?", DRAKE: "?", **POSE}),
+    DRAKE: ({}, {"{http://drake.mit.edu}rigid_hydroelastic": "?"}),
     "geometry": ({}, {"mesh": "?", "box": "?"}),
     "mesh": ({}, {"uri": "1", "submesh": "?", "scale": "?"}),
     "material": ({}, {"ambient": "?", "diffuse": "?", "specular": "?", "emissive": "?"}),

@@ -15,7 +15,8 @@ import pytest
 from supply import CONSTRAINTS, ROOT, canonical, declared, needed
 
 OURS = ("encoded_objects", "generator", "decoder", "probe", "recognizer")
-APART = {"calib_targets"}  #: a peer of benchmarks, which say how to install it
+#: peers of benchmarks and campaigns, which say how to install them
+APART = {"calib_targets", "newton", "pydrake"}
 
 
 def imported(folder):

@@ -1,10 +1,10 @@
 """Parts -> the object as one rigid body, and what the files of robots share.
 
-Seen: the bodies of all parts in one mesh, and the symbols. Hit: the plain shape as convex
-pieces, and where asked for the symbols as convex pieces of their own, each piece one mesh that
-stands wherever its symbol does. Mass, centre and inertia: of the parts as they are printed,
-symbols and marks included, all solid; an object of panels is hollow. Metres, kilograms, radians;
-the origin is that of the object frame, so that the frame of a face is its `T_object_face`.
+Visual: the bodies of all parts in one mesh, and the symbols. Collision: one closed mesh of all
+parts with their symbols, which simulators feel, or convex pieces that reach to the tops of the
+symbols. Mass, centre and inertia: of the parts as they are printed, symbols and marks included,
+all solid; an object of panels is hollow. Metres, kilograms, radians; the origin is that of the
+object frame, so that the frame of a face is its `T_object_face`.
 """
 
 from __future__ import annotations
@@ -24,10 +24,9 @@ from generator.export.meshes import join_meshes
 from generator.layout.placement import Layout
 from generator.polyhedron import Polyhedron, face_frame
 from generator.solid import Mesh, Part, body_mesh, emboss_whole, symbol_meshes
-from generator.solid.convex import DEPTH_MM, ConvexPieces, convex_pieces
+from generator.solid.convex import DEPTH_MM, convex_pieces
 from generator.solid.measure import inertia_of
-from generator.solid.part import to_part, transform, turn
-from generator.solid.triangulate import template_of
+from generator.solid.part import transform
 
 Floats = NDArray[np.float64]
 M = 1e-3  #: metres in a millimetre
@@ -49,14 +48,6 @@ class ModelMesh:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PlacedMesh:
-    """A mesh and where it stands."""
-
-    mesh: ModelMesh
-    T_object_mesh: Floats  #: (4, 4) m
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class FaceFrame:
     """A face and its frame."""
 
@@ -74,14 +65,16 @@ class RobotModel:
     centre_m: Floats  #: (3,) of mass, object frame
     inertia_kg_m2: Floats  #: (3, 3) about the centre of mass, axes of the object
     visuals: tuple[ModelMesh, ...]
-    collisions: tuple[PlacedMesh, ...]  #: convex each
+    touch: ModelMesh | None  #: all parts with their symbols, closed; None: the pieces collide
+    pieces: tuple[ModelMesh, ...]  #: convex each, to the tops of the symbols
     frames: tuple[FaceFrame, ...]
+    stroke_m: float = 1e-3  #: width of the symbols' strokes
     warnings: tuple[str, ...] = ()
 
     @property
-    def meshes(self) -> tuple[ModelMesh, ...]:
-        """All meshes, each once."""
-        return tuple(dict.fromkeys((*self.visuals, *(c.mesh for c in self.collisions))))
+    def colliders(self) -> tuple[ModelMesh, ...]:
+        """What collides, where a collider need not be convex."""
+        return (self.touch,) if self.touch else self.pieces
 
 
 def robot_model(
@@ -91,29 +84,29 @@ def robot_model(
     meshes: Sequence[Mesh],
     *,
     density_kg_m3: float,
-    symbols_collide: bool = False,
+    stroke_mm: float,
+    touch: bool = True,
 ) -> RobotModel:
     """Return the model of an object; `meshes` of its parts, part frame, mm.
 
-    Raises `SolidError` if symbols on a round face are to collide.
+    Parts never overlap, so their meshes side by side are their union.
     """
-    corners = [
-        transform(part.T_object_part, mesh.vertices)[mesh.triangles]
+    vertices, triangles = join_meshes(
+        (transform(part.T_object_part, mesh.vertices), mesh.triangles)
         for part, mesh in zip(parts, meshes, strict=True)
-    ]
-    inertia = inertia_of(np.concatenate(corners))
-    body, warnings = _body_pieces(name, polyhedron)
-    placed = [PlacedMesh(mesh, np.eye(4)) for mesh in body]
-    if symbols_collide:
-        placed += _placed_symbols(name, parts)
+    )
+    inertia = inertia_of(vertices[triangles])
+    pieces, warnings = _pieces(name, polyhedron, vertices)
     return RobotModel(
         name=name,
         mass_kg=density_kg_m3 * inertia.volume * M**3,
         centre_m=inertia.centre * M,
         inertia_kg_m2=density_kg_m3 * inertia.tensor * M**5,
         visuals=tuple(_visuals(name, parts)),
-        collisions=tuple(placed),
+        touch=ModelMesh(f"{name}-touch", M * vertices, triangles) if touch else None,
+        pieces=pieces,
         frames=tuple(_frames(name, polyhedron)),
+        stroke_m=stroke_mm * M,
         warnings=warnings,
     )
 
@@ -131,51 +124,24 @@ def _visuals(name: str, parts: Sequence[Part]) -> Iterator[ModelMesh]:
         yield _joined(f"{name}-visual-symbols", symbols, SYMBOL_RGB)
 
 
-def _body_pieces(name: str, polyhedron: Polyhedron) -> tuple[list[ModelMesh], tuple[str, ...]]:
-    """Return the plain shape as convex meshes, and what they lack."""
+def _pieces(
+    name: str, polyhedron: Polyhedron, vertices: Floats
+) -> tuple[tuple[ModelMesh, ...], tuple[str, ...]]:
+    """Return the shape as convex meshes, and what they lack; `vertices` of its parts."""
     plain = emboss_whole(polyhedron, Layout("faces", 1.0, ()), (), name)
     mesh = body_mesh(plain)
-    found = convex_pieces(transform(plain.T_object_part, mesh.vertices), mesh.triangles)
+    body = transform(plain.T_object_part, mesh.vertices)
+    found = convex_pieces(body, mesh.triangles, vertices)
     warnings: tuple[str, ...] = ()
     if found.depth_mm > DEPTH_MM:
         warnings = (
             f"{len(found.pieces)} convex collision pieces stand out up to {found.depth_mm:.1f} mm",
         )
-    return _piece_meshes(f"{name}-collision", found), warnings
-
-
-def _placed_symbols(name: str, parts: Sequence[Part]) -> Iterator[PlacedMesh]:
-    """Yield the convex pieces of every symbol where they stand."""
-    pieces: dict[int, list[ModelMesh]] = {}
-    for part in parts:
-        if part.wrapped:
-            raise SolidError(
-                "symbols on a round face cannot collide: each is bent in its own way",
-                fix="set robot: {collision: body}",
-                place=part.name,
-            )
-        for embossing in part.embossings:
-            if embossing.face is None:
-                continue
-            T_part_symbol = embossing.T_part_facet.copy()
-            T_part_symbol[:3, :2] = T_part_symbol[:3, :2] @ turn(embossing.rotation_rad)
-            centres = to_part(embossing, embossing.centres_mm, 0.0)
-            for label, centre in zip(embossing.labels.tolist(), centres, strict=True):
-                if label not in pieces:
-                    solid = template_of(embossing.tiers[label], closed=True)
-                    found = convex_pieces(solid.points, solid.own)
-                    pieces[label] = _piece_meshes(f"{name}-symbol-{label}", found)
-                T_part_symbol[:3, 3] = centre
-                T = part.T_object_part @ T_part_symbol
-                T[:3, 3] *= M
-                yield from (PlacedMesh(mesh, T) for mesh in pieces[label])
-
-
-def _piece_meshes(stem: str, found: ConvexPieces) -> list[ModelMesh]:
-    return [
-        ModelMesh(f"{stem}-{number}", M * vertices, triangles)
-        for number, (vertices, triangles) in enumerate(found.pieces, 1)
-    ]
+    meshes = (
+        ModelMesh(f"{name}-collision-{number}", M * corners, triangles)
+        for number, (corners, triangles) in enumerate(found.pieces, 1)
+    )
+    return tuple(meshes), warnings
 
 
 def _frames(name: str, polyhedron: Polyhedron) -> Iterator[FaceFrame]:
@@ -197,9 +163,9 @@ def _joined(
     return ModelMesh(name, M * vertices, triangles, colour)
 
 
-def mesh_files(model: RobotModel) -> Iterator[tuple[str, Iterator[bytes]]]:
+def mesh_files(meshes: Iterable[ModelMesh]) -> Iterator[tuple[str, Iterator[bytes]]]:
     """Yield name and content of the files of meshes, Wavefront OBJ."""
-    for mesh in model.meshes:
+    for mesh in meshes:
         yield f"{mesh.name}.obj", _obj(mesh)
 
 

@@ -1,9 +1,13 @@
 """Robot model -> MJCF, SDFormat and URDF, each read back by another program.
 
-MJCF, for MuJoCo: a free body, geoms in group 2 (seen) and 3 (hit), a site for every face.
+MJCF, for MuJoCo: a free body, geoms in group 2 (visual) and 3 (collision), a site for every face.
+MuJoCo's contacts are of convex bodies: pieces bear the part. A `tactile` sensor feels the meshes
+that are in contact and have an octree: that of the touch mesh comes from a geom of type sdf.
 SDFormat 1.9, for Gazebo: a model of one link, frames `F1`, ... in its scope, `Cube::F1` outside.
-URDF: one link, and a fixed link for every face. Mesh files are named relative to the file, which
-yourdfpy, PyBullet and Drake follow; ROS wants `package://` before them.
+URDF: one link, and a fixed link for every face. Both tell Drake to make the touch mesh the rigid
+side of a hydroelastic contact: of a compliant mesh it would take the convex hull. Mesh files are
+named relative to the file, which yourdfpy, PyBullet and Drake follow; ROS wants `package://`
+before them.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ from generator.export.colours import hexadecimal
 from generator.export.formats import ExportedObject, Files
 from generator.export.robot.model import (
     Floats,
+    ModelMesh,
     ReadModel,
     RobotModel,
     compare_model,
@@ -35,11 +40,16 @@ from generator.export.robot.model import (
 )
 
 LINK = "body"  #: of an SDFormat model
+DRAKE = "http://drake.mit.edu"  #: namespace of what Drake alone reads
+#: Of contacts of the touch mesh: listed, so that a tactile sensor finds them, and almost without
+#: force (MuJoCo takes an impedance of 0 as 1e-4); as its hull, the mesh would fill every notch.
+_FORCELESS = {"priority": "1", "solimp": "0 0 0.001"}
 _MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
+ElementTree.register_namespace("drake", DRAKE)
 
 
 def mjcf_bytes(model: RobotModel) -> bytes:
-    """Return the MJCF file; its mesh files are named as `RobotModel.meshes`."""
+    """Return the MJCF file; its mesh files are named as the meshes of `_mjcf_meshes`."""
     root = Element("mujoco", model=model.name)
     SubElement(root, "compiler", angle="radian", autolimits="true")
     default = SubElement(root, "default")
@@ -48,7 +58,7 @@ def mjcf_bytes(model: RobotModel) -> bytes:
     hit = SubElement(default, "default", {"class": f"{model.name}-collision"})
     SubElement(hit, "geom", type="mesh", group="3", mass="0")
     asset = SubElement(root, "asset")
-    for mesh in model.meshes:
+    for mesh in _mjcf_meshes(model):
         SubElement(asset, "mesh", name=mesh.name, file=f"{mesh.name}.obj")
     body = SubElement(SubElement(root, "worldbody"), "body", name=model.name)
     SubElement(body, "freejoint", name=model.name)
@@ -62,13 +72,21 @@ def mjcf_bytes(model: RobotModel) -> bytes:
             body, "geom", {"class": f"{model.name}-visual"}, name=mesh.name, mesh=mesh.name,
             rgba=rgba(mesh.colour),
         )  # fmt: skip
-    for placed in model.collisions:
-        which = {"class": f"{model.name}-collision", "mesh": placed.mesh.name}
-        SubElement(body, "geom", which | _place(placed.T_object_mesh))
+    for mesh in model.pieces:
+        SubElement(body, "geom", {"class": f"{model.name}-collision"}, mesh=mesh.name)
+    if model.touch:
+        which = {"class": f"{model.name}-collision", "mesh": model.touch.name}
+        SubElement(body, "geom", {**which, "name": model.touch.name, **_FORCELESS})
+        off = {"contype": "0", "conaffinity": "0"}
+        SubElement(body, "geom", {**which, "type": "sdf", **off})
     for frame in model.frames:
         site = {"name": frame.name, **_place(frame.T_object_face), "size": "0.001", "group": "4"}
         SubElement(body, "site", site)
     return _document(root)
+
+
+def _mjcf_meshes(model: RobotModel) -> tuple[ModelMesh, ...]:
+    return (*model.visuals, *model.pieces, *([model.touch] if model.touch else []))
 
 
 def read_mjcf(model: RobotModel, path: Path) -> ReadModel:
@@ -90,7 +108,7 @@ def read_mjcf(model: RobotModel, path: Path) -> ReadModel:
 
 
 def sdf_bytes(model: RobotModel) -> bytes:
-    """Return the SDFormat file; its mesh files are named as `RobotModel.meshes`."""
+    """Return the SDFormat file; its mesh files are named as the meshes of `_meshes`."""
     root = Element("sdf", version="1.9")
     body = SubElement(root, "model", name=model.name)
     for frame in model.frames:
@@ -109,10 +127,10 @@ def sdf_bytes(model: RobotModel) -> bytes:
         material = SubElement(visual, "material")
         SubElement(material, "ambient").text = rgba(mesh.colour)
         SubElement(material, "diffuse").text = rgba(mesh.colour)
-    for number, placed in enumerate(model.collisions, 1):
+    for number, mesh in enumerate(model.colliders, 1):
         collision = SubElement(link, "collision", name=f"collision-{number}")
-        SubElement(collision, "pose").text = pose(placed.T_object_mesh)
-        _mesh_element(collision, uri=f"{placed.mesh.name}.obj")
+        _mesh_element(collision, uri=f"{mesh.name}.obj")
+        _for_drake(collision, model)
     return _document(root)
 
 
@@ -140,7 +158,7 @@ def read_sdf(_model: RobotModel, path: Path) -> ReadModel:
 
 
 def urdf_bytes(model: RobotModel) -> bytes:
-    """Return the URDF file; its mesh files are named as `RobotModel.meshes`."""
+    """Return the URDF file; its mesh files are named as the meshes of `_meshes`."""
     root = Element("robot", name=model.name)
     colours = {mesh.colour: rgba(mesh.colour) for mesh in model.visuals}
     for colour, text in colours.items():
@@ -155,10 +173,10 @@ def urdf_bytes(model: RobotModel) -> bytes:
         visual = SubElement(link, "visual", name=mesh.name)
         _mesh_element(visual, filename=f"{mesh.name}.obj")
         SubElement(visual, "material", name=f"{model.name}-{hexadecimal(mesh.colour)[1:]}")
-    for number, placed in enumerate(model.collisions, 1):
+    for number, mesh in enumerate(model.colliders, 1):
         collision = SubElement(link, "collision", name=f"{model.name}-collision-{number}")
-        SubElement(collision, "origin", _origin(placed.T_object_mesh))
-        _mesh_element(collision, filename=f"{placed.mesh.name}.obj")
+        _mesh_element(collision, filename=f"{mesh.name}.obj")
+        _for_drake(collision, model)
     for frame in model.frames:
         SubElement(root, "link", name=frame.name)
         joint = SubElement(root, "joint", name=f"{frame.name}-joint", type="fixed")
@@ -202,14 +220,29 @@ def _mesh_element(parent: Element, *, uri: str = "", filename: str = "") -> None
         SubElement(SubElement(geometry, "mesh"), "uri").text = uri
 
 
+def _for_drake(collision: Element, model: RobotModel) -> None:
+    if model.touch:
+        properties = SubElement(collision, f"{{{DRAKE}}}proximity_properties")
+        SubElement(properties, f"{{{DRAKE}}}rigid_hydroelastic")
+
+
 def _document(root: Element) -> bytes:
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def _write(suffix: str, content: Callable[[RobotModel], bytes], exported: ExportedObject) -> Files:
-    yield from mesh_files(exported.robot)
+def _meshes(model: RobotModel) -> tuple[ModelMesh, ...]:
+    return (*model.visuals, *model.colliders)
+
+
+def _write(
+    suffix: str,
+    content: Callable[[RobotModel], bytes],
+    meshes: Callable[[RobotModel], tuple[ModelMesh, ...]],
+    exported: ExportedObject,
+) -> Files:
+    yield from mesh_files(meshes(exported.robot))
     yield exported.name + suffix, content(exported.robot)
 
 
@@ -220,6 +253,8 @@ def _verify(
     compare_model(exported.robot, read(exported.robot, path), path)
 
 
-write_mjcf, verify_mjcf = partial(_write, ".xml", mjcf_bytes), partial(_verify, read_mjcf)
-write_sdf, verify_sdf = partial(_write, ".sdf", sdf_bytes), partial(_verify, read_sdf)
-write_urdf, verify_urdf = partial(_write, ".urdf", urdf_bytes), partial(_verify, read_urdf)
+write_mjcf = partial(_write, ".xml", mjcf_bytes, _mjcf_meshes)
+write_sdf = partial(_write, ".sdf", sdf_bytes, _meshes)
+write_urdf = partial(_write, ".urdf", urdf_bytes, _meshes)
+verify_mjcf, verify_sdf = partial(_verify, read_mjcf), partial(_verify, read_sdf)
+verify_urdf = partial(_verify, read_urdf)

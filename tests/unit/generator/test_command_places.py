@@ -67,6 +67,39 @@ def test_a_spec_that_writes_elsewhere_says_where_and_needs_a_yes(bench, output, 
         assert encode_object([path, "--yes"]) == 0
 
 
+@pytest.mark.parametrize(
+    "setting",
+    ["shape: {file: own.stl}", "sensor_type: own", "print: {printer: own.yaml}",
+     "print: {printer: {file: own}}", "symbols: {alphabet: own.yaml}", "output: {folder: out}",
+     "output: {database: own.db}", "objects: [own.yaml]"],
+)  # fmt: skip
+def test_specs_of_strangers_name_no_files(bench, setting, capsys):
+    (bench / "here" / "own").write_text("rows: kept to itself\n")
+    path = bench / "specs" / "cube.yaml"
+    shape = "" if setting.startswith(("shape", "objects")) else "shape: {cube: 40 mm}\n"
+    path.write_text(f"name: Cube\n{shape}{setting}\n")
+    assert encode_object([str(path), "--no-files", "--dry-run"]) == 2
+    said = capsys.readouterr().err
+    assert "are not taken here" in said or "'own' is no sensor type" in said
+    assert "kept" not in said
+    path.write_text("name: Cube\nshape: {cube: 40 mm}\nsensor_type: gel-24x32\n")
+    assert encode_object([str(path), "--no-files", "--dry-run"]) == 0
+
+
+def test_a_trial_takes_down_what_would_be_made_and_nothing_else(bench, capsys):
+    path = spec(bench)
+    assert encode_object([path, "--dry-run", "--trial", "trial.db", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)["objects"][0]
+    assert said["promise"][0].endswith("within three")
+    assert [one.name for one in bench.rglob("*.db")] == ["trial.db"]
+    assert encode_object(["show", "Cube", "--database", "trial.db", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert [face["symbols"] for face in shown["faces"]] == [
+        face["symbols"] for face in said["face_reports"]
+    ]
+    assert encode_object([path, "--trial", "other.db"]) == 2
+
+
 @pytest.mark.parametrize(("answer", "code"), [("n", 1), ("y", 0)])
 def test_at_a_terminal_it_asks(bench, answer, code):
     path = spec(bench, ", folder: ../elsewhere")

@@ -150,7 +150,7 @@ def test_the_database_gives_the_rates_that_were_reported(made, name, capsys):
     if name == "Can":  # the mantle, with the seam of its symbols
         assert 0.5 < reported["F2"]["at_once"] < reported["F3"]["at_once"]
     run(["show", name, "--database", f"{folder}/{name}.db", "--json"])
-    part = json.loads(capsys.readouterr().out)["promise"]
+    part = json.loads(capsys.readouterr().out)["surface"]
     assert part == (made_object.promise and asdict(made_object.promise))
 
 

@@ -2,7 +2,7 @@
 
 export const figures = {
   frames: 0, paints: 0, latency_ms: [] as number[], answers: 0, click_ms: [] as number[],
-  lit: "", shown: "", contact: false, touch: 0, state: "",
+  lit: "", shown: "", contact: false, touch: 0, state: "", tried: 0, tried_ms: 0, made: 0,
 };
 Object.assign(window, { bench: figures });
 

@@ -9,6 +9,7 @@ import { figures, keep } from "./figures";
 import { GuideDialog } from "./guide";
 import { Heat } from "./heat";
 import { Live } from "./live";
+import { MakeDialog } from "./make";
 import { MosaicPanel } from "./mosaic";
 import { Objects } from "./objects";
 import { Panes } from "./panes";
@@ -36,6 +37,7 @@ async function begin(): Promise<void> {
     tint.show(shape);
     lights();
   });
+  const making = new MakeDialog(sensor, (name) => objects.look(name));
   const bench: Bench = { shape: () => part.shape, touches: () => touches.all, press: (...where) => form.press(...where) };
   const scan = new ScanPanel(), mounting = new MountingCheck(bench), prints = new PrintCheck(bench);
   new Tour();
@@ -151,7 +153,7 @@ async function begin(): Promise<void> {
   }
 
   function themes(): void {
-    for (const panel of [part, surface, objects.map, mosaic, replay]) panel.theme();
+    for (const panel of [part, making, surface, objects.map, mosaic, replay]) panel.theme();
   }
 
   const filter = element<HTMLSelectElement>("filter");

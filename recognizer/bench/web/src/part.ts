@@ -14,7 +14,7 @@ const STILL_PX = 5; // farther, a press of the button is a turn and no click
 export interface Place { face: string; x_mm: number; y_mm: number }
 
 export class Part {
-  private readonly stage = new Stage(element<HTMLCanvasElement>("part"));
+  private readonly stage: Stage;
   private readonly probe: Group;
   private readonly ring: Mesh;
   private held: Group | null = null;
@@ -29,14 +29,16 @@ export class Part {
   private painted: Mesh[] = [];
   shape: ObjectShape | null = null;
 
-  constructor(sensor: Sensor, private readonly touched: (place: Place) => void) {
+  /** `touched` is told where the part is clicked on; null: it is to be looked at alone. */
+  constructor(sensor: Sensor, private readonly touched: ((place: Place) => void) | null, canvas = element<HTMLCanvasElement>("part")) {
+    this.stage = new Stage(canvas);
     this.probe = probeOf(sensor);
     this.ring = new Mesh(new RingGeometry(1.6, 2.3, 32),
       new MeshLambertMaterial({ color: 0xd97a00, side: DoubleSide, depthTest: false }));
     this.ring.renderOrder = 2;
     this.probe.visible = this.ring.visible = false;
     this.stage.scene.add(this.probe, this.ring);
-    this.listen();
+    if (touched) this.listen();
   }
 
   theme(): void {
@@ -44,7 +46,9 @@ export class Part {
     this.stage.theme();
   }
 
-  show(shape: ObjectShape): void {
+  /** Show an object, from the usual side or as the last one was seen. */
+  show(shape: ObjectShape, asBefore = false): void {
+    const from = asBefore && this.held ? this.stage.camera.position.clone().sub(this.stage.target) : new Vector3(0.55, -1, 0.6);
     this.clear();
     this.shape = shape;
     const held = new Group();
@@ -59,7 +63,7 @@ export class Part {
     const ball = new Sphere();
     this.faces.geometry.computeBoundingSphere();
     ball.copy(this.faces.geometry.boundingSphere!);
-    this.stage.look(ball.center, ball.radius, new Vector3(0.55, -1, 0.6));
+    this.stage.look(ball.center, ball.radius, from);
     this.lit = -1;
     this.colour();
   }
@@ -194,7 +198,7 @@ export class Part {
     this.ring.visible = true;
     this.stage.draw();
     const at = this.placeOf(face, hit.faceIndex!, hit.point);
-    this.touched({ face: face.name, x_mm: at.x, y_mm: at.y });
+    this.touched?.({ face: face.name, x_mm: at.x, y_mm: at.y });
   }
 
   /** The place on a face of a point on one of its triangles; of a round face, in its unrolled plane. */

@@ -121,16 +121,21 @@ export class Tint {
     const told = JSON.stringify(rows);
     if (told === this.told) return;
     this.told = told;
-    this.list.hidden = !rows.length;
-    this.list.replaceChildren(...rows.map(([name, text, colour]) => {
-      const item = document.createElement("li"), mark = document.createElement("i"), label = document.createElement("span");
-      mark.style.background = colour || "var(--line)";
-      mark.setAttribute("aria-hidden", "true");
-      say(label, `${name}: ${text}`);
-      item.append(mark, label);
-      return item;
-    }));
+    faceRows(this.list, rows);
   }
+}
+
+/** List faces with what is said of each, and its colour. */
+export function faceRows(list: HTMLElement, rows: [string, string, string][]): void {
+  list.hidden = !rows.length;
+  list.replaceChildren(...rows.map(([name, text, colour]) => {
+    const item = document.createElement("li"), mark = document.createElement("i"), label = document.createElement("span");
+    mark.style.background = colour || "var(--line)";
+    mark.setAttribute("aria-hidden", "true");
+    say(label, `${name}: ${text}`);
+    item.append(mark, label);
+    return item;
+  }));
 }
 
 function blankPicture(face: FaceShape): FacePicture {
@@ -158,16 +163,17 @@ function filled(ink: CanvasRenderingContext2D, canvas: HTMLCanvasElement, least:
   return count;
 }
 
-function shade(share: number): string {
+export function shade(share: number): string {
   const at = 3 * Math.round(255 * Math.max(0, Math.min(1, share)));
-  return `rgb(${TABLE[at]} ${TABLE[at + 1]} ${TABLE[at + 2]})`;
+  return `rgb(${TABLE[at]}, ${TABLE[at + 1]}, ${TABLE[at + 2]})`; // with commas: three.js knows no others
 }
 
 function percent(share: number): string {
-  return `${(100 * share).toFixed(0)} %`;
+  const whole = Math.round(100 * share), half = Math.abs(100 * share - whole) === 0.5;
+  return `${half && whole % 2 ? whole - 1 : whole} %`; // halves to the even number, as the command has it
 }
 
-function words(promised: Promised): string {
+export function words(promised: Promised): string {
   const three = promised.within_three;
   return `${percent(promised.at_once)} of touches answered at once${typeof three === "number" ? `, ${percent(three)} within three` : ""}`;
 }

@@ -3,12 +3,13 @@
 MuJoCo moves the arm, presses the probe through the wrist's springs onto objects of unknown
 pose, and says what the tactels feel of the written meshes and how the plate comes to rest on them.
 The robot knows its link table, encoders with play and noise, and the wrist's four distances. It
-presses over the table until something is higher than that, reads, goes where `next` says, and tells
+presses over the table until something is higher than that, reads, goes where `next` says, and gives
 object and pose in its base.
 
-    python mujoco_bench.py --trials 1 --pictures strip.png
+    python tests/campaigns/robot_world.py --trials 1 --pictures strip.png
 
-Needs encoded-objects[robot]; pictures need OpenGL without a screen (MUJOCO_GL=egl or osmesa).
+Images are of our own sensor model on the written faces; `docs/examples/mujoco_arm.py` has MuJoCo's.
+Pictures need OpenGL without a screen (MUJOCO_GL=egl or osmesa).
 """
 
 from __future__ import annotations
@@ -61,6 +62,7 @@ LEVEL = Rotation.from_rotvec([0, 0, -WRIST.gamma_rad]).as_matrix()  # of the pla
 SPRING_N_MM = 4 * WRIST.spring_n_mm + WRIST.axial_n_mm
 ON = "table/"  # before the names of what lies there
 HELD_OFF_MM = 0.65  # by which the symbols hold the tips' plane off the face at this force
+SYMBOL_MM = 1.0  # height of the symbols: what collides reaches to their tops
 SEARCH_MM = [(x, y) for x in (0, 28, -28) for y in (0, 28, -28)]
 
 
@@ -125,7 +127,7 @@ def arm_mjcf() -> str:
         '<geom type="cylinder" size=".032 .003" mass=".4" rgba=".2 .2 .22 1" contype="0" '
         'conaffinity="0"/>'
         f'<geom name="pad" type="box" size="{half} {half} .005" '
-        f'pos="0 0 {tips - 0.005 + HELD_OFF_MM / 1e3}" '
+        f'pos="0 0 {tips - 0.005 + (HELD_OFF_MM - SYMBOL_MM) / 1e3}" '
         'rgba=".9 .47 .13 1" friction="1"/>'
         f'<site name="sensor" pos="0 0 {tips}" quat="0 1 0 0"/></body>'
     )
@@ -180,7 +182,7 @@ class Bench:
             radius = self.rng.uniform(0.29, 0.34)
             at = radius * np.array([math.cos(sector), math.sin(sector)])
             middle = turn.apply(self.model.body(ON + name).ipos)
-            low = -turn.apply(down.pos)[2]
+            low = -turn.apply(down.pos)[2] + SYMBOL_MM / 1e3
             start = self.model.joint(ON + name).qposadr[0]
             xy = at - middle[:2] + self.rng.uniform(-0.02, 0.02, 2)
             self.data.qpos[start : start + 7] = [*xy, low + 1e-4, *np.roll(turn.as_quat(), 1)]
@@ -381,7 +383,8 @@ def make(folder: Path) -> tuple[mujoco.MjModel, str]:
     """Encode the objects into a lab; return the world and the lab's URL."""
     for name, shape in OBJECTS.items():
         spec = folder / f"{name}.yaml"
-        spec.write_text(f"name: {name}\nshape: {shape}\noutput: {{lab_key: {KEY}}}\n")
+        spec.write_text(f"name: {name}\nshape: {shape}\noutput: {{lab_key: {KEY}}}\n"
+                        "robot: {collision: body}\n")  # fmt: skip
         encode(
             spec, database=str(folder / "bench.db"), folder=folder / name, formats=("stl", "mjcf")
         )
@@ -412,7 +415,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--trials", type=int, default=1)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--folder", type=Path, default=Path("mujoco_bench"))
+    parser.add_argument("--folder", type=Path, default=Path("robot_world"))
     parser.add_argument("--pictures", type=Path)
     given = parser.parse_args()
     given.folder.mkdir(exist_ok=True)
