@@ -130,6 +130,9 @@ def _intact_object(connection: Connection, job: MakeJob) -> MadeObject | None:
         found = job.folder.glob(f"{glob.escape(plan.spec.name)}-plate-*.3mf")
         plates = sorted(found, key=lambda plate: natural_key(plate.name))
         others += plates or [Path(f"{stem}.3mf"), Path(f"{stem}-prusaslicer.3mf")]
+    if "bambu" in job.formats:
+        found = job.folder.glob(f"{glob.escape(plan.spec.name)}-bambu*.3mf")
+        others += sorted(found) or [Path(f"{stem}-bambu.3mf")]
     if not all(other.is_file() for other in others):
         return None
     files = (*(state.path for state in states), *others)

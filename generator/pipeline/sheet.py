@@ -14,7 +14,7 @@ from generator.export.drawing import draw_back, draw_front, draw_plate, draw_ste
 from generator.export.sheet import Figure, Section, sheet_html
 from generator.layout.placement import FaceLayout, Layout, object_code
 from generator.layout.recognition_rate import PartRate
-from generator.pipeline.made import overhang_text
+from generator.pipeline.made import overhangs
 from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon
 from generator.polyhedron.assembly import AssemblyStep, assembly_order, distinct_faces
@@ -96,13 +96,6 @@ def layers_text(printer: Printer) -> str:
     return f"{printer.layer_mm:g} mm, the first {printer.first_layer_mm:g} mm"
 
 
-def lies_text(plan: ObjectPlan, layout: Layout) -> str:
-    """Return how the parts of an object lie on the bed, and what supports they need."""
-    if plan.spec.parts == "panels":
-        return "every panel on its back, symbols up; no supports"
-    return overhang_text(plan, layout)
-
-
 def material_text(volume_mm3: float, *, resin: bool) -> str:
     """Return how much material parts of this volume take."""
     cm3 = volume_mm3 / 1000
@@ -128,7 +121,7 @@ def _facts(
         ("short code", code),
         ("printer", f"{printer.name}: {printer.description}"),
         ("layers", layers_text(printer)),
-        ("lies", lies_text(plan, layout)),
+        ("lies", overhangs(plan, layout).text),
         ("scale", "100 %"),
     ]
     if spec.colours > 1 and is_panel(parts[0]):

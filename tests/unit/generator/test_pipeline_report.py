@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import xml.etree.ElementTree as ET
+import zipfile
 from dataclasses import asdict
 
 import numpy as np
@@ -225,3 +226,27 @@ def test_the_build_sheet_and_the_last_line_say_how_parts_lie(tmp_path):
     assert "print Course-plate-1" in line
     assert "Course-build.html" in line
     assert "Whole: F1 down, supports needed under F1 (" in line
+
+
+@pytest.mark.parametrize(
+    ("shape", "how", "said"),
+    [
+        ("{cone: {diameter: 40 mm, top_diameter: 30 mm, height: 30 mm}}", "whole", "no supports"),
+        ("{dodecahedron: 25 mm}", "whole, printer: {overhang: 10 deg}", "supports needed under F"),
+        ("{box: 40 x 40 x 30 mm}", "panels", "no supports"),
+    ],
+)
+def test_sheet_advice_and_slicer_project_agree_on_supports(tmp_path, shape, how, said):
+    spec = tmp_path / "a.yaml"
+    spec.write_text(f"name: A\nshape: {shape}\nprint: {{parts: {how}}}\n")
+    url = f"sqlite:///{tmp_path}/l.db"
+    made = encode(read_specs([spec]), folder=tmp_path, database=url, formats=("3mf",), jobs=1)
+    assert said in (tmp_path / "A-build.html").read_text()
+    assert said in next_step(made)
+    wanted = "0" if said.startswith("no") else "1"
+    for project in tmp_path.glob("*-prusaslicer.3mf"):
+        with zipfile.ZipFile(project) as package:
+            settings = package.read("Metadata/Slic3r_PE.config").decode()
+            of_object = package.read("Metadata/Slic3r_PE_model.config").decode()
+        assert f"; support_material = {wanted}\n" in settings
+        assert set(re.findall(r'support_material" value="(.)"', of_object)) == {wanted}
