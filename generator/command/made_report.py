@@ -117,16 +117,12 @@ def _face_lines(reports: Sequence[FaceReport]) -> list[str]:
                 answered += f"{face.promise.obstacle}, "
         text = (
             f"{size} mm, {_count(face.symbols, 'symbol')}, "
-            f"{answered}it could be as small as {least} mm"
+            f"{answered}places can be told down to {least} mm"
         )
         named.setdefault(text, []).append(face.name)
-    titles = [f"{_enumeration(names)}:" for names in named.values()]
+    titles = [f"{output.some_of(names)}:" for names in named.values()]
     width = max(map(len, titles), default=0)
     return [f"  {title:{width}} {text}" for title, text in zip(titles, named, strict=True)]
-
-
-def _enumeration(names: Sequence[str]) -> str:
-    return ", ".join(names) if len(names) <= 6 else f"{names[0]} and {len(names) - 1} like it"
 
 
 def _file_list(folder: Path, files: Sequence[Path]) -> str:
@@ -259,7 +255,7 @@ def _of_object(made: MadeObject) -> list[str]:
     plates = _plates(printable)
     if not printable:
         return steps
-    chosen = plates or printable[:1]
+    chosen = plates or printable[: made.parts]
     name = str(chosen[0]) if len(chosen) == 1 else f"{chosen[0]} ... {chosen[-1].name}"
     if plates:
         name += f" ({_opened_by(chosen[0])})"

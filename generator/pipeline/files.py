@@ -31,7 +31,7 @@ from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.pipeline.sheet import SheetPlate, build_sheet
 from generator.polyhedron import Polyhedron, face_polygon
-from generator.solid import Part, emboss_whole, panels, prove_closed, triangles
+from generator.solid import Mesh, Part, emboss_whole, panels, prove_closed, triangles
 from generator.spec.problem import error_location
 
 if TYPE_CHECKING:
@@ -61,6 +61,8 @@ def stage(
     progress: Progress,
 ) -> StagedObject:
     """Write all files of an object into the staging folder: `formats` of `EXPORTERS`, and pictures.
+
+    Without formats nothing is written.
 
     Parameters
     ----------
@@ -127,12 +129,23 @@ def stage(
         if large:
             width, depth = plan.printer.bed_mm
             bed = f"the bed of {plan.printer.name}, {width:g} x {depth:g} mm"
-            warnings += (f"plate {', '.join(large)}: larger than {bed}; print it elsewhere",)
+            warnings += (f"plate {', '.join(large)}: larger than {bed}; take a larger printer",)
     if any(EXPORTERS[name].robot for name in formats):
         warnings += exported.robot.warnings
-    progress("drawing", 0.85)
-    size = outer_size_mm(plan.polyhedron, parts).tolist()
     faces = face_reports(plan, layout)
+    if formats:
+        progress("drawing", 0.85)
+        _draw(plan, layout, parts, meshes, faces, on_sheet, staging)
+    return StagedObject(registered, len(parts), warnings, faces, fit)
+
+
+def _draw(
+    plan: ObjectPlan, layout: Layout, parts: Sequence[Part], meshes: Sequence[Mesh],
+    faces: Sequence[FaceReport], plates: Sequence[SheetPlate], staging: Staging,
+) -> None:  # fmt: skip
+    """Write the picture, the build sheet and the faces on the array."""
+    name = plan.spec.name
+    size = outer_size_mm(plan.polyhedron, parts).tolist()
     promise = whole_rate(plan, layout, faces)
     shares: dict[str, tuple[float, float | None]] = {}
     if promise is not None:  # faces of which nothing is said are blank
@@ -142,11 +155,11 @@ def stage(
         for face in faces
         if face.promise is not None
     }
-    staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes, shares))
-    page = build_sheet(plan, layout, parts, on_sheet, promise)
-    staging.write(f"{spec.name}-build.html", page.encode())
-    staging.write(f"{spec.name}-array.svg", _array_picture(plan, layout).encode())
-    return StagedObject(registered, len(parts), warnings, faces, fit)
+    picture = preview_png(name, size, parts, meshes, shares)
+    staging.write(f"{name}.png", picture)
+    page = build_sheet(plan, layout, parts, plates, picture, promise)
+    staging.write(f"{name}-build.html", page.encode())
+    staging.write(f"{name}-array.svg", _array_picture(plan, layout).encode())
 
 
 def settings_of(plan: ObjectPlan, layout: Layout) -> SlicerSettings | None:

@@ -281,20 +281,20 @@ def _set_sheet(
         listed.append((job.plan.spec.name, Mark(code), ", ".join(on), Mark(link, quote(link))))
     facts = _facts(objects, plates, costs, printers)
     sort = (
-        "Every back names its object, or bears the object's short code: sort the parts by object "
-        "before anything is glued."
+        "Every back names its object, or bears its mark where the name has no room: sort the parts "
+        "by object before anything is glued."
     )
     again = (
         "The plates above hold everything. Each folder has plates of its object alone, too: for "
         "one that is printed again."
     )
-    head = ("object", "short code", "plates", "sheet")
+    head = ("object", "mark on small parts", "plates", "sheet")
     return sheet_html(
         f"{name}: build sheet",
         [
             Section(rows=facts),
-            Section("Objects and their codes", head=head, rows=listed),
-            Section("Print", figures=drawings, wide=True, notes=(sort, again)),
+            Section("Objects and their marks", head=head, rows=listed),
+            Section("Print", figures=drawings, notes=(sort, again)),
         ],
     )
 
@@ -315,7 +315,7 @@ def _facts(
     for job, layout in objects:
         by_way.setdefault(overhangs(job.plan, layout).text, []).append(job.plan.spec.name)
     for way, names in by_way.items():
-        rows.append(("lies", way if len(by_way) == 1 else f"{', '.join(names)}: {way}"))
+        rows.append(("on the bed", way if len(by_way) == 1 else f"{', '.join(names)}: {way}"))
     rows.append(("scale", "100 %"))
     for resin in sorted({not printer.nozzle_mm for printer in printers}):
         volume_mm3 = sum(

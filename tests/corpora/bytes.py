@@ -174,6 +174,8 @@ def content(data: bytes, ending: str) -> bytes:
 
         with Image.open(io.BytesIO(data)) as image:
             return f"{image.mode} {image.size} ".encode() + image.tobytes()
+    if ending == "html":  # its picture stands beside it
+        return re.sub(rb"data:image/png;base64,[^\"]*", b"", data)
     if ending == "stpz":
         return zlib.decompress(data, wbits=47)
     if ending == "3mf":
