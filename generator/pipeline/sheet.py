@@ -23,7 +23,7 @@ from generator.export.drawing import (
 )
 from generator.export.sheet import Figure, Section, picture_html, sheet_html
 from generator.layout.placement import Layout, object_code
-from generator.layout.recognition_rate import PartRate
+from generator.layout.recognition_rate import PartRate, percent
 from generator.pipeline.made import overhangs
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import face_vector, points_inside
@@ -82,8 +82,6 @@ def build_sheet(
     panelled = is_panel(parts[0])
     code = object_code(layout, plan.array.rows, plan.array.columns)
     facts = _facts(plan, layout, code, parts, plates)
-    if promise is not None:
-        facts = (*facts, ("promise", promise.text))
     sections = [Section(drawing=picture_html(picture)), Section(rows=facts)]
     if plates:
         figures = [
@@ -105,6 +103,8 @@ def build_sheet(
     if checks := _checks(plan, layout):
         title = f"Check by {'three touches' if len(checks) == 3 else 'touch'}"
         text = _CHECK.format(force=LIGHT_N * force_share(plan.spec.sensor)) + _MIXED * panelled
+        if promise is not None:
+            text += f" {percent(promise.at_once)} of touches anywhere are answered at once."
         sections.append(Section(title, text, ("", "touch", "must answer"), checks))
     return sheet_html(f"{plan.spec.name}: build sheet", sections)
 
