@@ -156,7 +156,7 @@ def touch_part(name: str, lab: Path, rounds: int, seed: int) -> list[runner.Row]
 
 
 def compare(folder: Path, rows: Iterable[runner.Row]) -> None:
-    """Print promised and answered by face, by class, and of whole parts."""
+    """Print promised and answered by face and by class."""
     faces: dict[tuple[str, str], list[runner.Row]] = defaultdict(list)
     for row in rows:
         faces[row["part"], row["face"]].append(row)
@@ -165,7 +165,6 @@ def compare(folder: Path, rows: Iterable[runner.Row]) -> None:
              "within three: promised", "answered", "why")  # fmt: skip
     runner.table(heads)
     classes: dict[str, list[tuple[float, ...]]] = defaultdict(list)
-    whole: dict[str, list[tuple[float, ...]]] = defaultdict(list)
     for (part, name), touches in faces.items():
         face = next(one for one in said[part]["faces"] if one["name"] == name)
         promise = face["promise"]
@@ -182,7 +181,6 @@ def compare(folder: Path, rows: Iterable[runner.Row]) -> None:
         classes[kind].append((*values, number))
         if promise["meets"]:
             classes["beside another face"].append((*values, number))
-        whole[part].append((*values[:2], face["area_mm2"]))
     print()
     runner.table(("class", "faces", "touches", *heads[4:8], "apart"))
     for kind, some in classes.items():
@@ -191,16 +189,6 @@ def compare(folder: Path, rows: Iterable[runner.Row]) -> None:
         apart = f"{means[0] - means[1]:+.1f}, {means[2] - means[3]:+.1f}"
         shown = [f"{mean:.1f} %" for mean in means]
         runner.row(kind, len(some), int(number.sum()), *shown, apart)
-    print()
-    runner.table(("part", "promised of all of it", "answered", "encoded"))
-    for part, some in whole.items():
-        values = np.array(some)
-        promise = said[part]["promise"]
-        area = values[:, 2].sum() / promise["encoded"]
-        answered = (values[:, 1] * values[:, 2]).sum() / area
-        runner.row(
-            part, f"{promise['at_once']:.0%}", f"{answered:.0%}", f"{promise['encoded']:.0%}"
-        )
 
 
 def _share(touches: list[runner.Row], which: str) -> float:
