@@ -23,6 +23,7 @@ from generator.export.drawing import (
 )
 from generator.export.sheet import Figure, Section, picture_html, sheet_html
 from generator.layout.placement import Layout, object_code
+from generator.layout.recognition_rate import PartRate, percent
 from generator.pipeline.made import overhangs
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import face_vector, points_inside
@@ -75,6 +76,7 @@ def build_sheet(
     parts: Sequence[Part],
     plates: Sequence[SheetPlate],
     picture: bytes,
+    promise: PartRate | None,
 ) -> str:
     """Return the page of one object; `picture`: PNG, of its faces and what they promise."""
     panelled = is_panel(parts[0])
@@ -101,6 +103,8 @@ def build_sheet(
     if checks := _checks(plan, layout):
         title = f"Check by {'three touches' if len(checks) == 3 else 'touch'}"
         text = _CHECK.format(force=LIGHT_N * force_share(plan.spec.sensor)) + _MIXED * panelled
+        if promise is not None:
+            text += f" {percent(promise.at_once)} of touches anywhere are answered at once."
         sections.append(Section(title, text, ("", "touch", "must answer"), checks))
     return sheet_html(f"{plan.spec.name}: build sheet", sections)
 
