@@ -10,7 +10,7 @@
     Scan              several touches of one face -> one belief
     simulate          a part or a face, touched -> frames with their truth
     decode            a window -> its place on the array
-    validate          a set made, touched and read -> right, wrong, rejected
+    validate          a set made, touched and read -> right, wrong, refused
     EncodedObjectsError   the root of every error that a person can cause
 
     >>> from encoded_objects import decode

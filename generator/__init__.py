@@ -15,7 +15,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from generator.cad import EncodedSolid, encode, to_build123d, to_cadquery
+    from generator.cad.encode import EncodedSolid, encode
+    from generator.cad.result import to_build123d, to_cadquery
 
 __all__ = ["EncodedSolid", "encode", "to_build123d", "to_cadquery"]
 

@@ -32,6 +32,8 @@ class Printer:
     overhang_max_rad: float  #: steepest overhang, from the vertical, that needs no support
     nozzle_mm: float = 0.0  #: 0 of resin printers
     density_kg_m3: float = 1240.0  #: of its plastic, printed solid: PLA, or a usual resin
+    blocked_mm: tuple[float, float] = (0.0, 0.0)  #: front left corner of the bed, not printed on
+    model: str = ""  #: by which Bambu Studio and OrcaSlicer know a printer of Bambu Lab
 
     @property
     def first_layer_mm(self) -> float:
@@ -68,7 +70,8 @@ MACHINES: dict[str, tuple[str, tuple[float, float], str]] = {
     "prusa-mini": ("Prusa MINI", (180.0, 180.0), "fdm-0.4"),
     "prusa-xl": ("Prusa XL", (360.0, 360.0), "fdm-0.4"),
     "ender-3": ("Creality Ender 3, all of them", (220.0, 220.0), "fdm-0.4"),
-    "bambu-x1c": ("Bambu Lab X1C, X1, P1S, P1P", (256.0, 256.0), "fdm-0.4"),
+    "bambu-x1c": ("Bambu Lab X1C, X1", (256.0, 256.0), "fdm-0.4"),
+    "bambu-p1s": ("Bambu Lab P1S, P1P", (256.0, 256.0), "fdm-0.4"),
     "bambu-a1": ("Bambu Lab A1", (256.0, 256.0), "fdm-0.4"),
     "bambu-a1-mini": ("Bambu Lab A1 mini", (180.0, 180.0), "fdm-0.4"),
     "voron-250": ("Voron 2.4 or Trident, 250 mm", (250.0, 250.0), "fdm-0.4"),
@@ -77,6 +80,13 @@ MACHINES: dict[str, tuple[str, tuple[float, float], str]] = {
     "prusa-sl1s": ("Prusa SL1S, resin", (127.0, 80.0), "resin"),
     "elegoo-mars": ("Elegoo Mars 3 and its like, resin", (143.0, 89.0), "resin"),
     "elegoo-saturn": ("Elegoo Saturn and its like, resin", (192.0, 120.0), "resin"),
+}
+#: Machines of Bambu Lab: the name in their slicer, and the corner of the bed where a cutter stands.
+_BAMBU: dict[str, tuple[str, tuple[float, float]]] = {
+    "bambu-x1c": ("Bambu Lab X1 Carbon", (18.0, 28.0)),
+    "bambu-p1s": ("Bambu Lab P1S", (18.0, 28.0)),
+    "bambu-a1": ("Bambu Lab A1", (0.0, 0.0)),
+    "bambu-a1-mini": ("Bambu Lab A1 mini", (0.0, 0.0)),
 }
 NOZZLES_MM = (0.2, 0.25, 0.4, 0.6, 0.8)
 FIRST_LAYER_MM = 0.2
@@ -91,16 +101,17 @@ def printer_named(name: str) -> Printer:
     """
     if name in PRINTERS:
         return PRINTERS[name]
-    if name in MACHINES:
-        description, bed, limits = MACHINES[name]
-        return replace(PRINTERS[limits], name=name, description=description, bed_mm=bed)
     machine, _, nozzle = name.rpartition("-")
-    if nozzle in [f"{n:g}" for n in NOZZLES_MM] and machine in MACHINES:
+    sized = name not in MACHINES and nozzle in [f"{n:g}" for n in NOZZLES_MM]
+    machine = machine if sized else name
+    if machine in MACHINES and (not sized or PRINTERS[MACHINES[machine][2]].nozzle_mm):
         description, bed, limits = MACHINES[machine]
-        if PRINTERS[limits].nozzle_mm:
-            limited = printer_of_nozzle(float(nozzle))
-            description = f"{description}, {nozzle} mm nozzle"
-            return replace(limited, name=name, description=description, bed_mm=bed)
+        model, blocked = _BAMBU.get(machine, ("", (0.0, 0.0)))
+        return replace(
+            printer_of_nozzle(float(nozzle)) if sized else PRINTERS[limits],
+            name=name, description=description + (f", {nozzle} mm nozzle" if sized else ""),
+            bed_mm=bed, model=model, blocked_mm=blocked,
+        )  # fmt: skip
     known = ", ".join([*PRINTERS, *MACHINES])
     fix = f"choose one of {known}; with another nozzle as {_MACHINE}-0.6"
     raise GeneratorError(f"unknown printer '{name}'", fix=fix)

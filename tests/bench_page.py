@@ -143,7 +143,7 @@ def making(page, settings, state="sound"):
 
 def made(page):
     """Let it be made; return the name of the zip, and its files by their names."""
-    with page.expect_download(timeout=PATIENCE_MS) as download:
+    with page.expect_download(timeout=5 * PATIENCE_MS) as download:
         page.get_by_test_id("make-go").click()
     with zipfile.ZipFile(download.value.path()) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}

@@ -6,7 +6,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -93,6 +93,13 @@ def count_of(count: int, thing: str) -> str:
     """Return a count in words: 1 frame, 2,000 frames."""
     plural = f"{thing}es" if thing.endswith("ch") else f"{thing}s"
     return f"{count:,} {thing if count == 1 else plural}"
+
+
+def some_of(names: Sequence[str], most: int = 6) -> str:
+    """Return names with commas between; of many the first few, and how many more."""
+    if len(names) <= most:
+        return ", ".join(names)
+    return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more"
 
 
 def json_value(value: Any) -> Any:

@@ -127,10 +127,25 @@ def explain_syntax(
                 f"the '{bracket}' in line {opened.line + 1} is not closed, or a comma is missing"
             )
             return Problem(cause, f"close it with {other}", mark, source.name)
+    if "mapping values" in said and where and (deeper := _too_deep(text, where.line, where.column)):
+        return Problem(*deeper, SourceMark(source, where.line + 1, 1), source.name)
     for pattern, cause, fix in _SYNTAX:
         if pattern in said:
             return Problem(cause, fix, mark, source.name)
     return Problem(f"not YAML: {said}", f"compare with: {kind.example}", mark, source.name)
+
+
+def _too_deep(text: str, line: int, column: int) -> tuple[str, str] | None:
+    """Return cause and fix of a setting that stands deeper than one with a value above it."""
+    lines = text.splitlines()
+    above = [one for one in lines[:line] if one.strip() and not one.lstrip().startswith("#")]
+    if not above or ":" in lines[line][:column]:
+        return None
+    name, indent = above[-1].partition(":")[0].strip(), len(above[-1]) - len(above[-1].lstrip())
+    return (
+        f"this line is indented, but '{name}' above it has a value already",
+        f"begin it in column {indent + 1}, as the line above; or give '{name}' no value of its own",
+    )
 
 
 class _Reader:

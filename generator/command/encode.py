@@ -54,8 +54,9 @@ def encode(
     ] = None,
     formats: Annotated[
         str,
-        Option("step, stl, 3mf, glb, stpz (STEP, gzipped), mjcf, urdf, sdf, usd: files to write, "
-               "with commas between.", "LIST", names=("--format",)),
+        Option("step, stl, 3mf, bambu (Bambu Studio, OrcaSlicer), glb, stpz (STEP, gzipped), mjcf, "
+               "urdf, sdf, usd: files to write, with commas between.", "LIST",
+               names=("--format",)),
     ] = "",
     database: Annotated[
         str,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -107,16 +108,12 @@ def _face_lines(reports: Sequence[FaceReport]) -> list[str]:
             answered = f"{once:.0%} answered at once, {later}"
         text = (
             f"{size} mm, {_count(face.symbols, 'symbol')}, "
-            f"{answered}it could be as small as {least} mm"
+            f"{answered}places can be told down to {least} mm"
         )
         named.setdefault(text, []).append(face.name)
-    titles = [f"{_enumeration(names)}:" for names in named.values()]
+    titles = [f"{output.some_of(names)}:" for names in named.values()]
     width = max(map(len, titles), default=0)
     return [f"  {title:{width}} {text}" for title, text in zip(titles, named, strict=True)]
-
-
-def _enumeration(names: Sequence[str]) -> str:
-    return ", ".join(names) if len(names) <= 6 else f"{names[0]} and {len(names) - 1} like it"
 
 
 def _file_list(folder: Path, files: Sequence[Path]) -> str:
@@ -244,8 +241,7 @@ def next_step(result: Encoded) -> str:
 
 def _of_set(result: Encoded) -> str:
     files = result.set_files
-    plates = [file for file in files if file.suffix == ".3mf"]
-    plain = [file for file in plates if not file.stem.endswith("-prusaslicer")]
+    plain = _plates(files)
     sheet = next((file for file in files if file.name.endswith("-build.html")), None)
     steps = []
     if plain:
@@ -253,7 +249,7 @@ def _of_set(result: Encoded) -> str:
         lies = "as it lies" if len(plain) == 1 else "as they lie"
         if all(made.lying is None for made in result.objects):
             lies += ", backs down, symbols up, no supports, 100 % scale"
-        where = f"{first} in {plain[0].parent} ({_twin_name(plain[0])} in PrusaSlicer)"
+        where = f"{first} in {plain[0].parent} ({_opened_by(plain[0])})"
         steps.append(f"print {where} {lies}")
     if sheet:
         steps.append(f"put the objects together by {sheet}")
@@ -269,14 +265,13 @@ def _of_object(made: MadeObject) -> list[str]:
     sheet = next((file for file in made.files if file.name.endswith("-build.html")), None)
     steps = [f"open {sheet}"] if sheet else []
     printable = [f for suffix in (".3mf", ".stl") for f in made.files if f.suffix == suffix]
-    plates = [f for f in printable if f.suffix == ".3mf" and "-prusaslicer" not in f.stem]
+    plates = _plates(printable)
     if not printable:
         return steps
-    chosen = plates or printable[:1]
+    chosen = plates or printable[: made.parts]
     name = str(chosen[0]) if len(chosen) == 1 else f"{chosen[0]} ... {chosen[-1].name}"
-    twin = chosen[0].with_name(_twin_name(chosen[0]))
-    if twin in made.files:
-        name += f" (in PrusaSlicer {twin.name})"
+    if plates:
+        name += f" ({_opened_by(chosen[0])})"
     if made.lying is None:
         steps.append(f"print {name} as it lies, backs down, symbols up, no supports, 100 % scale")
         return steps
@@ -284,5 +279,19 @@ def _of_object(made: MadeObject) -> list[str]:
     return steps
 
 
-def _twin_name(plate: Path) -> str:
-    return f"{plate.stem}-prusaslicer.3mf"
+def _plates(files: Sequence[Path]) -> list[Path]:
+    """Return the files of plates: projects for Bambu Studio, or what all other slicers open."""
+    models = [f for f in files if f.suffix == ".3mf" and "-prusaslicer" not in f.stem]
+    return [file for file in models if _is_project(file)] or models
+
+
+def _is_project(file: Path) -> bool:
+    """Whether a file is a project for Bambu Studio."""
+    return re.search(r"-bambu(-\d+)?\.3mf$", file.name) is not None
+
+
+def _opened_by(plate: Path) -> str:
+    """Return what opens a plate or a project."""
+    if _is_project(plate):
+        return "in Bambu Studio or OrcaSlicer"
+    return f"in PrusaSlicer {plate.stem}-prusaslicer.3mf"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from rich.markup import escape
 
 from encoded_objects.base import output
 from generator.database.open import without_password
-from generator.database.read import surfaces_of
+from generator.database.read import natural_key, surfaces_of
 
 if TYPE_CHECKING:
     from encoded_objects.base.sensor_type import SensorType
@@ -78,7 +78,7 @@ def print_object(
     output.write("\n".join(lines))
     titles = ("face", "kind", "area", "symbols", "places", "at once", "first cell")
     table = output.table(*titles, broken=())
-    for face in faces:
+    for face in _by_region(faces):
         on = face.layout
         first = f"({on.rows[0]}, {on.columns[0]})" if len(on.rows) else "blank"
         share = "" if face.promise is None else f"{100 * face.promise.at_once:.0f} %"
@@ -110,7 +110,8 @@ def print_retired(entries: Sequence[ObjectEntry], done: str, url: str, *, as_jso
         "retired": "stay taken",
     }
     for entry in entries:
-        output.write(f"{entry.name}: {done}; its {entry.symbols} cells {cells[done]}")
+        undo = f"; undo: encode-object retire --undo {entry.name}" if done == "retired" else ""
+        output.write(f"{entry.name}: {done}; its {entry.symbols} cells {cells[done]}{undo}")
 
 
 def warning_before(entries: Sequence[ObjectEntry]) -> str:
@@ -209,6 +210,21 @@ def _faces(held: RegisteredObject, sensor: SensorType) -> list[_Face]:
             )
         )
     return found
+
+
+def _by_region(faces: Sequence[_Face]) -> list[_Face]:
+    """Return faces as a person counts them: a curved region (F9, F9.2, ...) is one."""
+    regions: dict[str, list[_Face]] = {}
+    for face in faces:
+        regions.setdefault(face.name.partition(".")[0], []).append(face)
+    return [
+        replace(
+            some[0], name=name, kind=f"{len(some)} facets", area_mm2=sum(f.area_mm2 for f in some)
+        )
+        if len(some) > 1
+        else some[0]
+        for name, some in sorted(regions.items(), key=lambda one: natural_key(one[0]))
+    ]
 
 
 def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
@@ -366,8 +382,8 @@ def _chance_text(use: PitchUse) -> str:
         return f"{at} read by a scan of about {use.touches} touches"
     once = f"once in {_round_text(1 / use.chance)} touches"
     text = (
-        f"{at} a touch tells about {use.symbols:.0f}, so a part that is not registered here "
-        f"matches one of the {use.places:,} places by chance {once}"
+        f"{at} a touch shows about {use.symbols:.0f} symbols, so a part that is not registered "
+        f"here matches one of the {use.places:,} places by chance {once}"
     )
     if use.places <= use.most_places:
         return f"{text}; single touches are enough up to {_round_text(use.most_places)} places"

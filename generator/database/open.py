@@ -162,7 +162,8 @@ def _sqlite_engine(url: URL, path: Path, writable: bool, wait_s: float) -> Engin
             connection.execute("PRAGMA query_only = ON")
         return connection
 
-    engine = create_engine(url, creator=connect, poolclass=NullPool)
+    wait = {"wait_s": wait_s}
+    engine = create_engine(url, creator=connect, poolclass=NullPool, execution_options=wait)
     event.listen(engine, "begin", begin_sqlite)
     event.listen(engine, "handle_error", note_engine)
     return engine

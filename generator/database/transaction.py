@@ -2,7 +2,8 @@
 
 Writers take turns from their first statement (SQLite: BEGIN IMMEDIATE, PostgreSQL: one
 advisory lock for the transaction), so that the occupied cells a writer reads stay what
-they are until it commits. Nobody waits longer than the engine's `wait_s`. What is left to
+they are until it commits. Nobody waits longer than the engine's `wait_s`, nor longer than `QUIET_S`
+without a word. What is left to
 conflict: a layout made before the turn came, a writer that takes no turns, a deadlock on the
 server. The work is then undone and repeated on the state that the other writer left
 (`retry_on_conflict`).
@@ -15,16 +16,20 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
+from threading import Timer
 from typing import Concatenate, NoReturn, ParamSpec, TypeVar
 
 import numpy as np
 from sqlalchemy import URL, Connection, Engine, ExceptionContext, text
-from sqlalchemy.exc import DBAPIError, SQLAlchemyError
+from sqlalchemy.exc import DBAPIError, OperationalError, SQLAlchemyError
 
 from encoded_objects.base.foreign import DAMAGE
+from encoded_objects.base.output import message
 from generator.errors import DatabaseError, GeneratorError
 
 WAIT_S = 60.0  #: how long a writer waits for its turn, and a reader for a commit to end
+QUIET_S = 2.0  #: from then on it says for what
+BUSY_MS = 200  #: that SQLite waits by itself, deaf to Ctrl-C
 
 _TURN = int.from_bytes(b"encoded", "big")  #: the advisory lock of writers on PostgreSQL
 
@@ -113,15 +118,46 @@ def home_of(engine: Engine) -> URL:
 def take_turn(connection: Connection) -> None:
     """Wait until no other transaction writes; held until this one ends."""
     if connection.dialect.name == "postgresql":
-        wait_ms = int(1000 * connection.get_execution_options().get("wait_s", WAIT_S))
-        connection.execute(text(f"SET LOCAL lock_timeout = {wait_ms}"))
-        connection.execute(text("SELECT pg_advisory_xact_lock(:turn)"), {"turn": _TURN})
+        wait_s = connection.get_execution_options().get("wait_s", WAIT_S)
+        connection.execute(text(f"SET LOCAL lock_timeout = {int(1000 * wait_s)}"))
+        notice = Timer(QUIET_S, _say_waiting, (connection.engine.url, wait_s))
+        notice.daemon = True
+        notice.start()
+        try:
+            connection.execute(text("SELECT pg_advisory_xact_lock(:turn)"), {"turn": _TURN})
+        finally:
+            notice.cancel()
 
 
 def begin_sqlite(connection: Connection) -> None:
-    """Begin a SQLite transaction: a writer's at once, a reader's with its first read."""
+    """Begin a SQLite transaction, as soon as no other program keeps the file locked."""
     options = connection.get_execution_options()
-    connection.exec_driver_sql("BEGIN IMMEDIATE" if options.get("writing") else "BEGIN")
+    wait_s, first = options["wait_s"], "BEGIN IMMEDIATE"
+    if not options.get("writing"):
+        connection.exec_driver_sql("BEGIN")
+        first = "SELECT 1 FROM sqlite_master"  # which takes a reader's lock
+    connection.exec_driver_sql(f"PRAGMA busy_timeout = {min(BUSY_MS, int(1000 * wait_s))}")
+    began, said = time.monotonic(), False
+    while True:
+        try:
+            connection.exec_driver_sql(first)
+            break
+        except OperationalError as error:
+            waited = time.monotonic() - began
+            busy = getattr(error.orig, "sqlite_errorname", "") == "SQLITE_BUSY"
+            if not busy or waited >= wait_s:
+                raise
+            if waited >= QUIET_S and not said:
+                _say_waiting(connection.engine.url, wait_s)
+                said = True
+    connection.exec_driver_sql(f"PRAGMA busy_timeout = {int(1000 * wait_s)}")
+
+
+def _say_waiting(url: URL, wait_s: float) -> None:
+    message(
+        f"{place_of(url)}: another program keeps the database locked; waiting up to {wait_s:.0f} s "
+        "(Ctrl-C ends it)"
+    )
 
 
 def place_of(url: URL) -> str:

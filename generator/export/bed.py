@@ -2,18 +2,19 @@
 
 Rectangles are placed on a skyline from the largest to the smallest, each as low as it
 gets and then as far left, also turned by a quarter (bottom-left, Jylänki, A thousand ways
-to pack the bin, 2010, section 2.4). Plate frame: mm, x right, y back, origin at the front left
-corner of the bed.
+to pack the bin, 2010, section 2.4). A rim of the bed stays free for a brim where that takes no
+more plates. Plate frame: mm, x right, y back, origin at the front left corner of the bed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 Size = tuple[float, float]
 
 _GAP_MM = 5.0  # least distance between two parts
+_RIM_MM = 6.0  # of the bed: slicers lay brims of 5 mm, .1 mm from the part
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,18 +52,35 @@ def arrange_plates(
     sizes: Sequence[Size],
     bed_mm: Size,
     groups: Sequence[int] | None = None,
+    blocked_mm: Size = (0.0, 0.0),
 ) -> tuple[Plate, ...]:
     """Arrange rectangles (width and depth, mm) on as many plates as needed, centred on the bed.
 
     A group lies on one plate if one can hold it, else on plates of its own; without groups, all
     parts are one. A part larger than the bed has a plate of its own with an `overhang_mm`.
+    `blocked_mm`: width and depth of the corner at the origin where nothing may lie.
 
     Examples
     --------
     >>> [len(plate.places) for plate in arrange_plates([(60, 60)] * 6, (250, 210))]
     [6]
     """
-    room = (bed_mm[0] + _GAP_MM, bed_mm[1] + _GAP_MM)
+    tight, rimmed = (_arrange(sizes, bed_mm, groups, blocked_mm, rim) for rim in (0.0, _RIM_MM))
+    fit = sum(plate.fits for plate in rimmed) == sum(plate.fits for plate in tight)
+    return rimmed if fit and len(rimmed) == len(tight) else tight
+
+
+def _arrange(
+    sizes: Sequence[Size],
+    bed_mm: Size,
+    groups: Sequence[int] | None,
+    blocked_mm: Size,
+    rim_mm: float,
+) -> tuple[Plate, ...]:
+    """Arrange rectangles no nearer to the edges of the bed than its rim."""
+    room = (bed_mm[0] - 2 * rim_mm + _GAP_MM, bed_mm[1] - 2 * rim_mm + _GAP_MM)
+    corner = (blocked_mm[0] - rim_mm, blocked_mm[1] - rim_mm)
+    floor = [(0.0, corner[1]), (corner[0], 0.0)] if min(corner) > 0 else [(0.0, 0.0)]
     grown = [(width + _GAP_MM, depth + _GAP_MM) for width, depth in sizes]
     order = sorted(range(len(sizes)), key=lambda i: (-max(sizes[i]), -min(sizes[i]), i))
     kinds = [0] * len(sizes) if groups is None else list(groups)
@@ -70,18 +88,22 @@ def arrange_plates(
     oversize: list[Plate] = []
     for kind in dict.fromkeys(kinds):
         own = [part for part in order if kinds[part] == kind]
-        small = [
-            p for p in own if any(_fits(turned, room) for turned in (grown[p], grown[p][::-1]))
-        ]
-        oversize += [_oversize_plate(p, sizes[p], bed_mm) for p in own if p not in small]
+        small = [p for p in own if _place_part(_Skyline(list(floor), []), p, grown[p], room)]
+        for part in own:
+            if part not in small and rim_mm:  # it lies on the rim, too
+                (lone,) = _arrange([sizes[part]], bed_mm, None, blocked_mm, 0.0)
+                oversize.append(replace(lone, places=(replace(lone.places[0], part=part),)))
+            elif part not in small:
+                oversize.append(_oversize_plate(part, sizes[part], bed_mm, blocked_mm))
         for number, plate in enumerate(open_plates):
             together = _add_parts(plate, small, grown, room)
             if together is not None:
                 open_plates[number] = together
                 break
         else:
-            open_plates += _fill_plates(small, grown, room)
-    return (*(_centre(plate, sizes, bed_mm) for plate in open_plates), *oversize)
+            open_plates += _fill_plates(small, grown, room, floor)
+    plates = [_centre(plate, sizes, bed_mm, blocked_mm, rim_mm) for plate in open_plates]
+    return (*plates, *oversize)
 
 
 def _add_parts(
@@ -93,12 +115,14 @@ def _add_parts(
     return more if fit else None
 
 
-def _fill_plates(parts: Sequence[int], grown: Sequence[Size], room: Size) -> list[_Skyline]:
-    """Return new plates with parts that each fit a plate alone."""
+def _fill_plates(
+    parts: Sequence[int], grown: Sequence[Size], room: Size, floor: list[tuple[float, float]]
+) -> list[_Skyline]:
+    """Return new plates with parts that each fit a plate alone; `floor` are its first steps."""
     plates: list[_Skyline] = []
     for part in parts:
         if not any(_place_part(plate, part, grown[part], room) for plate in plates):
-            plates.append(_Skyline([(0.0, 0.0)], []))
+            plates.append(_Skyline(list(floor), []))
             _place_part(plates[-1], part, grown[part], room)
     return plates
 
@@ -108,16 +132,18 @@ def _fits(size: Size, room: Size) -> bool:
     return size[0] <= room[0] + slack and size[1] <= room[1] + slack
 
 
-def _oversize_plate(part: int, size: Size, bed_mm: Size) -> Plate:
-    """Place a part that is too large in the direction in which it exceeds the bed less."""
-    beyond = [
-        (max(0.0, width - bed_mm[0]), max(0.0, depth - bed_mm[1]))
-        for width, depth in (size, size[::-1])
+def _oversize_plate(part: int, size: Size, bed_mm: Size, blocked_mm: Size) -> Plate:
+    """Place a part that is too large as it exceeds least what is free of the bed."""
+    width, depth = bed_mm
+    free = [(width - blocked_mm[0], depth), (width, depth - blocked_mm[1])]
+    ways = [
+        ((max(0.0, side[0] - room[0]), max(0.0, side[1] - room[1])), turned, side)
+        for turned, side in enumerate((size, size[::-1]))
+        for room in (free if min(blocked_mm) > 0 else [bed_mm])
     ]
-    turned = sum(beyond[1]) < sum(beyond[0])
-    width, depth = size[::-1] if turned else size
-    place = BedPlace(part, (bed_mm[0] - width) / 2, (bed_mm[1] - depth) / 2, turned)
-    return Plate((place,), beyond[int(turned)])
+    beyond, turned, side = min(ways, key=lambda way: sum(way[0]))
+    place = BedPlace(part, (width - side[0]) / 2, (depth - side[1]) / 2, bool(turned))
+    return Plate((place,), beyond)
 
 
 def _place_part(plate: _Skyline, part: int, size: Size, room: Size) -> bool:
@@ -154,15 +180,21 @@ def _raise(steps: list[tuple[float, float]], start: float, end: float, height: f
     steps[:] = sorted([*kept, (start, height), (end, after)])
 
 
-def _centre(plate: _Skyline, sizes: Sequence[Size], bed_mm: Size) -> Plate:
-    extents = []
+def _centre(
+    plate: _Skyline, sizes: Sequence[Size], bed_mm: Size, blocked_mm: Size, rim_mm: float
+) -> Plate:
+    """Return a plate with its parts in the middle of the bed, or as near as its corner allows."""
+    low, high = [], []
     for place in plate.places:
         width, depth = sizes[place.part]
         if place.turned:
             width, depth = depth, width
-        extents.append((place.x_mm + width, place.y_mm + depth))
-    dx = (bed_mm[0] - max(x for x, _ in extents)) / 2
-    dy = (bed_mm[1] - max(y for _, y in extents)) / 2
+        low.append((place.x_mm, place.y_mm))
+        high.append((place.x_mm + width, place.y_mm + depth))
+    left, front, right, back = *map(min, zip(*low, strict=True)), *map(max, zip(*high, strict=True))
+    dx, dy = (bed_mm[0] - left - right) / 2, (bed_mm[1] - front - back) / 2
+    if any(x + dx < blocked_mm[0] and y + dy < blocked_mm[1] for x, y in low):
+        dx, dy = max(dx, rim_mm), max(dy, rim_mm)
     places = sorted(plate.places, key=lambda place: place.part)
     return Plate(
         tuple(BedPlace(p.part, p.x_mm + dx, p.y_mm + dy, p.turned) for p in places),

@@ -7,6 +7,7 @@ engraved side. mm, y down.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 
 import numpy as np
@@ -14,8 +15,10 @@ from numpy.typing import NDArray
 
 from generator.export.bed import BedPlace, Plate
 from generator.export.colours import BODY_RGB, SYMBOL_RGB, hexadecimal
-from generator.plane.polygon import face_vector
+from generator.export.raster import rasterise
+from generator.plane.polygon import face_vector, plane_axes
 from generator.solid.part import Embossing, Part, in_frame, plane_frame
+from generator.solid.triangulate import triangulate_rings
 
 Points = NDArray[np.float64]
 
@@ -25,6 +28,11 @@ _FRONT, _BACK = 0, 1  # facets of a panel
 _MARGIN_MM = 6.0
 _LETTER_MM = 4.5
 _ACROSS_PX = 220  # a drawing's greatest width
+_ABOVE = 0.75  # height of the eye over the table, of its distance to the side
+_SIDES = 8  # from which an assembly is looked at
+_SCREEN = 72  # pixels a side by which it is found what hides what
+_LEAST_SEEN = 0.012  # share of the screen from which a face has room for its name
+_BACK_FILLS = ("#F1F5F9", "#FBD9BF")  # of a panel's back, and of that of the new one
 
 
 def is_panel(part: Part) -> bool:
@@ -106,30 +114,111 @@ def _draw_bed(
     return _svg(corners, shapes, across_px=3 * _ACROSS_PX)
 
 
-def draw_step(polygons: Sequence[Sequence[Points]], kinds: Sequence[int], names: Sequence[str],
-              R_eye_object: Points) -> str:  # fmt: skip
-    """Return the object while it is put together.
+@dataclass(frozen=True, slots=True)
+class Assembly:
+    """The faces of an object, and the order in which they are glued together."""
 
-    `polygons`: loops (k, 3) of each face, object frame; `kinds` of each face: 0 missing, 1 glued,
-    2 to be glued now; `R_eye_object` (3, 3), eye frame: x right, y up, z towards the eye.
+    names: Sequence[str]
+    polygons: Sequence[Sequence[Points]]  #: loops (k, 3) of each face, object frame, mm
+    order: Sequence[int]  #: faces as they are glued; the first one lies on the table
+    edges: Sequence[Sequence[tuple[str, Points]]]  #: of each step: numbers and ends (2, 3)
+
+
+def draw_steps(assembly: Assembly) -> list[str]:
+    """Return a drawing of each step, all from the side from which new panels are seen best.
+
+    The new panel is orange, backs are light; what is hidden has no name; what is missing is dashed.
     """
-    seen = [[loop @ R_eye_object.T for loop in loops] for loops in polygons]
-    order = sorted(range(len(seen)), key=lambda k: round(float(seen[k][0][:, 2].mean()), 6))
-    shapes = [
-        _path([loop[:, :2] for loop in seen[k]],
-              f'fill="none" stroke="{GREY}" stroke-width=".3" stroke-dasharray="2 2"')
-        for k in order if kinds[k] == 0
-    ]  # fmt: skip
-    for k in (k for k in order if kinds[k]):
-        fill = SYMBOL if kinds[k] == 2 else BODY
-        style = f'fill="{fill}" fill-opacity=".75" stroke="{INK}" stroke-width=".5"'
-        shapes.append(_path([loop[:, :2] for loop in seen[k]], style))
-    size = float(np.ptp(np.concatenate([loop[:, :2] for loops in seen for loop in loops]), 0).max())
-    for k in (k for k in order if kinds[k]):
-        middle = (seen[k][0].min(axis=0) + seen[k][0].max(axis=0)) / 2
-        shapes.append(_text(names[k], middle[:2], INK, size / 14))
-    flat = [loop[:, :2] for loops in seen for loop in loops]
-    return _svg(flat, shapes, across_px=200)
+    triangles: list[NDArray[np.int64]] = []
+    first = 0
+    for name, loops in zip(assembly.names, assembly.polygons, strict=True):
+        T = plane_frame(loops[0][0], loops[0][1] - loops[0][0], face_vector(loops))
+        numbers = np.arange(sum(map(len, loops))) + first
+        triangles.append(
+            triangulate_rings([in_frame(T, loop)[:, :2] for loop in loops], numbers, name)
+        )
+        first += len(numbers)
+    up = -face_vector(assembly.polygons[assembly.order[0]])
+    up /= np.linalg.norm(up)
+    ahead, aside = plane_axes(up, np.eye(3)[int(np.argmin(np.abs(up)))])[:2]
+    views = [
+        _FixedView(assembly, triangles, np.cos(t) * ahead + np.sin(t) * aside + _ABOVE * up, up)
+        for t in np.linspace(0.35, 0.35 + 2 * np.pi, _SIDES, endpoint=False)
+    ]
+    best = max(views, key=lambda view: round(view.shown(), 3))
+    return [best.draw(step) for step in range(len(assembly.order))]
+
+
+class _FixedView:
+    """An assembly as it is seen from one side; eye frame: x right, y up, z towards the eye, mm."""
+
+    def __init__(
+        self, assembly: Assembly, triangles: Sequence[NDArray[np.int64]], eye: Points, up: Points
+    ) -> None:
+        eye = eye / np.linalg.norm(eye)
+        right = np.cross(up, eye)
+        right /= np.linalg.norm(right)
+        self.R_eye_object = np.stack([right, np.cross(eye, right), eye])
+        self.assembly, self.step_of = assembly, np.argsort(assembly.order)
+        self.loops = [[p @ self.R_eye_object.T for p in loops] for loops in assembly.polygons]
+        self.flat = [loop[:, :2] for loops in self.loops for loop in loops]
+        points = np.concatenate([loop for loops in self.loops for loop in loops])
+        self.low = points[:, :2].min(axis=0)
+        self.size = float(np.ptp(points[:, :2], axis=0).max())
+        self.screen = np.column_stack([self._pixels(points[:, :2]), points[:, 2]]).T.copy()
+        both = [np.concatenate([one, one[:, ::-1]]) for one in triangles]  # seen from both sides
+        self.triangles = np.concatenate(both)
+        self.owners = np.repeat(np.arange(len(both)), [len(one) for one in both])
+
+    def _pixels(self, points: Points) -> Points:
+        """Return points (n, 2) of the eye frame in pixels, y down."""
+        across: Points = (points - self.low) * (_SCREEN / self.size)
+        return across * [1, -1] + [0, _SCREEN]
+
+    def seen(self, step: int) -> NDArray[np.int64]:
+        """Return which face is seen at each pixel after a step, -1 for none."""
+        there = np.flatnonzero(self.step_of[self.owners] <= step)
+        memory = np.empty((_SCREEN, _SCREEN), np.int64)
+        return rasterise(self.screen, self.triangles[there], memory).coarse(self.owners[there], 1)
+
+    def shown(self) -> float:
+        """Return how well all new panels are seen: the sum of the roots of their shares."""
+        order = enumerate(self.assembly.order)
+        return float(sum(np.sqrt((self.seen(k) == face).mean()) for k, face in order))
+
+    def draw(self, step: int) -> str:
+        """Return the drawing of a step."""
+        now, seen = self.assembly.order[step], self.seen(step)
+        shapes = []
+        depths = [round(float(loops[0][:, 2].mean()), 6) for loops in self.loops]
+        behind = [face_vector(loops)[2] < 0 for loops in self.loops]
+        missing = self.step_of > step
+        for face in sorted(range(len(depths)), key=lambda k: (not missing[k], depths[k])):
+            fill = (_BACK_FILLS if behind[face] else (BODY, SYMBOL))[face == now]
+            style = f'fill="{fill}" stroke="{INK}" stroke-width=".5"'
+            if missing[face]:
+                style = f'fill="none" stroke="{GREY}" stroke-width=".3" stroke-dasharray="2 2"'
+            shapes.append(_path([loop[:, :2] for loop in self.loops[face]], style))
+        labels: list[Points] = []
+        for face in np.unique(seen[seen >= 0]).tolist():
+            rows, columns = np.nonzero(seen == face)
+            if len(rows) >= _LEAST_SEEN * seen.size:
+                away = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2
+                best = int(np.argmin(away))  # seen itself, where the middle is hidden
+                at = np.array([columns[best] + 0.5, _SCREEN - rows[best] - 0.5])
+                at = self.low + at * (self.size / _SCREEN)
+                shapes.append(_text(self.assembly.names[face], at, INK, self.size / 13))
+                labels.append(at)
+        middle = self.loops[now][0][:, :2].mean(axis=0)
+        for number, ends in self.assembly.edges[step]:
+            at = (ends @ self.R_eye_object.T).mean(axis=0)[:2]
+            away = middle - at
+            at = at + away * (0.06 * self.size / max(float(np.hypot(*away)), 1e-9))
+            column, row = self._pixels(at[None])[0].astype(int).clip(0, _SCREEN - 1).tolist()
+            apart = min((float(np.hypot(*(at - label))) for label in labels), default=self.size)
+            if seen[row, column] == now and apart > self.size / 10:
+                shapes.append(_text(number, at, INK, self.size / 18))
+        return _svg(self.flat, shapes, across_px=200)
 
 
 def _symbols(embossing: Embossing, name: str, colour: str, *, own: bool = False) -> list[str]:

@@ -84,6 +84,7 @@ EXPORTERS = {
         Exporter("stl", ".stl", "generator.export.meshes:write_stl",
                  verify_part=f"{_CHECK}:verify_stl", registered=True, kept=True),
         Exporter("3mf", ".3mf", write="generator.export.threemf:write_plates", kept=True),
+        Exporter("bambu", ".3mf", write="generator.export.bambu:write_projects", kept=True),
         Exporter("glb", ".glb", write="generator.export.meshes:write_glb", kept=True),
         Exporter("stpz", ".stpz", f"{_STEP}:write_part_gzipped", f"{_STEP}:write_assembly_gzipped"),
         Exporter("mjcf", ".xml", write=f"{_ROBOT}.xml_files:write_mjcf",

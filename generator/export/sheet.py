@@ -5,6 +5,7 @@ Build sheets of objects and sets, and the sheet of a probe kit, share `sheet.htm
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,9 +44,10 @@ class Section:
     head: Sequence[str] = ()  #: of the table; without one the first cell of a row is its name
     rows: Sequence[Sequence[Cell]] = ()
     figures: Sequence[Figure] = ()
-    wide: bool = False  #: two figures a row
+    across: int = 2  #: figures a row
+    new_page: bool = False  #: on paper
     steps: Sequence[str] = ()
-    drawing: str = ""  #: SVG
+    drawing: str = ""  #: SVG, or a picture
     notes: Sequence[str] = ()
 
 
@@ -53,3 +55,8 @@ def sheet_html(title: str, sections: Sequence[Section]) -> str:
     """Return the page."""
     environment = page_environment(Path(__file__).parent)
     return environment.get_template("sheet.html.j2").render(title=title, sections=sections)
+
+
+def picture_html(png: bytes) -> str:
+    """Return a picture that stands in the page itself."""
+    return f'<img alt="" src="data:image/png;base64,{base64.b64encode(png).decode()}">'

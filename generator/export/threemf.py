@@ -1,7 +1,7 @@
 """Parts -> 3MF: body and symbols as separate objects, arranged on the printer's bed.
 
-Slicers read two ways to say that a body and its symbols belong together, so each plate is
-made in both; the same meshes are written and deflated once:
+Slicers read three ways to say that a body and its symbols belong together. The same meshes are
+written and deflated once for all; the third, projects of Bambu Studio, is `generator.export.bambu`:
 
 - ``components`` (3MF core specification 1.3): each part is an object of two components,
   "<part> body" and "<part> symbols". Bambu Studio, Orca, Cura and 3D Builder keep them
@@ -21,8 +21,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -43,11 +42,12 @@ BODY, SYMBOLS = 0, 1  #: materials
 _BLOCK = 8_192  # vertices or triangles formatted at once: their text stays in the cache
 _SETTINGS = "Metadata/Slic3r_PE.config"
 _COLOUR_CHANGE = "Metadata/Prusa_Slicer_custom_gcode_per_print_z.xml"
-_MODEL, _CONFIG = "3D/3dmodel.model", "Metadata/Slic3r_PE_model.config"
+MODEL, _CONFIG = "3D/3dmodel.model", "Metadata/Slic3r_PE_model.config"
+_OF_OBJECT = ("layer_height", "support_material")  #: settings of each object, over any of a print
 
-_XML = '<?xml version="1.0" encoding="UTF-8"?>\n'
+XML = '<?xml version="1.0" encoding="UTF-8"?>\n'
 _CONTENT_TYPES = (
-    _XML + '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+    XML + '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
     '<Default Extension="rels" '
     'ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
     '<Default Extension="model" '
@@ -55,70 +55,83 @@ _CONTENT_TYPES = (
     '<Default Extension="config" ContentType="text/xml"/></Types>\n'
 )
 _RELATIONSHIPS = (
-    _XML + '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
-    '<Relationship Target="/3D/3dmodel.model" Id="rel0" '
-    'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>\n'
+    f'{XML}<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
 )
 _TO_TRIANGLES, _TO_END = "</vertices><triangles>\n", "</triangles></mesh></object>\n"
 
 
-class SlicerSettings(NamedTuple):
-    """How one plate is printed in filament, by the slicer's own names."""
+@dataclass(frozen=True, slots=True)
+class SlicerSettings:
+    """How a plate is printed in filament; projects say it by their slicer's names."""
 
-    of_object: tuple[tuple[str, str], ...]  #: of each object, over any print settings
-    files: tuple[tuple[str, str], ...]  #: name and text of those added to a package
+    printer: Printer  #: with a nozzle
+    supports: bool = False
+    colour_change_mm: float = 0.0  #: height at which the filament is changed; 0: nowhere
+    symbols_apart: bool = True  #: symbols in another filament, where the slicer can change it
+
+    @property
+    def entries(self) -> dict[str, str]:
+        """What PrusaSlicer reads as the settings of a project."""
+        printer = self.printer
+        width, depth = (f"{side:g}" for side in printer.bed_mm)
+        return {
+            "printer_technology": "FFF",
+            "printer_settings_id": "encoded-objects",
+            "bed_shape": f"0x0,{width}x0,{width}x{depth},0x{depth}",
+            "nozzle_diameter": f"{printer.nozzle_mm:g}",
+            "filament_diameter": "1.75",
+            "filament_density": "1.24",
+            "filament_type": "PLA",
+            "first_layer_temperature": "215",
+            "temperature": "210",
+            "first_layer_bed_temperature": "60",
+            "bed_temperature": "60",
+            "layer_height": f"{printer.layer_mm:g}",
+            "first_layer_height": f"{printer.first_layer_mm:g}",
+            "fill_density": "15%",
+            "support_material": str(int(self.supports)),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class MeshText:
+    """A mesh where it lies on the bed, as the elements of a 3MF."""
+
+    name: str
+    material: int  #: `BODY` or `SYMBOLS`
+    vertices: DeflatedText
+    triangles: DeflatedText
+    count: int  #: of its triangles
+
+
+@dataclass(frozen=True, slots=True)
+class PartText:
+    """A part on a plate: its body, and its symbols where it has any."""
+
+    name: str
+    centre_mm: Size  #: of its box
+    meshes: tuple[MeshText, ...]
+    body_after: DeflatedText | None  #: triangles of the body, numbered after the symbols' vertices
 
 
 @dataclass(frozen=True, slots=True)
 class PrintFile:
-    """One plate as two 3MF files; see the module."""
+    """One plate, its texts deflated once for all files that hold it; see the module."""
 
     plate: Plate
-    content: bytes  #: body and symbols as components
-    prusaslicer: bytes  #: as volumes
+    title: str
+    parts: tuple[PartText, ...]  #: in the order of the plate's places
+    settings: SlicerSettings | None
 
+    @property
+    def content(self) -> bytes:
+        """The 3MF with body and symbols as components."""
+        return _components(self)
 
-def slicer_settings(
-    printer: Printer, *, supports: bool, colour_change_mm: float = 0.0
-) -> SlicerSettings | None:
-    """Return the settings of a plate, or None for a printer without a nozzle.
-
-    The filament is changed at a height of `colour_change_mm`; 0: nowhere.
-    """
-    if not printer.nozzle_mm:
-        return None
-    width, depth = (f"{side:g}" for side in printer.bed_mm)
-    own = {"layer_height": f"{printer.layer_mm:g}", "support_material": str(int(supports))}
-    entries = {
-        "printer_technology": "FFF",
-        "printer_settings_id": "encoded-objects",
-        "bed_shape": f"0x0,{width}x0,{width}x{depth},0x{depth}",
-        "nozzle_diameter": f"{printer.nozzle_mm:g}",
-        "filament_diameter": "1.75",
-        "filament_density": "1.24",
-        "filament_type": "PLA",
-        "first_layer_temperature": "215",
-        "temperature": "210",
-        "first_layer_bed_temperature": "60",
-        "bed_temperature": "60",
-        "layer_height": own["layer_height"],
-        "first_layer_height": f"{printer.first_layer_mm:g}",
-        "fill_density": "15%",
-        "support_material": own["support_material"],
-    }
-    lines = [f"; {name} = {value}\n" for name, value in entries.items()]
-    files = {_SETTINGS: "; made by encoded-objects\n\n" + "".join(lines)}
-    change = printer.printed_mm(colour_change_mm) if colour_change_mm else 0.0
-    if change > 0:
-        # The slicer changes before the layer that ends at or above this height.
-        files[_COLOUR_CHANGE] = (
-            '<?xml version="1.0" encoding="utf-8"?>\n<custom_gcodes_per_print_z>\n'
-            f'<code print_z="{change + printer.layer_mm:.6g}" type="0" extruder="1" '
-            f'color="{hexadecimal(SYMBOL_RGB)}" '
-            'extra="" gcode="M600"/>\n<mode value="SingleExtruder"/>\n'
-            "</custom_gcodes_per_print_z>\n"
-        )
-    return SlicerSettings(tuple(own.items()), tuple(files.items()))
+    @property
+    def prusaslicer(self) -> bytes:
+        """The 3MF with body and symbols as volumes."""
+        return _volumes(self)
 
 
 def write_plates(exported: ExportedObject) -> Files:
@@ -140,18 +153,16 @@ def print_files(
     Parts lie in their own frames, mm, as on the bed; of one without symbols name and mesh.
     """
     held = [_bed_part(part) for part in parts]
-    plates = arrange_plates([part.size for part in held], bed_mm)
-    return tuple(
-        PrintFile(plate, *_plate_packages(title, held, plate, settings)) for plate in plates
-    )
+    corner = settings.printer.blocked_mm if settings else (0.0, 0.0)
+    plates = arrange_plates([part.size for part in held], bed_mm, blocked_mm=corner)
+    return tuple(_print_file(title, held, plate, settings) for plate in plates)
 
 
 def print_file(
     title: str, parts: Sequence[Part], plate: Plate, settings: SlicerSettings | None = None
 ) -> PrintFile:
     """Return the 3MF files of one plate; its places count `parts`, which are all on it."""
-    held = [_bed_part(part) for part in parts]
-    return PrintFile(plate, *_plate_packages(title, held, plate, settings))
+    return _print_file(title, [_bed_part(part) for part in parts], plate, settings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,85 +233,84 @@ def _move_to_bed(mesh: _BedMesh, part: _BedPart, place: BedPlace) -> _BedMesh:
     return _BedMesh(mesh.name, mesh.material, points + shift, mesh.triangles)
 
 
-@dataclass(slots=True)
-class _Model:
-    """The text of one model so far."""
-
-    pieces: list[DeflatedText] = field(default_factory=list)
-    items: list[str] = field(default_factory=list)
-    number: int = 2  #: of the next object; 1 are the materials
-
-    def add(self, *pieces: str | DeflatedText) -> None:
-        self.pieces += [
-            deflate_text([piece.encode()]) if isinstance(piece, str) else piece for piece in pieces
-        ]
-
-    def item(self) -> None:
-        """Put the next object on the bed, where its vertices are."""
-        self.items.append(f'<item objectid="{self.number}"/>\n')
-        self.number += 1
-
-
-def _plate_packages(
+def _print_file(
     title: str, parts: Sequence[_BedPart], plate: Plate, settings: SlicerSettings | None
-) -> tuple[bytes, bytes]:
-    """Return one plate as components and as volumes; its places count `parts`."""
-    components, volumes = _Model(), _Model()
-    for model in (components, volumes):
-        model.add(_header(title))
-    for place in plate.places:
-        part = parts[place.part]
-        body = _move_to_bed(part.body, part, place)
-        symbols = None if part.symbols is None else _move_to_bed(part.symbols, part, place)
-        _add_part(part.name, body, symbols, components, volumes)
-    for model in (components, volumes):
-        model.add(f"</resources>\n<build>\n{''.join(model.items)}</build>\n</model>\n")
-    more = {_CONFIG: _volume_settings(parts, plate, settings)}
-    if settings is not None:
-        more |= dict(settings.files)
-    return _package(components.pieces), _package(volumes.pieces, more)
+) -> PrintFile:
+    texts = tuple(_part_text(parts[place.part], place) for place in plate.places)
+    return PrintFile(plate, title, texts, settings)
 
 
-def _add_part(
-    name: str, body: _BedMesh, symbols: _BedMesh | None, components: _Model, volumes: _Model
-) -> None:
-    """Add a part as an object of one or two components, and as one mesh of as many volumes."""
-    points, faces = body.vertex_text(), body.triangle_text()
-    references = [_add_mesh(components, body, points, faces)]
-    if symbols is None:
-        volumes.add(_mesh_head(volumes.number, name, BODY), points, _TO_TRIANGLES, faces, _TO_END)
-    else:
-        own, sides = symbols.vertex_text(), symbols.triangle_text()
-        references.append(_add_mesh(components, symbols, own, sides))
-        moved = body.triangle_text(len(symbols.vertices), f' pid="1" p1="{BODY}"')
-        head = _mesh_head(volumes.number, name, SYMBOLS)
-        volumes.add(head, own, points, _TO_TRIANGLES, moved, sides, _TO_END)
-    volumes.item()
-    components.add(
-        f'<object id="{components.number}" type="model" name={quoteattr(name)}>'
-        f"<components>{''.join(references)}</components></object>\n"
+def _part_text(part: _BedPart, place: BedPlace) -> PartText:
+    meshes = [_move_to_bed(mesh, part, place) for mesh in part.meshes]
+    after = None
+    if part.symbols is not None:
+        after = meshes[0].triangle_text(len(part.symbols.vertices), f' pid="1" p1="{BODY}"')
+    width, depth = part.size[::-1] if place.turned else part.size
+    return PartText(
+        part.name,
+        (round(place.x_mm + width / 2, PLACES), round(place.y_mm + depth / 2, PLACES)),
+        tuple(
+            MeshText(m.name, m.material, m.vertex_text(), m.triangle_text(), len(m.triangles))
+            for m in meshes
+        ),
+        after,
     )
-    components.item()
 
 
-def _add_mesh(model: _Model, mesh: _BedMesh, points: DeflatedText, faces: DeflatedText) -> str:
-    """Add a mesh as an object; return the component that refers to it."""
-    head = _mesh_head(model.number, mesh.name, mesh.material)
-    model.add(head, points, _TO_TRIANGLES, faces, _TO_END)
-    model.number += 1
-    return f'<component objectid="{model.number - 1}"/>'
+def _components(file: PrintFile) -> bytes:
+    """Return a plate with each part as an object of one or two components."""
+    pieces: list[str | DeflatedText] = [_header(file.title)]
+    items, number = [], 2  # of the next object; 1 are the materials
+    for part in file.parts:
+        references = []
+        for mesh in part.meshes:
+            pieces += mesh_object(number, mesh, f'pid="1" pindex="{mesh.material}"')
+            references.append(f'<component objectid="{number}"/>')
+            number += 1
+        pieces.append(
+            f'<object id="{number}" type="model" name={quoteattr(part.name)}>'
+            f"<components>{''.join(references)}</components></object>\n"
+        )
+        items.append(number)
+        number += 1
+    return _package(_model(pieces, items))
 
 
-def _mesh_head(number: int, name: str, material: int) -> str:
-    return (
-        f'<object id="{number}" type="model" name={quoteattr(name)} pid="1" pindex="{material}">'
-        "<mesh><vertices>\n"
-    )
+def _volumes(file: PrintFile) -> bytes:
+    """Return a plate with each part as one mesh of one or two volumes, and PrusaSlicer's files."""
+    pieces: list[str | DeflatedText] = [_header(file.title)]
+    for number, part in enumerate(file.parts, 2):
+        body, *symbols = part.meshes
+        head = _mesh_head(number, part.name, f'pid="1" pindex="{len(symbols)}"')
+        points = [mesh.vertices for mesh in (*symbols, body)]
+        faces = [part.body_after or body.triangles, *(mesh.triangles for mesh in symbols)]
+        pieces += [head, *points, _TO_TRIANGLES, *faces, _TO_END]
+    more = {_CONFIG: _volume_settings(file)}
+    if file.settings is not None:
+        more |= _prusaslicer_files(file.settings)
+    return _package(_model(pieces, range(2, len(file.parts) + 2)), more)
+
+
+def mesh_object(number: int, mesh: MeshText, properties: str = "") -> list[str | DeflatedText]:
+    """Return a mesh as an object, in pieces; `properties` are more attributes of it."""
+    head = _mesh_head(number, mesh.name, properties)
+    return [head, mesh.vertices, _TO_TRIANGLES, mesh.triangles, _TO_END]
+
+
+def _model(pieces: Iterable[str | DeflatedText], items: Iterable[int]) -> list[DeflatedText]:
+    """Return a model of objects, of which `items` lie on the bed, where their vertices are."""
+    built = "".join(f'<item objectid="{number}"/>\n' for number in items)
+    return deflated([*pieces, f"</resources>\n<build>\n{built}</build>\n</model>\n"])
+
+
+def _mesh_head(number: int, name: str, properties: str) -> str:
+    more = f" {properties}" if properties else ""
+    return f'<object id="{number}" type="model" name={quoteattr(name)}{more}><mesh><vertices>\n'
 
 
 def _header(title: str) -> str:
     return (
-        f'{_XML}<model unit="millimeter" xml:lang="en-US" '
+        f'{XML}<model unit="millimeter" xml:lang="en-US" '
         'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">\n'
         f'<metadata name="Title">{quoteattr(title)[1:-1]}</metadata>\n'
         '<metadata name="Application">encoded-objects</metadata>\n<resources>\n'
@@ -310,14 +320,30 @@ def _header(title: str) -> str:
     )
 
 
-def _volume_settings(
-    parts: Sequence[_BedPart], plate: Plate, settings: SlicerSettings | None
-) -> str:
+def _prusaslicer_files(settings: SlicerSettings) -> dict[str, str]:
+    """Return the files that hold PrusaSlicer's settings, by name."""
+    lines = [f"; {name} = {value}\n" for name, value in settings.entries.items()]
+    files = {_SETTINGS: "; made by encoded-objects\n\n" + "".join(lines)}
+    printer, change = settings.printer, settings.colour_change_mm
+    change = printer.printed_mm(change) if change else 0.0
+    if change > 0:
+        # The slicer changes before the layer that ends at or above this height.
+        files[_COLOUR_CHANGE] = (
+            '<?xml version="1.0" encoding="utf-8"?>\n<custom_gcodes_per_print_z>\n'
+            f'<code print_z="{change + printer.layer_mm:.6g}" type="0" extruder="1" '
+            f'color="{hexadecimal(SYMBOL_RGB)}" '
+            'extra="" gcode="M600"/>\n<mode value="SingleExtruder"/>\n'
+            "</custom_gcodes_per_print_z>\n"
+        )
+    return files
+
+
+def _volume_settings(file: PrintFile) -> str:
     """Return PrusaSlicer's settings of a plate: the ranges of triangles that are volumes."""
-    own = {} if settings is None else dict(settings.of_object)
-    text = [f"{_XML}<config>\n"]
-    for number, place in enumerate(plate.places, 2):
-        part = parts[place.part]
+    entries = file.settings.entries if file.settings else {}
+    own = {name: entries[name] for name in _OF_OBJECT if name in entries}
+    text = [f"{XML}<config>\n"]
+    for number, part in enumerate(file.parts, 2):
         text.append(
             f'<object id="{number}" instances_count="1">\n'
             f'<metadata type="object" key="name" value={quoteattr(part.name)}/>\n'
@@ -327,7 +353,7 @@ def _volume_settings(
         ]
         first = 0
         for mesh in part.meshes:
-            last = first + len(mesh.triangles) - 1
+            last = first + mesh.count - 1
             text.append(
                 f'<volume firstid="{first}" lastid="{last}">\n'
                 f'<metadata type="volume" key="name" value={quoteattr(mesh.name)}/>\n'
@@ -341,14 +367,28 @@ def _volume_settings(
     return "".join(text)
 
 
-def _package(model: Sequence[DeflatedText], more: dict[str, str] | None = None) -> bytes:
+def _package(model: Sequence[DeflatedText], more: Mapping[str, str] | None = None) -> bytes:
     """Return the zip of a model, of the two files that every 3MF has, and of some more."""
-    before = {"[Content_Types].xml": _CONTENT_TYPES, "_rels/.rels": _RELATIONSHIPS}
-    entries = {name: [deflate_text([text.encode()])] for name, text in before.items()}
-    entries[_MODEL] = list(model)
-    for name, text in (more or {}).items():
-        entries[name] = [deflate_text([text.encode()])]
-    return zip_package(entries)
+    texts = {name: deflated([text]) for name, text in (more or {}).items()}
+    return zip_package(package_head() | {MODEL: model} | texts)
+
+
+def package_head() -> dict[str, Sequence[DeflatedText]]:
+    """Return the two files that every 3MF begins with."""
+    return {
+        "[Content_Types].xml": deflated([_CONTENT_TYPES]),
+        "_rels/.rels": deflated([relationships([f"/{MODEL}"])]),
+    }
+
+
+def relationships(models: Iterable[str]) -> str:
+    """Return the file that names the models of a package, or those that a model refers to."""
+    found = "".join(
+        f'<Relationship Target="{target}" Id="rel{number}" '
+        'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>'
+        for number, target in enumerate(models)
+    )
+    return f"{_RELATIONSHIPS}{found}</Relationships>\n"
 
 
 _LEVEL = 4  # of compression: 6 takes twice as long for a few percent
@@ -382,6 +422,11 @@ def deflate_text(pieces: Iterable[bytes]) -> DeflatedText:
         crc = zlib.crc32(piece, crc)
     blocks.append(packer.flush(zlib.Z_FULL_FLUSH))
     return DeflatedText(b"".join(blocks), size, crc)
+
+
+def deflated(pieces: Iterable[str | DeflatedText]) -> list[DeflatedText]:
+    """Return pieces of a text, each deflated."""
+    return [deflate_text([one.encode()]) if isinstance(one, str) else one for one in pieces]
 
 
 def zip_package(entries: Mapping[str, Sequence[DeflatedText]]) -> bytes:

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from encoded_objects.base.output import some_of
 from generator.layout.footprint import Region
 from generator.layout.lattice import LatticeRequest
 
@@ -34,7 +35,7 @@ def describe_blank(
         alike.setdefault(size, []).append(name)
     rows, columns = request.window
     listed = "; ".join(
-        f"{'faces' if len(same) > 1 else 'face'} {', '.join(same)} ({size})"
+        f"{'faces' if len(same) > 1 else 'face'} {some_of(same)} ({size})"
         for size, same in alike.items()
     )
     return (

@@ -2,8 +2,9 @@
 
 `NAME-F1.step`, `NAME-F1.stl`, ... one per part in its local origin; `NAME.step`, the panels as an
 assembly (`.stpz`: gzipped); `NAME.3mf` and `NAME-prusaslicer.3mf` for each plate of the printer;
-`NAME.glb` assembled; `NAME.xml`, `NAME.urdf`, `NAME.sdf` with their meshes and `NAME.usdc` for
-robots; the picture `NAME.png`, the build sheet `NAME-build.html`, and `NAME-array.svg`.
+`NAME-bambu.3mf` with all plates; `NAME.glb` assembled; `NAME.xml`, `NAME.urdf`, `NAME.sdf` with
+their meshes and `NAME.usdc` for robots; the picture `NAME.png`, the build sheet
+`NAME-build.html`, and `NAME-array.svg`.
 """
 
 from __future__ import annotations
@@ -18,17 +19,19 @@ from numpy.typing import NDArray
 from generator.database.registered import RegisteredPart
 from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.atomic import Staging
+from generator.export.bambu import PLATES_MAX
 from generator.export.formats import EXPORTERS, ExportedObject, stage_formats
 from generator.export.preview import preview_png
-from generator.export.threemf import SlicerSettings, slicer_settings
+from generator.export.threemf import SlicerSettings
 from generator.layout.placement import Layout, object_code
 from generator.pipeline.faces import FaceReport, face_reports
+from generator.pipeline.made import overhangs
 from generator.pipeline.place import BuiltParts
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.pipeline.sheet import SheetPlate, build_sheet
 from generator.polyhedron import Polyhedron, face_polygon
-from generator.solid import Part, emboss_whole, panels, prove_closed, triangles
+from generator.solid import Mesh, Part, emboss_whole, panels, prove_closed, triangles
 from generator.spec.problem import error_location
 
 if TYPE_CHECKING:
@@ -59,6 +62,8 @@ def stage(
 ) -> StagedObject:
     """Write all files of an object into the staging folder: `formats` of `EXPORTERS`, and pictures.
 
+    Without formats nothing is written.
+
     Parameters
     ----------
     built
@@ -81,7 +86,8 @@ def stage(
         prove_closed(part)
     meshes = [triangles(part) for part in parts]
     exported = ExportedObject(
-        spec.name, plan.polyhedron, parts, meshes, plan.printer.bed_mm, settings_of(plan),
+        spec.name, plan.polyhedron, parts, meshes, plan.printer.bed_mm,
+        settings_of(plan, layout),
         density_kg_m3=spec.density_kg_m3, stroke_mm=spec.style.stroke_mm,
         touch=spec.collision == "touch",
     )  # fmt: skip
@@ -104,44 +110,66 @@ def stage(
         ]
         fit = verify_fit(panel_files, spec.gap_mm)
     on_sheet: list[SheetPlate] = []
-    if "3mf" in staged:
-        for number, plate in enumerate(exported.plates):
-            file, twin = staged["3mf"][2 * number : 2 * number + 2]
+    plates = exported.plates if {"3mf", "bambu"} & staged.keys() else ()
+    if plates:
+        for number, plate in enumerate(plates):
             cost = None
-            if slice_plates:
+            if slice_plates and "3mf" in staged:
                 from generator.printed.slicer import slice_plate
 
                 progress(f"slicing plate {number + 1}", 0.8)
-                cost = slice_plate(twin.staged)
-            on_sheet.append(SheetPlate(file.path.name, plate.plate, cost))
-        large = [str(n) for n, plate in enumerate(exported.plates, 1) if not plate.plate.fits]
+                cost = slice_plate(staged["3mf"][2 * number + 1].staged)
+            if "bambu" in staged:
+                project = staged["bambu"][number // PLATES_MAX].path.name
+                name = f"{project}, plate {number % PLATES_MAX + 1}"
+            else:
+                name = staged["3mf"][2 * number].path.name
+            on_sheet.append(SheetPlate(name, plate.plate, cost))
+        large = [str(n) for n, plate in enumerate(plates, 1) if not plate.plate.fits]
         if large:
             width, depth = plan.printer.bed_mm
             bed = f"the bed of {plan.printer.name}, {width:g} x {depth:g} mm"
-            warnings += (f"plate {', '.join(large)}: larger than {bed}; print it elsewhere",)
+            warnings += (f"plate {', '.join(large)}: larger than {bed}; take a larger printer",)
     if any(EXPORTERS[name].robot for name in formats):
         warnings += exported.robot.warnings
-    progress("drawing", 0.85)
-    size = outer_size_mm(plan.polyhedron, parts).tolist()
     faces = face_reports(plan, layout)
+    if formats:
+        progress("drawing", 0.85)
+        _draw(plan, layout, parts, meshes, faces, on_sheet, staging)
+    return StagedObject(registered, len(parts), warnings, faces, fit)
+
+
+def _draw(
+    plan: ObjectPlan, layout: Layout, parts: Sequence[Part], meshes: Sequence[Mesh],
+    faces: Sequence[FaceReport], plates: Sequence[SheetPlate], staging: Staging,
+) -> None:  # fmt: skip
+    """Write the picture, the build sheet and the faces on the array."""
+    name = plan.spec.name
+    size = outer_size_mm(plan.polyhedron, parts).tolist()
     shares = {
         face.name: (face.promise.at_once, face.promise.within_three)
         for face in faces
         if face.promise is not None
     }
-    staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes, shares))
-    page = build_sheet(plan, layout, parts, on_sheet)
-    staging.write(f"{spec.name}-build.html", page.encode())
-    staging.write(f"{spec.name}-array.svg", _array_picture(plan, layout).encode())
-    return StagedObject(registered, len(parts), warnings, faces, fit)
+    picture = preview_png(name, size, parts, meshes, shares)
+    staging.write(f"{name}.png", picture)
+    page = build_sheet(plan, layout, parts, plates, picture)
+    staging.write(f"{name}-build.html", page.encode())
+    staging.write(f"{name}-array.svg", _array_picture(plan, layout).encode())
 
 
-def settings_of(plan: ObjectPlan) -> SlicerSettings | None:
-    """Return how a slicer prints the parts of an object."""
+def settings_of(plan: ObjectPlan, layout: Layout) -> SlicerSettings | None:
+    """Return how a slicer prints the parts of an object; None: in resin."""
     spec = plan.spec
     panelled = spec.parts == "panels"
-    change = spec.wall_mm if panelled and spec.colours > 1 else 0.0
-    return slicer_settings(plan.printer, supports=not panelled, colour_change_mm=change)
+    if not plan.printer.nozzle_mm:
+        return None
+    return SlicerSettings(
+        plan.printer,
+        supports=overhangs(plan, layout).supports,
+        colour_change_mm=spec.wall_mm if panelled and spec.colours > 1 else 0.0,
+        symbols_apart=panelled or spec.colours > 1,  # of one body they share all layers with it
+    )
 
 
 def parts_of(plan: ObjectPlan, layout: Layout) -> BuiltParts:

@@ -118,7 +118,7 @@ def describe_object(
         reused=reused,
         skipped=skipped,
         fit=fit,
-        lying=overhang_text(plan, layout) if plan.spec.parts == "whole" else None,
+        lying=overhangs(plan, layout).text if plan.spec.parts == "whole" else None,
         touches=touches_needed(
             plan.array.order,
             plan.array.rows * plan.array.columns,
@@ -130,8 +130,23 @@ def describe_object(
     )
 
 
-def overhang_text(plan: ObjectPlan, layout: Layout) -> str:
-    """Return how a whole body lies on the bed, and its overhangs; z of the object frame is up."""
+@dataclass(frozen=True, slots=True)
+class Overhangs:
+    """How parts lie, and what hangs over: sheets, advice and slicer projects take it from here."""
+
+    text: str
+    faces: tuple[str, ...] = ()  #: that hang over
+
+    @property
+    def supports(self) -> bool:
+        """Whether a slicer must make supports."""
+        return bool(self.faces)
+
+
+def overhangs(plan: ObjectPlan, layout: Layout) -> Overhangs:
+    """Return how the parts lie, and what hangs over of a whole body: z of its frame is up."""
+    if plan.spec.parts == "panels":
+        return Overhangs("every panel on its back, symbols up; no supports")
     polyhedron, limit = plan.polyhedron, math.sin(plan.printer.overhang_max_rad)
     counts = {face.face: len(face.labels) for face in layout.faces}
     lowest = float(polyhedron.vertices[:, 2].min())
@@ -151,13 +166,15 @@ def overhang_text(plan: ObjectPlan, layout: Layout) -> str:
         elif abs(up) <= limit:
             upright += count
     lies = f"{bottom} down" if bottom else "as the file has it"
+    over = tuple(dict.fromkeys(faces))
     if not plan.printer.nozzle_mm:  # resin
-        return f"{lies}, supports where no symbols are"
-    needed = "no supports needed below"
-    if faces:
+        return Overhangs(f"{lies}, supports where no symbols are", over)
+    needed = "no supports needed"
+    if over:
         counted = f"{symbols} symbols hang over" if symbols else "they hang over"
-        needed = f"supports needed under {', '.join(dict.fromkeys(faces))} ({counted})"
+        needed = f"supports needed under {', '.join(over)} ({counted})"
     if upright:  # their lower sides hang over by their height
         needed += f", {upright} symbols stand out sideways"
     has_round = bool(polyhedron.surfaces or polyhedron.blank)
-    return f"{lies}, {needed}" + ("" if has_round else "; with  parts: panels  nothing hangs over")
+    better = "" if has_round else "; with  parts: panels  nothing hangs over"
+    return Overhangs(f"{lies}, {needed}{better}", over)

@@ -1,23 +1,24 @@
 """A set on the printer's bed: plates, a labelled overview, a packing list, a build sheet.
 
 Objects with their layouts -> `SET-plate-1.3mf`, `SET-plate-1-prusaslicer.3mf`, ...,
-`SET-build.html`, `SET-overview.pdf`, `SET-packing.csv`. Objects for one printer share its
-plates. The packing list is made each time; where the one that stands there is equal, and all
-plates are there, they stay.
+`SET-bambu.3mf`, `SET-build.html`, `SET-overview.pdf`, `SET-packing.csv`. Objects for one printer
+share its plates. The packing list is made each time; where the one that stands there is equal,
+and all plates are there, they stay.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import quote
 
 from generator.export.atomic import Staging
+from generator.export.bambu import PLATES_MAX, project_3mf, project_names
 from generator.export.bed import Plate, arrange_plates
 from generator.export.drawing import draw_boxes
 from generator.export.set_files import PackedPart, can_draw, overview_pdf, packing_csv
@@ -25,11 +26,12 @@ from generator.export.sheet import Figure, Mark, Section, sheet_html
 from generator.export.threemf import PrintFile, SlicerSettings, print_file
 from generator.layout.placement import Layout, object_code
 from generator.pipeline.files import parts_of, settings_of
+from generator.pipeline.made import overhangs
 from generator.pipeline.make import MakeJob
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, part_of_progress
-from generator.pipeline.sheet import Rows, cost_text, layers_text, lies_text, material_text
+from generator.pipeline.sheet import Rows, cost_text, layers_text, material_text
 from generator.printers import Printer
 from generator.solid import Part, box, volume
 
@@ -86,19 +88,22 @@ def write_set(
     rows = sorted((row for some in packed for row in some), key=lambda row: row.order)
     listed = packing_csv(rows)
     with_models = any("3mf" in job.formats for job, _ in objects)
+    of_bambu = {job.plan.printer for job, _ in objects if "bambu" in job.formats}
     models = [
         f"{name}-plate-{number}{kind}.3mf"
         for number in range(1, len(plates) + 1)
         for kind in ("", "-prusaslicer")
         if with_models
     ]
+    projects = _projects(name, plates, of_bambu)
+    models += [project.file for project in projects]
     overview = [f"{name}-overview.pdf"] if can_draw() else []
     names = [f"{name}-packing.csv", f"{name}-build.html", *overview, *models]
     if not slice_plates and _same_files(folder, names, listed):
         return tuple(folder / each for each in names)
     costs: list[PlateCost | None] = [None] * len(plates)
     with Staging(folder) as staging:
-        if with_models:
+        if models:
             contents = workers.done(
                 [
                     Task(f"plate {number}", _plate_files, _plate_task(objects, name, plate))
@@ -106,7 +111,10 @@ def write_set(
                 ],
                 part_of_progress(progress, 0.3, 0.9),
             )
-            for number, content in enumerate(contents, 1):
+            for project in projects:
+                held = [contents[number] for number in project.plates]
+                staging.write(project.file, project_3mf(name, held))
+            for number, content in enumerate(contents if with_models else (), 1):
                 staging.write(f"{name}-plate-{number}.3mf", content.content)
                 file = f"{name}-plate-{number}-prusaslicer.3mf"
                 twin = staging.write(file, content.prusaslicer)
@@ -115,7 +123,11 @@ def write_set(
                     from generator.printed.slicer import slice_plate
 
                     costs[number - 1] = slice_plate(twin.staged)
-        page = _set_sheet(name, objects, folder, plates, costs)
+        files = [f"{name}-plate-{number}.3mf" for number in range(1, len(plates) + 1)]
+        for project in projects:
+            for k, number in enumerate(project.plates, 1):
+                files[number] = f"{project.file}, plate {k}"
+        page = _set_sheet(name, objects, folder, plates, costs, files)
         staging.write(f"{name}-build.html", page.encode())
         if overview:
             progress("drawing the overview", 0.9)
@@ -151,14 +163,37 @@ def _measure(number: int, plan: ObjectPlan, layout: Layout) -> list[SetPart]:
 def _plates(objects: Sequence[SetObject], parts: Sequence[SetPart]) -> list[SetPlate]:
     """Arrange all parts: those that one printer prints with the same settings lie together."""
     plates: list[SetPlate] = []
-    ways = [(job.plan.printer, settings_of(job.plan)) for job, _ in objects]
+    ways = [(job.plan.printer, settings_of(job.plan, layout)) for job, layout in objects]
     for printer, settings in dict.fromkeys(ways):
         own = tuple(part for part in parts if ways[part.number] == (printer, settings))
         sizes = [part.size_mm[:2] for part in own]
         groups = [part.number for part in own]
-        for plate in arrange_plates(sizes, printer.bed_mm, groups=groups):
+        for plate in arrange_plates(sizes, printer.bed_mm, groups, printer.blocked_mm):
             plates.append(SetPlate(printer, settings, plate, own))
     return plates
+
+
+class _Project(NamedTuple):
+    """A project for Bambu Studio, and the numbers of its plates, from 0."""
+
+    file: str
+    plates: Sequence[int]
+
+
+def _projects(
+    name: str, plates: Sequence[SetPlate], printers: Collection[Printer]
+) -> list[_Project]:
+    """Return the projects of the plates of some printers, as many for each as they need."""
+    by_printer: dict[Printer, list[int]] = {}
+    for number, plate in enumerate(plates):
+        by_printer.setdefault(plate.printer, []).append(number)
+    batches = [
+        own[k : k + PLATES_MAX]
+        for printer, own in by_printer.items()
+        if printer in printers
+        for k in range(0, len(own), PLATES_MAX)
+    ]
+    return [_Project(*one) for one in zip(project_names(name, len(batches)), batches, strict=True)]
 
 
 def _packing_rows(objects: Sequence[SetObject], plate: SetPlate, number: int) -> list[PackedPart]:
@@ -224,10 +259,11 @@ def _set_sheet(
     folder: Path,
     plates: Sequence[SetPlate],
     costs: Sequence[PlateCost | None],
+    files: Sequence[str],
 ) -> str:
     printers = list(dict.fromkeys(plate.printer for plate in plates))
     drawings, lying = [], [list[str]() for _ in objects]
-    for number, (plate, cost) in enumerate(zip(plates, costs, strict=True), 1):
+    for number, (plate, cost, file) in enumerate(zip(plates, costs, files, strict=True), 1):
         held = sorted({plate.parts[place.part].number for place in plate.plate.places})
         for one in held:
             lying[one].append(str(number))
@@ -237,7 +273,7 @@ def _set_sheet(
         boxes = [(p.name, p.size_mm[:2]) for p in plate.parts]
         drawing = draw_boxes(boxes, plate.plate, plate.printer.bed_mm)
         text = what + (f"; {cost}" if cost else "")
-        drawings.append(Figure(drawing, text, f"{name}-plate-{number}.3mf"))
+        drawings.append(Figure(drawing, text, file))
     listed = []
     for (job, layout), on in zip(objects, lying, strict=True):
         link = Path(os.path.relpath(build_sheet_path(job), folder)).as_posix()
@@ -245,20 +281,20 @@ def _set_sheet(
         listed.append((job.plan.spec.name, Mark(code), ", ".join(on), Mark(link, quote(link))))
     facts = _facts(objects, plates, costs, printers)
     sort = (
-        "Every back names its object, or bears the object's short code: sort the parts by object "
-        "before anything is glued."
+        "Every back names its object, or bears its mark where the name has no room: sort the parts "
+        "by object before anything is glued."
     )
     again = (
         "The plates above hold everything. Each folder has plates of its object alone, too: for "
         "one that is printed again."
     )
-    head = ("object", "short code", "plates", "sheet")
+    head = ("object", "mark on small parts", "plates", "sheet")
     return sheet_html(
         f"{name}: build sheet",
         [
             Section(rows=facts),
-            Section("Objects and their codes", head=head, rows=listed),
-            Section("Print", figures=drawings, wide=True, notes=(sort, again)),
+            Section("Objects and their marks", head=head, rows=listed),
+            Section("Print", figures=drawings, notes=(sort, again)),
         ],
     )
 
@@ -277,9 +313,9 @@ def _facts(
         rows += [("layers", layers_text(printer))]
     by_way: dict[str, list[str]] = {}
     for job, layout in objects:
-        by_way.setdefault(lies_text(job.plan, layout), []).append(job.plan.spec.name)
+        by_way.setdefault(overhangs(job.plan, layout).text, []).append(job.plan.spec.name)
     for way, names in by_way.items():
-        rows.append(("lies", way if len(by_way) == 1 else f"{', '.join(names)}: {way}"))
+        rows.append(("on the bed", way if len(by_way) == 1 else f"{', '.join(names)}: {way}"))
     rows.append(("scale", "100 %"))
     for resin in sorted({not printer.nozzle_mm for printer in printers}):
         volume_mm3 = sum(

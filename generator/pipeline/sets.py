@@ -72,12 +72,12 @@ def make_set(
         found = workers.done(list(tasks.values()), part_of_progress(progress, 0.1, 0.8))
         made |= dict(zip(tasks, found, strict=True))
         objects = [made[number] for number in range(len(to_make))]
-        files = write_set(
+        files = () if not any(job.formats for job in to_make) else write_set(
             [(job, one.layout) for job, one in zip(to_make, objects, strict=True)],
             folder, workers, part_of_progress(progress, 0.8, 1.0), slice_plates=slice_plates,
             replace=ours,
         )  # fmt: skip
-    if not can_draw():
+    if files and not can_draw():
         notice = f"the set has no overview: matplotlib is not installed; {install_line('report')}"
         objects[0] = replace(objects[0], warnings=(*objects[0].warnings, notice))
     return objects, files
@@ -122,6 +122,8 @@ def _intact_object(connection: Connection, job: MakeJob) -> MadeObject | None:
     parts = {state.part.name for state in states}
     stem = job.folder / plan.spec.name
     others = [Path(f"{stem}.png"), build_sheet_path(job), Path(f"{stem}-array.svg")]
+    if not job.formats:
+        others = []
     if "step" in job.formats and len(parts) > 1:
         others.append(Path(f"{stem}.step"))
     if "glb" in job.formats:
@@ -130,6 +132,9 @@ def _intact_object(connection: Connection, job: MakeJob) -> MadeObject | None:
         found = job.folder.glob(f"{glob.escape(plan.spec.name)}-plate-*.3mf")
         plates = sorted(found, key=lambda plate: natural_key(plate.name))
         others += plates or [Path(f"{stem}.3mf"), Path(f"{stem}-prusaslicer.3mf")]
+    if "bambu" in job.formats:
+        found = job.folder.glob(f"{glob.escape(plan.spec.name)}-bambu*.3mf")
+        others += sorted(found) or [Path(f"{stem}-bambu.3mf")]
     if not all(other.is_file() for other in others):
         return None
     files = (*(state.path for state in states), *others)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from encoded_objects.base.output import some_of
 from generator.alphabet.figures import in_figures
 from generator.alphabet.outline import Tiers
 from generator.errors import SolidError
@@ -100,7 +101,7 @@ def panels(
         parts.append(part.moved(np.array([-middle[0], -middle[1], 0.0])))
     warnings = [_no_room(missing)] if missing else []
     if nameless:
-        warnings.append(f"no room for a name on the back of {', '.join(nameless)}: mark by hand")
+        warnings.append(f"no room for a name on the back of {some_of(nameless)}: mark by hand")
     return Panels(tuple(parts), tuple(warnings))
 
 
@@ -131,13 +132,13 @@ def _no_room(missing: dict[str, tuple[str, ...]]) -> str:
     backs: dict[str, list[str]] = {}
     for face, texts in missing.items():
         edges = sorted(map(int, texts))
-        what = f"edge{'s' if len(edges) > 1 else ''} {', '.join(map(str, edges))}"
+        what = f"edge{'s' if len(edges) > 1 else ''} {some_of(list(map(str, edges)))}"
         backs.setdefault(what, []).append(face)
     kinds = list(backs.items())
     if rest := [face for _, faces in kinds[_LISTED:] for face in faces]:
         kinds = [*kinds[:_LISTED], ("others", rest)]
     places = [
-        f"of {what} on the back{'s' if len(faces) > 1 else ''} of {', '.join(faces)}"
+        f"of {what} on the back{'s' if len(faces) > 1 else ''} of {some_of(faces)}"
         for what, faces in kinds
     ]
     return f"no room for the numbers {'; '.join(places)}"

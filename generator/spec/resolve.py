@@ -151,7 +151,7 @@ def resolve(
         gap_mm=gap,
         printer=printer,
         colours=settings.print.colours,
-        formats=tuple(dict.fromkeys(settings.output.formats or FORMATS)),
+        formats=tuple(dict.fromkeys(settings.output.formats or _usual_formats(printer))),
         folder=Path(settings.output.folder or f"out/{folder_name(settings.name)}"),
         database=settings.output.database or DATABASE,
         lab_key=settings.output.lab_key or "",
@@ -163,6 +163,10 @@ def resolve(
     if settings.copies == 1:
         return (spec,)
     return tuple(replace(spec, name=f"{spec.name}-{k + 1}") for k in range(settings.copies))
+
+
+def _usual_formats(printer: Printer) -> tuple[str, ...]:
+    return (*FORMATS, "bambu") if printer.model else FORMATS
 
 
 def folder_name(name: str) -> str:
@@ -293,7 +297,12 @@ def _described_printer(settings: PrinterSettings, tree: Tree) -> Printer:
     given = {name: value for name, value in own_limits.items() if value is not None}
     if settings.nozzle is not None:
         limits = printer_of_nozzle(settings.nozzle)
-        base = replace(limits, name=base.name, description=base.description, bed_mm=base.bed_mm)
+        base = replace(
+            limits, name=base.name, description=base.description, bed_mm=base.bed_mm,
+            model=base.model, blocked_mm=base.blocked_mm,
+        )  # fmt: skip
+    if settings.bed not in (None, base.bed_mm):
+        given |= {"model": "", "blocked_mm": (0.0, 0.0)}  # a machine of its own
     if settings.gap is not None:
         given["gap_inside_mm"] = settings.gap * base.gap_inside_mm / base.gap_min_mm
     if not given and settings.nozzle is None and settings.name is None:

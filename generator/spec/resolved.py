@@ -66,7 +66,7 @@ class ObjectSpec:
     wall_mm: float  #: thickness of panels
     gap_mm: float  #: between panels where they meet in the finished object
     printer: Printer
-    formats: tuple[str, ...]  #: of step, stl, 3mf, glb, stpz, mjcf, urdf, sdf, usd
+    formats: tuple[str, ...]  #: of step, stl, 3mf, bambu, glb, stpz, mjcf, urdf, sdf, usd
     folder: Path  #: for the files; relative to the current folder
     database: str  #: URL
     source: Tree = field(repr=False, compare=False)  #: its settings as written, and their places
@@ -107,4 +107,6 @@ class ObjectSpec:
             known = printer_named(self.printer.name) == self.printer
         except GeneratorError:
             known = False
-        return self.printer.name if known else asdict(self.printer)
+        where = ("blocked_mm", "model")  # only say where parts lie, and older specs had none
+        own = {name: value for name, value in asdict(self.printer).items() if name not in where}
+        return self.printer.name if known else own

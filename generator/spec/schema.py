@@ -10,7 +10,9 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
 from encoded_objects.base.json_schema import DescribedSchema
-from generator.spec.settings import ObjectSettings, SetSettings
+from encoded_objects.base.sensor_type_file import shipped_names
+from generator.printers import MACHINES, PRINTERS
+from generator.spec.settings import ObjectSettings, Print, SetSettings
 from generator.spec.shape import EXAMPLES, Shape
 
 
@@ -32,6 +34,10 @@ def spec_schema() -> dict[str, Any]:
     for kind, text in EXAMPLES.items():
         if "..." not in text:
             shape["properties"][kind]["examples"] = [yaml.safe_load(text)[kind]]
+    blocks = schema["$defs"]
+    blocks[Print.__name__]["properties"]["printer"]["examples"] = [*PRINTERS, *MACHINES]
+    for block in (ObjectSettings, SetSettings):
+        blocks[block.__name__]["properties"]["sensor_type"]["examples"] = [*shipped_names()]
     one_kind = {"minProperties": 1, "maxProperties": 1}
     file_with_scale = {"required": ["file"], "maxProperties": 2}
     shape |= {"if": {"required": ["scale"]}, "then": file_with_scale, "else": one_kind}

@@ -408,7 +408,8 @@ class Print(Block):
     """What prints: its limits hold for strokes, gaps and the bed. A name, a YAML file, or a block
     of one's own: {like: ender-3, layer: 0.3 mm}."""
     colours: Literal[1, 2] = 1
-    """2: the filament is changed where the symbols begin (panels in PrusaSlicer)."""
+    """2: the filament is changed where the symbols begin (panels in PrusaSlicer). Bambu Studio's
+    projects print symbols of panels in another filament anyhow, with 2 those of one body too."""
 
 
 class Robot(Block):
@@ -427,7 +428,8 @@ class Output(Block):
     folder: PathText | None = None
     """Folder for the files, made if it is not there; out/NAME if left out."""
     formats: FormatList | None = None
-    """Files to write: step, stl, 3mf, glb, stpz, mjcf, urdf, sdf, usd; else the first three."""
+    """Files to write: step, stl, 3mf, bambu (a project for Bambu Studio and OrcaSlicer), glb, stpz,
+    mjcf, urdf, sdf, usd; else the first three, for a printer of Bambu Lab the first four."""
     database: DatabaseUrl | None = None
     """Database that registers the cells: sqlite:///lab.db, postgresql://host/name."""
     lab_key: LabKey | None = None

@@ -46,7 +46,7 @@ name: {name}
 
 # output:
 #   folder: out/{folder}
-#   formats: [step, stl, 3mf]        # and glb, stpz, mjcf, urdf, sdf, usd
+#   formats: [step, stl, 3mf]        # and bambu, glb, stpz, mjcf, urdf, sdf, usd
 #   database: sqlite:///lab.db       # or postgresql://host/name
 """
 

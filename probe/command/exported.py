@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,9 @@ def export_files(options: ExportOptions) -> int:
     another sensor; ContactError: the blur of a pad so high cannot be taken back;
     EncodedObjectsError: a file is there already.
     """
+    if (out := options.output) is not None:
+        named: dict[str, Any] = {"output": None, out.suffix[1:]: out}
+        options = dataclasses.replace(options, **named)
     csv, npy, png, mcap = options.csv, options.npy, options.png, options.mcap
     outputs = []
     for out, suffix in ((csv, ".csv"), (npy, ".npy"), (png, ".png"), (mcap, ".mcap")):

@@ -82,6 +82,9 @@ class ExportOptions(Options):
     """Which files are written of a recording, and how."""
 
     recording: Recording
+    output: Annotated[
+        File, Option("One of the files below, by its ending.", "OUT", names=("-o", "--output"))
+    ] = None
     csv: Annotated[File, Option("A table: seq, t_ns, readings, wrist, pose; counts.", "OUT")] = None
     npy: Annotated[File, Option("The images as a NumPy array (N, rows, columns).", "OUT")] = None
     png: Annotated[File, Option("One image as heat map and as surface, see --frame.", "OUT")] = None
@@ -105,8 +108,10 @@ class ExportOptions(Options):
 
     def check(self) -> None:
         """Refuse options that exclude each other."""
-        if self.csv is None and self.npy is None and self.png is None and self.mcap is None:
-            raise UsageError("nothing to write: give --csv, --npy, --png or --mcap")
+        if (out := self.output) is not None and out.suffix not in (".csv", ".npy", ".png", ".mcap"):
+            raise UsageError(f"-o {out}: end it in .csv, .npy, .png or .mcap")
+        if out is None and {self.csv, self.npy, self.png, self.mcap} == {None}:
+            raise UsageError("nothing to write: give -o, --csv, --npy, --png or --mcap")
         if self.calibration is not None and (self.csv is not None or self.mcap is not None):
             raise UsageError("--csv and --mcap hold counts; --calibration is for --npy and --png")
         if self.deblur is not None and self.calibration is None:

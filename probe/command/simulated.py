@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 from encoded_objects.base.console import INTERRUPTED, interruption
 from encoded_objects.base.errors import require
 from encoded_objects.base.files import refuse_taken, staged_file
-from encoded_objects.base.output import message, progress_bar, write, write_json
+from encoded_objects.base.output import count_of, message, progress_bar, write, write_json
 from probe.command.options import SimulateOptions
 from probe.command.recorded import check_output
 from probe.simulate.simulation import SimulatedProbe, SimulatedTouch, TouchOptions
@@ -64,6 +64,9 @@ def simulate_touches(options: SimulateOptions) -> int:
             draft.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", "utf-8")
     written = [str(out) for out in (output, png, truth) if out is not None]
     _say(result, first, written, as_json=options.as_json)
+    if probe.drawn_again:
+        again = count_of(probe.drawn_again, "touch")
+        message(f"{again} drawn again, where the plate found no rest")
     if len(kept) == number:
         return 0
     message(f"probe-sensor: interrupted after {len(kept):,} of {number:,} touches")

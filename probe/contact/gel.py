@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.sensor_type import SensorType, usual_force_n
 from probe.contact.contract import (
     STEEPEST_RAD,
     Contact,
@@ -61,7 +61,7 @@ def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
         raise ContactError(
             f"the plate tips or presses the gel through: {math.degrees(tilt):.3g} degrees, "
             f"{depth.max():.3g} mm of {sensor.overlay.height_mm:g} mm",
-            fix="press with less force, or nearer to the middle of the face",
+            fix=f"press with {usual_force_n(sensor):.2g} N or less, or nearer to the face's middle",
         )
     imprint, iterations = bridge(np.maximum(depth, 0.0), sensor.overlay.membrane_mm / step)
     pixels = blur(imprint, sensor.overlay.blur_mm / step)

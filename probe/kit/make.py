@@ -19,7 +19,7 @@ from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from generator.export.atomic import Staging
 from generator.export.meshes import stl_chunks
 from generator.export.step import step_chunks
-from generator.export.threemf import print_files, slicer_settings
+from generator.export.threemf import SlicerSettings, print_files
 from generator.printers import printer_named
 from generator.solid import Mesh, triangles
 from probe.kit.board import connections, electric_items, has_board, mechanical_items, wiring_svg
@@ -116,7 +116,7 @@ def _plates(
     """Yield the plates as 3MF, in PrusaSlicer's dialect: filament, resin, and the coupon."""
     for printer_name in (FILAMENT, RESIN):
         printer = printer_named(printer_name)
-        settings = slicer_settings(printer, supports=False)
+        settings = SlicerSettings(printer) if printer.nozzle_mm else None
         some = [(n, mesh) for n, mesh, resin in meshes if resin == (printer_name == RESIN)]
         bed = bed_for([mesh for _, mesh in some], printer.bed_mm)
         plates = print_files(title, some, bed, settings) if some else ()
@@ -124,7 +124,7 @@ def _plates(
             more = f"-{number + 1}" if len(plates) > 1 else ""
             yield f"{printer_name}{more}.3mf", file.prusaslicer
     printer = printer_named(coupon.printer)
-    settings = slicer_settings(printer, supports=False)
+    settings = SlicerSettings(printer) if printer.nozzle_mm else None
     (file,) = print_files("coupon", [coupon.part], printer.bed_mm, settings)
     yield "coupon.3mf", file.prusaslicer
 

@@ -27,7 +27,7 @@ from encoded_objects.base.sensor_type import (
 )
 from probe.contact.contract import Contact, Touch
 from probe.contact.press import accuracy_of, level_for
-from probe.errors import SurfaceError
+from probe.errors import ContactError, SurfaceError
 from probe.frame import Frame, frame_from
 from probe.recording.files import check_name
 from probe.recording.record import Recorder
@@ -36,6 +36,7 @@ from probe.simulate.scene import Scene, TouchRanges, pose_of, random_touches
 from probe.simulate.sensor import simulated_sensor
 from probe.simulate.target import surface_of
 
+DRAWS = 50  # of a touch at random until it has an equilibrium
 _WAY = 1 << 32  # of the generator that draws a scan's path: no touch has that number
 
 
@@ -155,20 +156,35 @@ class SimulatedProbe:
         self.level = level_for(self.sensor, accuracy_of(accuracy))  #: of the contact model
         self.scene = surface_of(target)
         self.path = self._scan_path()  #: None: no scan
+        self.drawn_again = 0  #: touches without an equilibrium
 
     def __len__(self) -> int:
         """Return the number of touches."""
         return (self.options.touches or 1) if self.path is None else len(self.path)
 
     def touches(self) -> Iterator[SimulatedTouch]:
-        """Yield the touches; raises `ContactError` for one that has no equilibrium."""
+        """Yield the touches; one at random that has no equilibrium is drawn again.
+
+        Raises `ContactError` for a touch as named, or after `DRAWS` of one at random.
+        """
         options, path = self.options, self.path
         quiet = self.noise == "quiet"
         sensor = simulated_sensor(self.sensor, accuracy=self.level, quiet=quiet)
         for i in range(len(self)):
             rng = np.random.default_rng([options.seed, i])
-            touch = options.draw(self.scene, self.sensor, rng) if path is None else path.touches[i]
-            reading = sensor.read(self.scene, touch, rng, options.frames)
+            left = DRAWS if path is None and options.touches is not None else 1
+            while left:
+                touch = (
+                    options.draw(self.scene, self.sensor, rng) if path is None else path.touches[i]
+                )
+                left -= 1
+                try:
+                    reading = sensor.read(self.scene, touch, rng, options.frames)
+                    break
+                except ContactError:
+                    if not left:
+                        raise
+                    self.drawn_again += 1
             contact = reading.contact
             true = believed = wrist = None
             if path is not None and math.isfinite(contact.z_mm):

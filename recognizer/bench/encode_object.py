@@ -20,7 +20,6 @@ from typing import IO, Any
 
 from encoded_objects.base.foreign import run_limited, waiting_process
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
-from encoded_objects.base.sensor_type_file import shipped_names
 from generator.database.open import normal_url, open_database
 from generator.database.transaction import read_transaction
 from recognizer.bench.errors import BenchError, BusyError, RefusedError
@@ -46,20 +45,14 @@ _WAITING: list[Popen[bytes]] = []  #: a process that has loaded `LOADS`, for the
 
 @lru_cache(maxsize=1)
 def part_settings() -> dict[str, Any]:
-    """Return what a page may ask for: the schema of specs, and the names that its settings take.
+    """Return what a page may ask for: the schema of specs.
 
     Raises
     ------
     BenchError
         `encode-object` fails; says why.
     """
-    schema = _ask("schema", longest_s=SHORT_S)
-    printers = _ask("printers", longest_s=SHORT_S)["printers"]
-    names = {
-        "print.printer": [[one["name"], one["description"]] for one in printers],
-        "sensor_type": [[name, ""] for name in shipped_names()],
-    }
-    return {"schema": schema, "names": names}
+    return _ask("schema", longest_s=SHORT_S)
 
 
 def try_part(text: str, name: str, database: str, gone: Callable[[], bool]) -> dict[str, Any]:
@@ -211,9 +204,9 @@ def _ask(
     def given_up() -> bool:
         return _ENDING.is_set() or gone()
 
-    begun = False
-    while not (begun or given_up()):
-        begun = _TURN.acquire(timeout=LOOK_S)
+    while not _TURN.acquire(timeout=LOOK_S):
+        if given_up():
+            raise BusyError("it was given up, or open-bench ends", fix="try again")
     try:
         code, printed = run_limited(
             "generator.command", [*words, "--json"], memory_bytes=MEMORY, cpu_s=longest_s,
@@ -223,8 +216,7 @@ def _ask(
     except (OSError, TimeoutError) as error:
         raise BenchError(f"it could not be done: {error}", fix="try again") from error
     finally:
-        if begun:
-            _TURN.release()
+        _TURN.release()
     if given_up():
         raise BusyError("it was given up, or open-bench ends", fix="try again")
     try:

@@ -5,7 +5,7 @@ GET   /api/clock                 its clock, for pages on machines with another
 POST  /api/port | sensor | bias | record | replay | calibration | mosaic | lab
 POST  /api/scan | flip | mounting | learned | as-built
 POST  /api/touch[/next] | load | unplug                          the simulated probe
-GET   /api/make                  what can be made: the schema of specs, names in it
+GET   /api/make                  what can be made: the schema of specs
 POST  /api/make[/try]            a zip of all files of a spec; or what it would be
 GET   /api/objects[/NAME[/picture.svg|/parts/N]], /api/promise/NAME, /api/map/N
 GET   /api/mosaics/NAME[/FACE]                              the mosaics of its faces
@@ -457,9 +457,9 @@ def _add_making_routes(routes: APIRouter, session: Session) -> None:
     def settings() -> dict[str, Any]:
         threading.Thread(target=load_ahead, daemon=True).start()
         lab = normal_url(session.database or LAB).render_as_string()  # without its password
-        return part_settings() | {
-            "sensor_type": session.sensor.name, "lab": lab.removeprefix("sqlite:///"),
-            "new": not session.database,
+        return {
+            "schema": part_settings(), "sensor_type": session.sensor.name,
+            "lab": lab.removeprefix("sqlite:///"), "new": not session.database,
         }  # fmt: skip
 
     @routes.post("/make/try")

@@ -55,9 +55,8 @@ class Answer:
         An answer of a scan takes about `needed` touches.
         """
         text = f"{self.touch.seq}: {self.found}"
-        text += "" if self.in_base is None else f"; {self.in_base}"
         if self.touches is None:
-            return text
+            return text + ("" if self.in_base is None else f"; {self.in_base}")
         if not self.found and self.found.reason != NO_CONTACT:
             more = f"; go on: about {needed} touches" if self.touches < needed else ""
             text = f"{self.touch.seq}: not yet: {self.found.reason}{more}"

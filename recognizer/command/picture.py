@@ -46,7 +46,8 @@ AROUND = 8  #: cells of the window around the one under the sensor's centre
 FREE, OTHERS, OBJECT, FACE = "#ffffff", "#e4e4e4", "#cfe3f7", "#f7d9a8"
 VIEW_DEG = (35.0, 32.0)  #: from where the touched face is seen, off its normal
 AXES = (("x", "tab:red"), ("y", "tab:green"), ("z", "tab:blue"))
-MANY = 40  #: vertices beyond which they are not numbered
+MANY = 40  #: faces beyond which they are not named
+FACING = 0.2  #: least cosine to the eye of a face that is named
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -241,7 +242,7 @@ def _draw_object(
     sensor: SensorType,
     found: Recognition,
 ) -> None:
-    """Draw the edges, the numbers of the vertices, the face that is touched, and the probe."""
+    """Draw the edges, the names of the faces in front, the one touched, and the probe."""
     if found.object is None or found.T_object_probe is None:
         return
     axes.computed_zorder = False  # what is drawn later lies above
@@ -256,11 +257,14 @@ def _draw_object(
         loops = solid.faces[touched.face_id].loops
         corners = solid.vertices[np.concatenate([np.array(loop) for loop in loops])]
         _fill(axes, corners, triangulate(touched.polygon_mm), FACE, 0.4, 1)
-    if len(solid.vertices) <= MANY:
-        for number, at in enumerate(solid.vertices.tolist()):
-            axes.text(*at, str(number), fontsize=7, color="#404040", zorder=6)
     _draw_probe(axes, sensor, found.T_object_probe)
-    _look(axes, solid, found.T_object_probe)
+    eye = _look(axes, solid, found.T_object_probe)
+    for face in solid.faces if len(solid.faces) <= MANY else ():
+        corners = solid.vertices[list(face.loops[0])]
+        middle = corners.mean(axis=0)
+        normal = np.cross(corners - middle, np.roll(corners, -1, axis=0) - middle).sum(axis=0)
+        if face.name != found.face and normal @ eye > FACING * np.linalg.norm(normal):
+            axes.text(*middle, face.name, fontsize=8, color="#404040", ha="center", zorder=6)
 
 
 def _draw_probe(axes: Any, sensor: SensorType, T: Array) -> None:
@@ -282,8 +286,8 @@ def _fill(
                       shade=False, linewidth=0, antialiased=False, zorder=zorder)  # fmt: skip
 
 
-def _look(axes: Any, solid: Polyhedron, T_object_probe: Array) -> None:
-    """Look at the touched face off its normal, with the whole object in view."""
+def _look(axes: Any, solid: Polyhedron, T_object_probe: Array) -> Array:
+    """Look at the touched face off its normal, the whole object in view; returns whence, (3,)."""
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     middle, half = (low + high) / 2, float((high - low).max()) * 0.6
     for k, (name, _) in enumerate(AXES):
@@ -294,5 +298,8 @@ def _look(axes: Any, solid: Polyhedron, T_object_probe: Array) -> None:
     x, y, z = T_object_probe[:3, 2]
     up = math.degrees(math.asin(max(-1.0, min(1.0, z))))
     azimuth = math.degrees(math.atan2(y, x)) if math.hypot(x, y) > 1e-6 else -60.0
-    axes.view_init(elev=up - VIEW_DEG[1] * (1 if up > 45 else -1), azim=azimuth + VIEW_DEG[0])
+    elevation, azimuth = up - VIEW_DEG[1] * (1 if up > 45 else -1), azimuth + VIEW_DEG[0]
+    axes.view_init(elev=elevation, azim=azimuth)
     axes.set_title("object and probe")
+    e, a = math.radians(elevation), math.radians(azimuth)
+    return np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])

@@ -115,9 +115,11 @@ def _print_answers(
     refused: list[TouchImage] = []
     read = answered = 0
     hinted, as_json = False, options.as_json
+    simulated = origin.sensor.startswith(("simulated/", "sim:"))  # none is mounted
     lines = as_json and options.follow
     needed = touches_for(learning.reader)
-    scan = bool(options.scan_method)
+    scan, said = bool(options.scan_method), ""
+    quiet = options.recording is not None and options.scan_method == "joint"  # news alone
     if scan and needed == 1:
         message("one touch is enough for these symbols; a scan helps where parts are worn or cut")
     with ExitStack() as stack:
@@ -134,21 +136,24 @@ def _print_answers(
                 refused.append(answer.touch)
                 if len(refused) == TRIED and not answered:
                     _hint_wiring(learning.reader, source, refused)
-            if answer.found and answer.found.mounting == UNCHECKED and not (hinted or as_json):
+            unchecked = answer.found and answer.found.mounting == UNCHECKED
+            if unchecked and not (hinted or as_json or simulated):
                 message(MOUNTING)
                 hinted = True
             answered = bool(answer.found) + (0 if scan else answered)
             if options.plot is not None and options.follow:
                 _draw(learning.reader, source, answer, options.plot)
             elif options.plot is not None:
-                kept.append(answer)
+                kept = [*kept[: 0 if scan else None], answer]  # of a scan one picture
             if options.as_json and not lines:
                 values.append(answer.printed_json())
                 continue
+            name = f"{answer.found.object}/{answer.found.face}" if answer.found else ""
             if lines:
                 write_json(answer.printed_json(), line=True)
-            else:
+            elif not quiet or name != said:
                 out.write(answer.sentence(needed) + "\n")
+                said = name
             out.flush()
     learning.end()
     if refused and not answered and len(refused) < TRIED and not interrupted.is_set():
@@ -158,8 +163,7 @@ def _print_answers(
     if options.as_json and not lines:
         write_json(values)
     elif scan and read:
-        what = f"{answer.found.object}/{answer.found.face}" if answered else "not recognised"
-        message(f"a scan of {answer.touches} touches: {what}")
+        out.write(f"a scan of {answer.touches} touches: {answer.found}\n")
     elif read == 0:
         message("no touch" + ("" if source.frames is None
                               else f" in {count_of(source.frames, 'frame')}"))  # fmt: skip
@@ -328,6 +332,9 @@ def _draw_all(
     reader: Reader, source: TouchSource, answers: list[Answer], plot: Path, interrupted: Event
 ) -> None:
     """Draw the answers: one into the file, several into files with their numbers."""
+    if len(answers) > 1:
+        numbers = f"{plot.stem}-{answers[0].touch.seq}.png ... -{answers[-1].touch.seq}.png"
+        message(f"drawing {len(answers):,} pictures, one a touch: {numbers}")
     with progress_bar("drawing", len(answers)) as bar:
         for number, answer in enumerate(answers, start=1):
             if interrupted.is_set():

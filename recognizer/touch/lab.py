@@ -168,10 +168,20 @@ def cell_keys(columns: int, rows: Ints, columns_at: Ints) -> NDArray[np.uint64]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lab:
-    """Everything that a touch may show; prints as its contents."""
+    """Everything that a touch may show; prints as its contents.
+
+    A context manager, for those who like to close what they open: nothing is kept open.
+    """
 
     url: str
     arrays: tuple[EmbossedArray, ...]
+
+    def __enter__(self) -> Lab:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for each in self.arrays:
+            each.engine.dispose()
 
     def __str__(self) -> str:
         objects = {name for each in self.arrays for name in each.names.values()}

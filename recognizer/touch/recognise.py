@@ -37,6 +37,7 @@ from recognizer.touch.recognition import (
     NO_CONTACT,
     OUTSIDE,
     TOO_FEW,
+    TOO_FINE,
     Cause,
     Recognition,
     RunnerUp,
@@ -90,7 +91,8 @@ def recognise(reader: PreparedLab, signal: Signal, seq: int = 0) -> Recognition:
     reading = read_touch(reader, signal, seq)
     answer = reading.answer
     cause = answer.cause if answer or answer.cause else diagnose(reading.touch, reading.found)
-    step = propose_next(reader, signal, answer, reading.found)
+    hopeless = cause is not None and cause.code == TOO_FINE
+    step = None if hopeless else propose_next(reader, signal, answer, reading.found)
     return replace(answer, next=step, cause=cause)
 
 

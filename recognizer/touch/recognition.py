@@ -33,6 +33,7 @@ ONE_ROW = "one_row"
 DEAD_TACTELS = "dead_tactels"
 EXCHANGED = "halves_exchanged"
 NOT_REGISTERED = "not_registered"
+TOO_FINE = "too_fine"
 OTHER_PATTERN = "other_pattern"
 PLAIN = "not_encoded"
 UNCLEAR = "unclear"
@@ -310,6 +311,13 @@ _CAUSES: dict[str, tuple[Callable[[Numbers], str], str]] = {
             f"{'columns' if n['columns'] else 'rows'} are exchanged"
         ),
         "is the sensor wired as drawn? recognize-object check tells",
+    ),
+    TOO_FINE: (
+        lambda n: (
+            f"symbols of {n['pitch_mm']:g} mm are too fine for this type of sensor, which reads "
+            f"{n['best_mm']:g} mm best"
+        ),
+        "make parts for it: sensor_type: NAME in their spec; or take a finer sensor",
     ),
     NOT_REGISTERED: (
         lambda n: (

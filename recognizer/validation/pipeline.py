@@ -89,7 +89,7 @@ class ValidationResult:
     def __str__(self) -> str:
         head = (
             f"{self.touches:,} touches: {self.right:,} right, {self.wrong:,} wrong, "
-            f"{self.rejected:,} rejected; pose {_size(self.rms_mm, 'mm')}, "
+            f"{self.rejected:,} refused; pose {_size(self.rms_mm, 'mm')}, "
             f"{_size(self.rms_deg, 'degrees')} rms ({self.seconds:.1f} s)"
         )
         if self.within:
@@ -180,7 +180,7 @@ def validate(
     >>> from tempfile import mkdtemp
     >>> result = validate("fixtures/cube.yaml", touches=4, folder=mkdtemp())
     >>> print(result)  # doctest: +ELLIPSIS
-    4 touches: ... right, 0 wrong, ... rejected; ...
+    4 touches: ... right, 0 wrong, ... refused; ...
     """
     require_report("validate-set")
     if export and export not in EXPORTS:

@@ -20,7 +20,7 @@ from recognizer.touch.symbols.fit import fit_lattices
 from recognizer.validation.campaign import series_of
 from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.pictures import figure_on
+from recognizer.validation.pictures import WORDS, figure_on
 from recognizer.validation.run import read_record
 from recognizer.validation.trial import find_face, judge
 from recognizer.validation.workers import reader_now
@@ -146,7 +146,7 @@ def _draw_answer(
         label = "answer" if own else f"answer, on {answer.object}/{answer.face}"
         outline = _outline(reader, T[0, 3], T[1, 3], math.atan2(T[1, 0], T[0, 0]))
         axis.plot(*outline, "--", color=ANSWER, label=label)
-    outcome = row["verdict"] + (f": {row['reason']}" if row["reason"] else "")
+    outcome = WORDS[row["verdict"]] + (f": {row['reason']}" if row["reason"] else "")
     if row["error_mm"] is not None:
         outcome += f", off by {row['error_mm']:.3f} mm, {row['error_deg']:.2f} degrees"
     axis.set_title(f"4  {outcome}")

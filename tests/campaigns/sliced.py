@@ -7,8 +7,9 @@ Every spec of `fixtures/specs` is made of panels and whole, every kit with `--ve
 sliced by PrusaSlicer with the settings in them; plates for resin hold none and are sliced on .05 mm
 pixels and layers, whose white pixels are held against the volume of the parts. The slicer's exit
 code is no check (it is 0 for a mesh with holes), so its words are read. Exit code 1 when a mesh is
-not manifold or needs a repair, panels overhang, a kit needs supports, or layers of resin hold more
-than 1 % of volume too much or too little.
+not manifold or needs a repair, panels overhang, a kit needs supports, a whole body gets supports
+that the command does not announce or none where it does, or layers of resin hold more than 1 % of
+volume too much or too little.
 """
 
 from __future__ import annotations
@@ -149,6 +150,8 @@ def slice_kit(name: str, folder: Path) -> list[runner.Row]:
 def at_fault(row: runner.Row) -> bool:
     """Whether a plate does not print as it was drawn."""
     hangs = row[{"panels": "overhang", "kit": "support"}.get(row["parts"], "repaired")]
+    if row["parts"] == "whole":
+        hangs = ("supports needed under" in row["side_down"]) != bool(row["support"])
     off = abs(row.get("volume", 1.0) - 1) > OFF
     faulty = not row["manifold"] or row["open_edges"] or row["repaired"] or not row["layers"]
     return bool(faulty or hangs or off)

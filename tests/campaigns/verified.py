@@ -28,6 +28,7 @@ import runner
 from manifold3d import Manifold, Mesh
 
 from generator.errors import GeneratorError
+from generator.export.bambu import project_3mf
 from generator.export.check import PanelFile, verify_fit, verify_step, verify_stl
 from generator.export.meshes import glb_bytes, stl_chunks
 from generator.export.step import step_chunks
@@ -98,10 +99,13 @@ def outcome(spec: ObjectSpec) -> runner.Row:
         faults = mesh_faults(glb_bytes(spec.name, parts, meshes))
         if any(faults):
             return row | {"failed": f"GLB: flat, doubled, open: {faults}"}
-        for plate in print_files(spec.name, parts, plan.printer.bed_mm, settings_of(plan)):
-            for content in (plate.content, plate.prusaslicer):
-                if said := model_faults(content, folder):
-                    return row | {"failed": f"3MF: {said[0]}"}
+        settings = settings_of(plan, layout)
+        plates = print_files(spec.name, parts, plan.printer.bed_mm, settings)
+        contents = [one for plate in plates for one in (plate.content, plate.prusaslicer)]
+        contents += [project_3mf(spec.name, plates)] if settings else []
+        for content in contents:
+            if said := model_faults(content, folder):
+                return row | {"failed": f"3MF: {said[0]}"}
     row["step_error"], row["mesh_error"] = map(max, zip(*errors, strict=True))
     if fit is not None:
         row |= {"panels": len(parts), "overlap_mm3": fit.overlap_mm3, "gap_mm": fit.gap_mm}

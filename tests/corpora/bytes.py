@@ -87,6 +87,7 @@ OPTIONS: Cases = (
     ("fine-printer", "stl,3mf", _SMALL + "print: {printer: fdm-0.25}"),
     ("resin", "stl,3mf,step", _SMALL + "print: {printer: resin}"),
     ("own-printer", "stl,3mf", _SMALL + "print: {printer: {like: ender-3, layer: 0.3 mm}}"),
+    ("bambu", "3mf,bambu", _SMALL + "print: {printer: bambu-x1c}"),
     ("wall-gap", "step,stl", _SMALL + "print: {wall: 4 mm, gap: 0.3 mm}"),
     ("symbols", "step,stl", _SMALL + "profile: one-touch\nsymbols: {pitch: 7.5 mm, "
      "height: 1.2 mm, stroke: 1.3 mm, draft: 5 deg, chamfer: 0.2 mm, alphabet: letters-4}"),
@@ -173,6 +174,8 @@ def content(data: bytes, ending: str) -> bytes:
 
         with Image.open(io.BytesIO(data)) as image:
             return f"{image.mode} {image.size} ".encode() + image.tobytes()
+    if ending == "html":  # its picture stands beside it
+        return re.sub(rb"data:image/png;base64,[^\"]*", b"", data)
     if ending == "stpz":
         return zlib.decompress(data, wbits=47)
     if ending == "3mf":

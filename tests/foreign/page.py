@@ -89,6 +89,7 @@ BODIES: dict[str, Any] = {
     "/api/mounting": {"touch": 1, "object": "Cube", "face": "F1"},
     "/api/as-built": {"do": "estimate", "after": 0, "material": "PLA"},
     "/api/touch": {"object": "Cube", "face": "F1", "x_mm": 30.0, "y_mm": 30.0, "force_n": 40.0},
+    "/api/make/try": {"name": "Cube", "spec": "name: Cube\nshape: {cube: 40 mm}\n", "keep": False},
     "/api/load": {"newtons": 3.0}, "/api/unplug": {"seconds": 0.0},
     "/api/touches/{number}": {"name": "mine"},
 }  # fmt: skip

@@ -16,9 +16,11 @@ from reference.cube_panels import cube_panels
 
 from generator.export.meshes import stl_chunks
 from generator.export.threemf import print_files
+from generator.pipeline import encode
 from generator.solid.measure import volume
 from generator.solid.part import Part
 from generator.solid.triangulate import triangles
+from generator.spec.read import read_specs
 
 
 @pytest.fixture(scope="module")
@@ -97,3 +99,17 @@ def test_3mf_volumes_are_sliced_with_the_symbols_on_their_panels(
     assert (low[4.0] > low[3.0]).all()
     assert (high[4.0] < high[3.0]).all()
     assert (high[4.0] - low[4.0] > 0.8 * (high[3.0] - low[3.0])).all()
+
+
+def test_a_body_that_needs_no_supports_gets_none(slicer: str, tmp_path: Path) -> None:
+    spec = tmp_path / "a.yaml"
+    shape = "{cone: {diameter: 36 mm, top_diameter: 30 mm, height: 16 mm}}"
+    spec.write_text(f"name: A\nshape: {shape}\n")
+    url = f"sqlite:///{tmp_path}/l.db"
+    made = encode(read_specs([spec]), folder=tmp_path, database=url, formats=("3mf",), jobs=1)
+    assert "no supports needed" in str(made.objects[0].lying)
+    project, gcode = tmp_path / "A-prusaslicer.3mf", tmp_path / "a.gcode"
+    run(slicer, "--export-gcode", "--dont-arrange", "-o", str(gcode), str(project))
+    kinds = set(re.findall(r"^;TYPE:(.*)$", gcode.read_text(), flags=re.MULTILINE))
+    assert "External perimeter" in kinds
+    assert not {kind for kind in kinds if kind.startswith("Support")}

@@ -133,6 +133,7 @@ def _notes(
     what = "region stays" if len(regions) == 1 else "regions stay"
     note = (
         f"{len(regions)} curved {what} blank, {facets} of {len(faces)} facets: "
-        f"{', '.join(places)}{more}; in STEP, cylinders and cones carry symbols"
+        f"{', '.join(places)}{more}; export the model as STEP: there "
+        "cylinders and cones carry symbols"
     )
     return (note,)

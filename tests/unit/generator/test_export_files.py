@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from generator.errors import WriteError
@@ -123,6 +123,31 @@ def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size]) -> Non
         for a, b in combinations(found, 2):
             apart = max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3])
             assert apart >= 5.0 - 1e-6
+
+
+@given(st.lists(st.tuples(st.floats(1.0, 256.0), st.floats(1.0, 256.0)), max_size=12))
+@example([(245.0, 201.0)])  # wider than what a rim leaves
+def test_nothing_lies_on_the_blocked_corner_of_the_bed(sizes: list[Size]) -> None:
+    corner, bed = (18.0, 28.0), (256.0, 256.0)
+    plates = arrange_plates(sizes, bed, blocked_mm=corner)
+    assert sorted(p.part for plate in plates for p in plate.places) == list(range(len(sizes)))
+    for plate in plates:
+        found = boxes(plate, sizes)
+        if not plate.fits:
+            (low,) = {(right - left, back - front) for left, front, right, back in found}
+            assert min(low) > 228.0 - 1e-6
+            continue
+        for left, front, right, back in found:
+            assert left >= corner[0] - 1e-6 or front >= corner[1] - 1e-6
+            assert min(left, front) >= -1e-6
+            assert max(right, back) <= 256.0 + 1e-6
+
+
+def test_a_brim_has_room_where_it_takes_no_more_plates() -> None:
+    tight, wide = (arrange_plates([(60.0, 60.0)] * 9, (side, side)) for side in (195.0, 203.0))
+    assert [len(tight), len(wide)] == [1, 1]
+    assert np.array(boxes(wide[0], [(60.0, 60.0)] * 9)).min() == pytest.approx(6.5)
+    assert np.array(boxes(tight[0], [(60.0, 60.0)] * 9)).min() == pytest.approx(2.5)
 
 
 def test_the_exact_size_of_the_bed_fits_also_turned() -> None:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
+import subprocess
 import xml.etree.ElementTree as ET
+import zipfile
 
 import numpy as np
 import pytest
+from bench_page import CHROMIUM, FLAGS
 
 from generator.command import run
 from generator.command.made_report import next_step, rate_lines
 from generator.errors import PrintError
+from generator.export.drawing import Assembly, draw_steps
 from generator.layout.recognition_rate import LOW
 from generator.pipeline import encode
 from generator.pipeline.faces import face_reports
 from generator.pipeline.files import outer_size_mm, parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
+from generator.pipeline.sheet import _checks
 from generator.polyhedron import SHAPES
 from generator.polyhedron.assembly import assembly_order, distinct_faces
 from generator.polyhedron.frame import face_area, face_frame
@@ -181,10 +187,10 @@ def test_the_build_sheet_and_the_last_line_say_how_parts_lie(tmp_path):
     made = encode(specs, folder=tmp_path / "out", database=url, formats=("3mf",), jobs=1)
     page = next(f for f in made.files if f.name == "Block-build.html").read_text()
     marks = re.findall(r'<b class="mark">(.*?)</b>', page)
-    code = re.search(r"short code</th><td>(\w+)", page)[1]
+    code = re.search(r"backs say (\w+), which stands for Block on small parts", page)[1]
     assert all(mark.split()[0].startswith(("BLOCK", code)) for mark in marks)
     assert [mark[-1] for mark in marks] == list("123456")
-    assert re.findall(r"(?:src|href)=\"(?!#)([^\"]*)", page) == []  # no network
+    assert re.findall(r"(?:src|href)=\"(?!#|data:)([^\"]*)", page) == []  # no network
     for drawing in re.findall(r"<svg.*?</svg>", page):
         ET.fromstring(drawing)
     lying = made.objects[1].lying
@@ -198,3 +204,72 @@ def test_the_build_sheet_and_the_last_line_say_how_parts_lie(tmp_path):
     assert "print Course-plate-1" in line
     assert "Course-build.html" in line
     assert "Whole: F1 down, supports needed under F1 (" in line
+
+
+def test_a_cube_takes_two_pages_of_paper_and_a_can_one(tmp_path):
+    cube = {"name": "Cube", "shape": {"cube": 60}}
+    can = {"name": "Can", "shape": {"cylinder": {"diameter": 60, "height": 80}}}
+    pages = {}
+    for spec in (cube, can):
+        (read,) = read_specs([tree_from(spec)])
+        url = f"sqlite:///{tmp_path}/l.db"
+        made = encode([read], folder=tmp_path, database=url, formats=("3mf",), jobs=1)
+        sheet = next(f for f in made.files if f.name.endswith("-build.html"))
+        paper = tmp_path / f"{spec['name']}.pdf"
+        printing = [CHROMIUM, "--headless", "--no-pdf-header-footer", f"--print-to-pdf={paper}"]
+        subprocess.run([*printing, *FLAGS, sheet.as_uri()], check=True, capture_output=True)
+        pages[spec["name"]] = len(re.findall(rb"/Type /Page\b", paper.read_bytes()))
+        text = sheet.read_text()
+        picture = re.search(r'<img alt="" src="data:image/png;base64,([^"]*)">', text)[1]
+        assert base64.b64decode(picture) == (tmp_path / f"{spec['name']}.png").read_bytes()
+        assert re.search(r"<th>to buy</th><td>PLA, \d+ cm3 in all", text)
+        assert re.search(r"<th>printing</th><td>about \d h \d+ min, \d+ g \(estimated", text)
+    assert pages == {"Cube": 2, "Can": 1}
+
+
+def test_glue_steps_are_seen_from_one_side_and_name_what_can_be_seen():
+    solid = SHAPES["cube"](60.0)
+    order = assembly_order(solid)
+    polygons = [[solid.vertices[list(loop)] for loop in face.loops] for face in solid.faces]
+    names = [face.name for face in solid.faces]
+    steps = draw_steps(Assembly(names, polygons, [step.face for step in order], [[]] * 6))
+    drawn = [ET.fromstring(step) for step in steps]
+    assert len({step.get("viewBox") for step in drawn}) == 1
+    named = [{text.text for text in step if text.tag.endswith("text")} for step in drawn]
+    glued = [names[step.face] for step in order]
+    for number, seen in enumerate(named):
+        assert glued[number] in seen <= set(glued[: number + 1])
+    assert len(named[-1]) == 3  # of six: a cube shows three
+
+
+def test_touches_that_check_a_part_are_on_its_faces(tmp_path):
+    """The middle of an L lies beside it."""
+    wide = re.sub(r"\b12\b", "20", BRACKET)
+    checks = _checks(*laid_out(tmp_path, wide))
+    assert len(checks) == 3
+    assert {"F1", "F2"}.isdisjoint(touch.split()[0] for _, touch, _ in checks)
+    assert all(answer.startswith(f"A/{touch.split()[0]} at about") for _, touch, answer in checks)
+
+
+@pytest.mark.parametrize(
+    ("shape", "how", "said"),
+    [
+        ("{cone: {diameter: 40 mm, top_diameter: 30 mm, height: 30 mm}}", "whole", "no supports"),
+        ("{dodecahedron: 25 mm}", "whole, printer: {overhang: 10 deg}", "supports needed under F"),
+        ("{box: 40 x 40 x 30 mm}", "panels", "no supports"),
+    ],
+)
+def test_sheet_advice_and_slicer_project_agree_on_supports(tmp_path, shape, how, said):
+    spec = tmp_path / "a.yaml"
+    spec.write_text(f"name: A\nshape: {shape}\nprint: {{parts: {how}}}\n")
+    url = f"sqlite:///{tmp_path}/l.db"
+    made = encode(read_specs([spec]), folder=tmp_path, database=url, formats=("3mf",), jobs=1)
+    assert said in (tmp_path / "A-build.html").read_text()
+    assert said in next_step(made)
+    wanted = "0" if said.startswith("no") else "1"
+    for project in tmp_path.glob("*-prusaslicer.3mf"):
+        with zipfile.ZipFile(project) as package:
+            settings = package.read("Metadata/Slic3r_PE.config").decode()
+            of_object = package.read("Metadata/Slic3r_PE_model.config").decode()
+        assert f"; support_material = {wanted}\n" in settings
+        assert set(re.findall(r'support_material" value="(.)"', of_object)) == {wanted}

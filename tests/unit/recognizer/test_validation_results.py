@@ -119,7 +119,7 @@ def test_counts_confusion_and_worst(columns, tmp_path):
     assert bounds[4].endswith("(59.038% ... 100.000%), bound within 90.0% ... 98.0%")
     result = result_from(found, 1.25, tmp_path)
     assert (result.holds, result.fair, result.fair_right) == (False, 9, 7)
-    assert str(result).startswith("10 touches: 7 right, 1 wrong, 2 rejected; pose 0.15")
+    assert str(result).startswith("10 touches: 7 right, 1 wrong, 2 refused; pose 0.15")
     json.dumps(found, allow_nan=False)
 
 

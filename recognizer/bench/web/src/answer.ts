@@ -4,11 +4,17 @@ import { timeOf } from "./clock";
 import { element, say } from "./dom";
 import type { Answer, TouchRecord } from "./types";
 
+const TIPS: Record<string, string> = {
+  "by chance": "How many places of this database a surface of another lab would match as well by chance: the fewer, the surer the answer",
+  "left unexplained": "Spread of the readings that the symbols do not explain, as a share of what a symbol reads",
+  mounting: "No touch shows a quarter or half turn of the sensor: Check mounting… tells",
+};
 const FULL = 5; // margins of the threshold fill the bar
 
 export class AnswerPanel {
   private readonly box = element("answer");
   private shown = "";
+  simulated = false;
 
   constructor(private readonly threshold: number) {
     element("margin-mark").style.left = `${100 / FULL}%`;
@@ -41,7 +47,7 @@ export class AnswerPanel {
       name.classList.add("reason");
       name.textContent = `Not recognised: ${answer.because}`;
       more.className = "";
-      more.textContent = answer.advice;
+      more.textContent = answer.advice.replace("(--scan)", "(Fuse touches)");
     }
     this.box.replaceChildren(name, more);
     this.next(answer);
@@ -56,7 +62,8 @@ export class AnswerPanel {
   }
 
   private margin(answer: Answer | null): void {
-    const known = answer !== null && (answer.margin !== null || answer.alone);
+    const enough = answer !== null && (answer.alone || (answer.margin ?? 0) >= this.threshold);
+    const known = answer !== null && (answer.margin !== null || answer.alone) && (answer.object !== null || !enough); // another limit refuses
     element("margin").hidden = !known;
     if (!known) return;
     const share = answer.alone ? 1 : Math.max(0, Math.min(1, answer.margin! / (FULL * this.threshold)));
@@ -66,7 +73,7 @@ export class AnswerPanel {
     const next = answer.runner_up
       ? `runner-up: ${answer.runner_up.object} ${answer.runner_up.face}, row ${answer.runner_up.index[0]}, column ${answer.runner_up.index[1]}`
       : "no other place comes into question";
-    const size = answer.alone ? "" : `margin ${answer.margin!.toFixed(1)} nats, ${Number(this.threshold.toFixed(1))} are needed; `;
+    const size = answer.alone ? "" : `margin over the next place ${answer.margin!.toFixed(1)}, ${Number(this.threshold.toFixed(1))} is needed; `;
     say(element("margin-text"), size + next);
   }
 
@@ -84,9 +91,11 @@ export class AnswerPanel {
     if (answer?.index) rows.push(["in the array", `row ${answer.index[0]}, column ${answer.index[1]}`]);
     if (answer && typeof answer.doubt === "number") rows.push(["by chance", answer.doubt.toPrecision(1)]);
     if (answer && answer.noise !== null) rows.push(["left unexplained", answer.noise.toFixed(3)]);
+    if (answer?.object && answer.mounting && !this.simulated) rows.push(["mounting", answer.mounting === "checked" ? "checked" : "never checked"]);
     element("pose").replaceChildren(...rows.flatMap(([term, value]) => {
       const dt = document.createElement("dt"), dd = document.createElement("dd");
       dt.textContent = term;
+      dt.title = dd.title = TIPS[term] ?? "";
       dd.textContent = value;
       return [dt, dd];
     }));

@@ -58,6 +58,11 @@ export function isDark(): boolean {
 
 let errorTimer = 0;
 
+/** Take the last error away: something else has happened since. */
+export function clearError(): void {
+  element("error").hidden = true;
+}
+
 /** Show what went wrong; in the open dialog if there is one, as all else can neither be seen nor heard then. */
 export function showError(text: string): void {
   const box = element("error");

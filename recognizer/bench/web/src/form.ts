@@ -7,7 +7,6 @@ interface Schema {
 
 export interface Settings {
   schema: Schema & { $defs: Record<string, Schema> };
-  names: Record<string, [string, string][]>; // that a setting takes, with a few words on each
   sensor_type: string; lab: string; new: boolean;
 }
 
@@ -51,7 +50,7 @@ export class SpecForm {
     for (const field of this.fields.values()) field.value = "";
     this.choose(kind ?? this.shapes[0]![0], kind !== undefined);
     for (const [path, value] of [["name", "Part"], ["sensor_type", this.settings.sensor_type], ...given] as [string, string][]) this.set(path, value);
-    return given.map(([path]) => path).filter((path) => !this.fields.has(path));
+    return given.filter(([path, value]) => this.fields.get(path)?.value !== value).map(([path]) => path);
   }
 
   get link(): string { return `#make?${new URLSearchParams([...this.values])}`; }
@@ -107,11 +106,11 @@ export class SpecForm {
   }
 
   private field(path: string, schema: Schema): HTMLElement {
-    const names = this.settings.names[path] ?? this.choices(schema).map((one): [string, string] => [String(one), ""]);
+    const names = this.choices(schema).map(String);
     const field = document.createElement(names.length ? "select" : "input");
     if (field instanceof HTMLSelectElement) {
       const usual = schema.default === undefined ? "usual" : `${String(schema.default)} (usual)`;
-      field.append(new Option(usual, ""), ...names.filter(([one]) => one !== String(schema.default)).map(([one, more]) => new Option(more ? `${one}: ${more}` : one, one)));
+      field.append(new Option(usual, ""), ...names.filter((one) => one !== String(schema.default)).map((one) => new Option(one, one)));
     } else {
       field.placeholder = String(schema.default ?? "usual");
       field.autocomplete = "off";
@@ -131,7 +130,7 @@ export class SpecForm {
     const field = this.fields.get(path);
     if (!field) return;
     if (field.value !== value) field.value = value;
-    if (value.trim()) this.values.set(path, value.trim());
+    if (field.value.trim()) this.values.set(path, field.value.trim()); // a list takes its own names alone
     else this.values.delete(path);
   }
 
@@ -140,8 +139,9 @@ export class SpecForm {
     return properties ?? ($ref ? this.of(this.settings.schema.$defs[$ref.split("/").at(-1)!]!) : {});
   }
 
-  private choices({ enum: own, anyOf }: Schema): (string | number)[] {
-    return own ?? anyOf?.flatMap((one) => this.choices(one)) ?? [];
+  /** The values that a setting takes, or the names that it knows: several examples. */
+  private choices({ enum: own, anyOf, examples }: Schema): unknown[] {
+    return own ?? (examples?.[1] ? examples : anyOf?.flatMap((one) => this.choices(one)) ?? []);
   }
 
   private describe({ description, $ref }: Schema): string {
@@ -167,7 +167,7 @@ function flow(value: unknown): string {
 /** Up and down change the number at the cursor, by 10 with Shift. */
 function step(event: KeyboardEvent, field: HTMLInputElement): void {
   const by = event.key === "ArrowUp" ? 1 : event.key === "ArrowDown" ? -1 : 0, at = field.selectionStart ?? 0;
-  const found = [...field.value.matchAll(/\d+(\.\d+)?/g)].findLast(({ index }) => index <= at);
+  const numbers = [...field.value.matchAll(/\d+(\.\d+)?/g)], found = numbers.findLast(({ index }) => index <= at) ?? numbers[0];
   if (!by || !found) return;
   event.preventDefault();
   const next = Math.max(0, Number(found[0]) + by * (event.shiftKey ? 10 : 1));

@@ -4,7 +4,7 @@ import { TABLE, gradient } from "./colours";
 import { element, say } from "./dom";
 import type { Answer, Encoding, Frame, Sensor } from "./types";
 
-const LEAST = { counts: 24, newtons: 0.2 };
+const LEAST = { counts: 400, newtons: 0.5 }; // above what an unloaded sensor reads: its scale stands still
 const PRESSED = 0.25; // of the scale, from which on an image is one of a touch
 const HELD = 0.985; // of the scale is left after each painting
 

@@ -4,7 +4,7 @@ import { get, post } from "./api";
 import { AnswerPanel } from "./answer";
 import { type Bench, MountingCheck, PrintCheck } from "./checks";
 import { setClock, since as sinceServer } from "./clock";
-import { able, choices, element, isDark, say } from "./dom";
+import { able, choices, clearError, element, isDark, say } from "./dom";
 import { figures, keep } from "./figures";
 import { GuideDialog } from "./guide";
 import { Heat } from "./heat";
@@ -23,6 +23,8 @@ import { Tour } from "./tour";
 import { Touches } from "./touches";
 import type { BenchInfo, Frame, Told, TouchRecord } from "./types";
 import { Work } from "./work";
+
+const FILTERS: Record<string, string> = { "bias-free": "without bias", sobel: "edges (Sobel)" };
 
 async function begin(): Promise<void> {
   const info = await get<BenchInfo>("bench");
@@ -43,17 +45,18 @@ async function begin(): Promise<void> {
   new Tour();
   new Panes();
   let newest: Frame | null = null, painting = false, past = false;
+  let held = false, released = 0; // the image of a lifted touch stays until the next one, or until another unit or filter is chosen
+  let strongest: { touch: number; frame: Frame } | null = null; // of the touch that is felt
   let record: TouchRecord | null = null, painted = 0, read = 0, started = 0, ready = false;
 
   const line = new Live({
     frame(frame) {
       figures.frames++;
-      if (past || element<HTMLInputElement>("freeze").checked) return;
+      if (held && (frame.newtons !== newest?.newtons || frame.filter !== newest.filter)) [held, released] = [false, record?.number ?? 0];
+      if (past || held || element<HTMLInputElement>("freeze").checked) return;
       newest = frame;
-      if (!painting) {
-        painting = true;
-        requestAnimationFrame(paint);
-      }
+      if (record?.contact && !(strongest?.touch === record.number && strongest.frame.largest > frame.largest)) strongest = { touch: record.number, frame };
+      repaint();
     },
     mosaic: (image) => {
       mosaic.show(image);
@@ -68,6 +71,11 @@ async function begin(): Promise<void> {
       else work.gone();
     },
   }, "bias-free");
+
+  function repaint(): void {
+    if (!painting) requestAnimationFrame(paint);
+    painting = true;
+  }
 
   function paint(): void {
     painting = false;
@@ -88,6 +96,7 @@ async function begin(): Promise<void> {
       if (started && topic.started_ms !== started) location.reload(); // its touches are numbered anew
       started = topic.started_ms;
       form.simulated(topic.simulated);
+      answers.simulated = topic.simulated;
       work.tell(topic);
       work.learnable(touches.all.filter((one) => one.answer).length);
       guide.tell(topic);
@@ -108,13 +117,14 @@ async function begin(): Promise<void> {
   function take(one: TouchRecord | null, ofPast: boolean): void {
     record = one;
     past = ofPast;
-    const answer = one?.answer ?? null;
+    const answer = one?.answer ?? null, lifted = !past && answer !== null && !one!.contact && one!.number !== released && one!.number === strongest?.touch;
     if (!ready) read = Math.max(read, answer?.read ?? 0); // it was there before the page
     const fresh = answer !== null && !past && answer.read > read;
     let since: number | null = null;
     if (fresh) {
       read = answer.read;
       figures.answers++;
+      clearError();
       since = form.since();
       tint.touched();
       if (since !== null) requestAnimationFrame(() => keep(figures.click_ms, since!));
@@ -123,9 +133,14 @@ async function begin(): Promise<void> {
     figures.touch = one?.number ?? 0;
     figures.state = one?.state ?? "";
     answers.tell(one, since, past);
-    heat.answer = past || (one?.contact && !one.moving) ? answer : null;
+    heat.answer = past || lifted || (one?.contact && !one.moving) ? answer : null;
     objects.map.tell(answer);
     if (past) void image(one!.number).catch(() => undefined);
+    if (lifted && !held) {
+      newest = strongest!.frame;
+      repaint();
+    }
+    held = lifted;
     if (answer?.object && (fresh || past) && answer.object !== part.shape?.name && element<HTMLInputElement>("follow").checked) objects.look(answer.object);
     else lights();
   }
@@ -157,7 +172,7 @@ async function begin(): Promise<void> {
   }
 
   const filter = element<HTMLSelectElement>("filter");
-  choices(filter, info.filters.map((name) => [name, name === "sobel" ? "Sobel" : name]), "bias-free");
+  choices(filter, info.filters.map((name) => [name, FILTERS[name] ?? name]), "bias-free");
   filter.addEventListener("change", () => { heat.top = 0; line.choose(filter.value); });
   element("show-symbols").addEventListener("change", (event) => { heat.symbols = (event.target as HTMLInputElement).checked; });
   element("show-probe").addEventListener("change", (event) => part.withProbe((event.target as HTMLInputElement).checked));

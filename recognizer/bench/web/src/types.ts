@@ -49,7 +49,7 @@ export interface Answer {
   turn?: number;
   window: { encoding: number; corners: [number, number][] } | null;
   next?: { dx_mm: number; dy_mm: number; turn_deg: number; force_n: number; why: string } | null;
-  doubt?: number | null;
+  doubt?: number | null; mounting?: "checked" | "unchecked";
   read: number; read_ms: number; received_ms: number; answered_ms: number;
 }
 
