@@ -134,14 +134,28 @@ def density_kg_m3(value: Any) -> float:
 
 def sides(value: Any) -> Any:
     """Return the three sides of a box as a list; `80 x 80 x 120 mm` is one too."""
+    return _sides(value, 3, "a box has three sides", "write box: [80 mm, 80 mm, 120 mm]")
+
+
+def two_sides(value: Any) -> Any:
+    """Return the two sides of a tag as a list; `40 x 40 mm` is one too."""
+    return _sides(value, 2, "a tag has two sides", "write tag: [40 mm, 40 mm]")
+
+
+def diameter_and_height(value: Any) -> Any:
+    """Return both lengths of a round magnet as a list; `8 x 2 mm` is one too."""
+    return _sides(value, 2, "a magnet has a diameter and a height", "write magnets: 8 x 2 mm")
+
+
+def _sides(value: Any, count: int, cause: str, fix: str) -> Any:
     parts = value
     if isinstance(value, str):
         parts = _SIDES.split(value)
         unit = re.sub(r"[-+0-9.eE\s]*", "", parts[-1], count=1)
         parts = [part if re.search(r"[^-+0-9.eE\s]", part) else f"{part} {unit}" for part in parts]
-    if not isinstance(parts, list) or len(parts) != 3:
+    if not isinstance(parts, list) or len(parts) != count:
         had = f", not {len(parts)}" if isinstance(parts, list) else ""
-        raise refuse(f"a box has three sides{had}", "write box: [80 mm, 80 mm, 120 mm]")
+        raise refuse(f"{cause}{had}", fix)
     return parts
 
 

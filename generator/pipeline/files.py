@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.alphabet.figures import in_figures
 from generator.database.registered import RegisteredPart
 from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.atomic import Staging
@@ -25,13 +26,16 @@ from generator.export.preview import preview_png
 from generator.export.threemf import SlicerSettings
 from generator.layout.placement import Layout, object_code
 from generator.pipeline.faces import FaceReport, face_reports
-from generator.pipeline.made import overhangs
+from generator.pipeline.made import overhangs, stance_of
 from generator.pipeline.place import BuiltParts
-from generator.pipeline.plan import ObjectPlan
+from generator.pipeline.plan import TAG_BACK, ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.pipeline.sheet import SheetPlate, build_sheet
 from generator.polyhedron import Polyhedron, face_polygon
+from generator.polyhedron.shapes import FRAME_STEP_MM
 from generator.solid import Mesh, Part, emboss_whole, panels, prove_closed, triangles
+from generator.solid.marks import NameMark
+from generator.solid.panels import with_name
 from generator.spec.problem import error_location
 
 if TYPE_CHECKING:
@@ -176,7 +180,14 @@ def parts_of(plan: ObjectPlan, layout: Layout) -> BuiltParts:
     """Return the parts of an object, panels or the whole body, and what they lack."""
     spec = plan.spec
     if spec.parts == "whole":
-        return (emboss_whole(plan.polyhedron, layout, plan.outlines, spec.name),), ()
+        stance = stance_of(plan, layout)
+        turned = None if stance is None or stance.as_modelled else stance.R_bed_object
+        part = emboss_whole(plan.polyhedron, layout, plan.outlines, spec.name, turned)
+        if plan.polyhedron.kind == "tag":
+            mark = NameMark.of(in_figures(spec.name), _code(plan, layout), "F1")
+            back = TAG_BACK, mark, spec.shape.parameters["thickness"] - FRAME_STEP_MM
+            part = with_name(part, *back, plan.printer)
+        return (part,), ()
     with error_location(plan.spec.source, "print.wall, print, shape"):
         made = panels(
             plan.polyhedron,
@@ -185,10 +196,14 @@ def parts_of(plan: ObjectPlan, layout: Layout) -> BuiltParts:
             spec.wall_mm,
             plan.printer,
             name=spec.name,
-            code=object_code(layout, plan.array.rows, plan.array.columns),
+            code=_code(plan, layout),
             gap_mm=spec.gap_mm,
         )
     return made.parts, made.warnings
+
+
+def _code(plan: ObjectPlan, layout: Layout) -> str:
+    return object_code(layout, plan.array.rows, plan.array.columns)
 
 
 def _array_picture(plan: ObjectPlan, layout: Layout) -> str:

@@ -14,12 +14,10 @@ from generator.layout.placement import Layout
 from generator.pipeline.faces import FaceReport
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import face_vector
+from generator.polyhedron.standing import DOWN, FLAT, LEVEL, Stance, bridges
 
 if TYPE_CHECKING:
     from generator.export.check import FitReport
-
-
-_FLAT = 0.999  # cosine from which a face looks straight down
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +128,16 @@ def describe_object(
     )
 
 
+def stance_of(plan: ObjectPlan, layout: Layout) -> Stance | None:
+    """Return how a whole body stands on the bed; None: with z of the object frame up.
+
+    An object that was registered with symbols on the face chosen now lies as it did then.
+    """
+    stance = plan.stance
+    bears = any(len(face.labels) for face in layout.faces if stance and face.face in stance.on_bed)
+    return None if bears and not plan.spec.down else stance
+
+
 @dataclass(frozen=True, slots=True)
 class Overhangs:
     """How parts lie, and what hangs over: sheets, advice and slicer projects take it from here."""
@@ -144,23 +152,29 @@ class Overhangs:
 
 
 def overhangs(plan: ObjectPlan, layout: Layout) -> Overhangs:
-    """Return how the parts lie, and what hangs over of a whole body: z of its frame is up."""
+    """Return how the parts lie, and what hangs over of a whole body."""
     if plan.spec.parts == "panels":
         return Overhangs("every panel on its back, symbols up; no supports")
     polyhedron, limit = plan.polyhedron, math.sin(plan.printer.overhang_max_rad)
     counts = {face.face: len(face.labels) for face in layout.faces}
-    lowest = float(polyhedron.vertices[:, 2].min())
-    size = float(np.ptp(polyhedron.vertices, axis=0).max())
+    stance = stance_of(plan, layout)
+    vertices = polyhedron.vertices
+    if stance is not None and not stance.as_modelled:
+        vertices = vertices @ stance.R_bed_object.T
+    lowest = float(vertices[:, 2].min())
+    size = float(np.ptp(vertices, axis=0).max())
+    down = -stance.R_bed_object[2] if stance is not None else DOWN
+    carried = bridges(polyhedron, down)
     bottom, faces, symbols, upright = "", [], 0, 0
     for number, face in enumerate(polyhedron.faces):
-        loops = [polyhedron.vertices[list(loop)] for loop in face.loops]
+        loops = [vertices[list(loop)] for loop in face.loops]
         normal = face_vector(loops)
         up = float(normal[2] / np.linalg.norm(normal))
         name, count = face.name.partition(".")[0], counts.get(number, 0)
-        on_bed = up < -_FLAT and abs(loops[0][:, 2].min() - lowest) < 1e-6 * size
+        on_bed = up < -FLAT and abs(loops[0][:, 2].min() - lowest) < LEVEL * size
         if on_bed:
             bottom = bottom or name
-        if up < -limit - 1e-9 and (count or not on_bed):
+        if up < -limit - 1e-9 and (count or not (on_bed or number in carried)):
             faces.append(name)
             symbols += count
         elif abs(up) <= limit:

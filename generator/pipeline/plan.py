@@ -2,13 +2,14 @@
 
 Every error is given the line of the setting that causes it. A round face is no flat panel, so an
 object that has one is printed whole. Each round face is laid out on its development, under the
-number of its first facet; the other facets carry nothing. Cylinder and cone stand on their base
-when they are printed, so it stays blank.
+number of its first facet; the other facets carry nothing. What one body stands on when it is
+printed stays blank.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -25,7 +26,9 @@ from generator.layout.layout import Clearances, Outlines
 from generator.polyhedron import Polyhedron, dihedral, face_polygon
 from generator.polyhedron.development import Development, development
 from generator.polyhedron.front import Loop, covered_parts
+from generator.polyhedron.mount import with_mount
 from generator.polyhedron.shapes import ROUND_SHAPES, SHAPES
+from generator.polyhedron.standing import Stance, best_stance, stance_on
 from generator.printers import Printer
 from generator.solid.analytic import bend_problem
 from generator.solid.part import edge_numbers
@@ -33,8 +36,9 @@ from generator.solid.plate import cut_corners, plain_panels, symbol_clearance_mm
 from generator.spec import ObjectSpec, ShapeSpec
 from generator.spec.problem import error_location
 
+FACES_LISTED = 8  #: faces that a message lists by name
+TAG_BACK = 1  #: face that a tag lies on
 LAYER_MM = 0.02  # by which a printed height may differ from the designed one, unsaid
-STANDING = ("cylinder", "cone")  #: shapes that are printed standing on F1
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +55,7 @@ class ObjectPlan:
     #: round faces by the facet that carries them, unrolled; faces less what is covered
     developed: Outlines = field(default_factory=dict)
     blank_faces: frozenset[int] = frozenset()  #: that carry no symbols of their own
+    stance: Stance | None = None  #: how one body stands on the bed; None: as it was modelled
     notes: tuple[str, ...] = ()  #: what was decided for the person who asked
 
     @property
@@ -76,6 +81,15 @@ class RoundFaces:
     blank: frozenset[int]
     notes: tuple[str, ...]
 
+    def shown(self, polyhedron: Polyhedron) -> bool:
+        """Whether a face is left that can carry symbols."""
+        return len(self.blank - set(self.developments)) < len(polyhedron.faces)
+
+    def without(self, blank: Collection[int], *notes: str) -> RoundFaces:
+        """Return the faces when more stay blank."""
+        left = {facet: flat for facet, flat in self.developments.items() if facet not in blank}
+        return RoundFaces(left, self.blank | set(blank), (*self.notes, *notes))
+
 
 def plan_objects(
     specs: Sequence[ObjectSpec], solid: Polyhedron | None = None
@@ -88,7 +102,9 @@ def plan_objects(
         if key not in known:
             known[key] = plan_object(spec, solid)
         plan = known[key]
-        plans.append(replace(plan, spec=replace(spec, parts=plan.spec.parts)))
+        own = replace(spec, parts=plan.spec.parts, down=plan.spec.down, blank=plan.spec.blank)
+        own = replace(own, mount=plan.spec.mount)
+        plans.append(replace(plan, spec=own))
     return tuple(plans)
 
 
@@ -104,7 +120,7 @@ def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan
     source, printer = spec.source, spec.printer
     with error_location(source, "shape"):
         polyhedron = _polyhedron(spec.shape) if solid is None else solid
-    spec = _as_one_part(spec, polyhedron)
+    spec, polyhedron = _mounted(_as_one_part(spec, polyhedron), polyhedron)
     with error_location(source, "encoding, profile"):
         array = array_from(spec.encoding)
     alphabet = spec.alphabet
@@ -115,6 +131,7 @@ def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan
     reach = 2.0 * spec.style.height_mm + printer.gap_min_mm  # room for symbols of two faces
     with error_location(source, "shape"):
         faces = _round_faces(polyhedron, shapes, spec, reach)
+    spec, faces, stance = _blank_faces(polyhedron, spec, faces)
     plain = [
         k
         for k in range(len(polyhedron.faces))
@@ -134,21 +151,68 @@ def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan
         _clearances(polyhedron, spec, faces, kept_free),
         outlines_of,
         faces.blank,
+        stance,
         (*faces.notes, *_covered_note(polyhedron, covered, reach), *_layer_note(spec)),
     )
 
 
 def _as_one_part(spec: ObjectSpec, polyhedron: Polyhedron) -> ObjectSpec:
-    """Return the spec of an object with round faces as one that is printed whole."""
-    if not (polyhedron.surfaces or polyhedron.blank) or spec.parts == "whole":
+    """Return the spec of an object with round faces or a mount as one that is printed whole."""
+    one = spec.mount or polyhedron.kind == "tag"
+    if not (polyhedron.surfaces or polyhedron.blank or one) or spec.parts == "whole":
         return spec
     asked = spec.source.value.get("print")
     if isinstance(asked, dict) and asked.get("parts") == "panels":
+        why = "a round face cannot be printed as a flat panel"
+        if one:
+            why = f"a {'part with a mount' if spec.mount else 'tag'} is printed in one piece"
         with error_location(spec.source, "print.parts"):
-            raise SolidError(
-                "a round face cannot be printed as a flat panel", fix="set parts to whole"
-            )
+            raise SolidError(why, fix="set parts to whole")
     return replace(spec, parts="whole")
+
+
+def _mounted(spec: ObjectSpec, polyhedron: Polyhedron) -> tuple[ObjectSpec, Polyhedron]:
+    """Return the solid with the holes of its mount, and the spec with the face that is held."""
+    mount = spec.mount
+    if mount is None:
+        return spec, polyhedron
+    with error_location(spec.source, "mount.face, mount"):
+        name = mount.face
+        face = _facets(polyhedron, name)[0] if name else _held_face(spec, polyhedron)
+        bent = {facet for surface in polyhedron.surfaces for facet in surface.facets}
+        if face in bent or (face in polyhedron.blank and polyhedron.kind != "tag"):
+            raise SolidError(f"{mount.face} is round, a mount needs a flat face", fix="face: F1")
+        name = polyhedron.faces[face].name
+        return replace(spec, mount=replace(mount, face=name)), with_mount(polyhedron, mount, face)
+
+
+def _held_face(spec: ObjectSpec, polyhedron: Polyhedron) -> int:
+    """Return the face that is mounted where the spec names none: the one that is down."""
+    if spec.down not in ("", "none"):
+        return _facets(polyhedron, spec.down)[0]
+    if polyhedron.kind == "tag":
+        return TAG_BACK
+    stance = best_stance(polyhedron, _flat(polyhedron), math.sin(spec.printer.overhang_max_rad))
+    return 0 if stance is None else stance.face
+
+
+def _facets(polyhedron: Polyhedron, name: str) -> list[int]:
+    """Return the faces that a name stands for: one, or the facets of a round face."""
+    known: dict[str, list[int]] = {}
+    for number, face in enumerate(polyhedron.faces):
+        known.setdefault(face.name.partition(".")[0], []).append(number)
+    if name not in known:
+        fix = f"name one of {', '.join(known)}"
+        if len(known) > FACES_LISTED:
+            fix = f"name one of F1 to {list(known)[-1]}; the picture NAME.png shows them"
+        raise LayoutError(f"the object has no face {name}", fix=fix)
+    return known[name]
+
+
+def _flat(polyhedron: Polyhedron) -> set[int]:
+    """Return the flat faces that can carry symbols."""
+    bent = {facet for surface in polyhedron.surfaces for facet in surface.facets}
+    return set(range(len(polyhedron.faces))) - bent - set(polyhedron.blank)
 
 
 def _round_faces(
@@ -158,11 +222,12 @@ def _round_faces(
     developments: dict[int, Development] = {}
     blank = set(polyhedron.blank)
     notes: list[str] = []
-    unrolled = [development(polyhedron, surface) for surface in polyhedron.surfaces]
+    surfaces = [one for one in polyhedron.surfaces if one.carrier not in blank]
+    unrolled = [development(polyhedron, surface) for surface in surfaces]
     problems = [bend_problem(each, tiers, spec.style, spec.printer) for each in unrolled]
-    bent = [s for s, problem in zip(polyhedron.surfaces, problems, strict=True) if not problem]
+    bent = [s for s, problem in zip(surfaces, problems, strict=True) if not problem]
     covered = covered_parts(polyhedron, [facet for s in bent for facet in s.facets], reach)
-    for surface, flat, problem in zip(polyhedron.surfaces, unrolled, problems, strict=True):
+    for surface, flat, problem in zip(surfaces, unrolled, problems, strict=True):
         name = polyhedron.faces[surface.carrier].name
         if not problem and not covered.keys().isdisjoint(surface.facets):
             problem = f"another face is nearer than {reach:.2g} mm in front of it"
@@ -172,14 +237,68 @@ def _round_faces(
         else:
             developments[surface.carrier] = flat
             blank |= set(surface.facets[1:])
-    if polyhedron.kind in STANDING:
-        blank.add(0)
-        notes.append(f"{polyhedron.faces[0].name} stays blank: the part is printed standing on it")
-    if len(blank - set(developments)) == len(polyhedron.faces):
+    found = RoundFaces(developments, frozenset(blank), tuple(notes))
+    if not found.shown(polyhedron):
         why = "; ".join((*polyhedron.notes, *notes))
         fix = "give it a planar face, or a cylinder or cone face between two circles"
         raise LayoutError(f"no face of the object carries symbols: {why}", fix=fix)
-    return RoundFaces(developments, frozenset(blank), tuple(notes))
+    return found
+
+
+def _blank_faces(
+    polyhedron: Polyhedron, spec: ObjectSpec, faces: RoundFaces
+) -> tuple[ObjectSpec, RoundFaces, Stance | None]:
+    """Leave faces blank: as the spec says, and what one body stands on.
+
+    Settings that say what holds without them are dropped, so that they mean the same object.
+    """
+    source = spec.source
+    with error_location(source, "print.blank"):
+        asked = {name: _facets(polyhedron, name) for name in spec.blank}
+        carried = faces.without([number for facets in asked.values() for number in facets])
+        if not carried.shown(polyhedron):
+            fix = "take a face with symbols out of the list"
+            raise LayoutError("all faces are blank, so that no touch names a place", fix=fix)
+    stance = None
+    with error_location(source, "print.down"):
+        if spec.parts == "panels" and spec.down:
+            fix = "leave it out, or set parts to whole"
+            raise SolidError("every panel lies on its back: none stands on a face", fix=fix)
+        if spec.parts == "whole" and spec.down != "none":
+            stance = _chosen_stance(polyhedron, spec)
+            if stance is not None and not carried.without(stance.on_bed).shown(polyhedron):
+                stance = None
+        if spec.down not in ("", "none"):
+            chosen, facets = stance, _facets(polyhedron, spec.down)
+            steepest = math.sin(spec.printer.overhang_max_rad)
+            stance = stance_on(polyhedron, facets[0], steepest) if len(facets) == 1 else None
+            if stance is None:
+                fix = "take a flat face on the outside, or leave it out: one is chosen"
+                raise SolidError(f"the part cannot stand on {spec.down}", fix=fix)
+            if not carried.without(stance.on_bed).shown(polyhedron):
+                fix = "take another face, or none: then no face is blank for the bed"
+                raise SolidError(f"only {spec.down} would carry symbols", fix=fix)
+            if chosen is not None and chosen.face == stance.face:
+                spec = replace(spec, down="")
+    if stance is not None:
+        names = ", ".join(polyhedron.faces[face].name for face in stance.on_bed)
+        on_it = "it" if len(stance.on_bed) == 1 else "them"
+        note = f"{names} stay{'s' * (on_it == 'it')} blank: the part is printed standing on {on_it}"
+        carried = carried.without(stance.on_bed, note)
+        kept = [name for name, facets in asked.items() if facets[0] not in stance.on_bed]
+        spec = replace(spec, blank=tuple(kept))
+    return spec, carried, stance
+
+
+def _chosen_stance(polyhedron: Polyhedron, spec: ObjectSpec) -> Stance | None:
+    """Return how one body stands where the spec does not say: on its mount if it can."""
+    steepest = math.sin(spec.printer.overhang_max_rad)
+    held = TAG_BACK if polyhedron.kind == "tag" else None
+    if spec.mount is not None:
+        (held,) = _facets(polyhedron, spec.mount.face)
+    if held is not None and (stance := stance_on(polyhedron, held, steepest)) is not None:
+        return stance
+    return best_stance(polyhedron, _flat(polyhedron), steepest)
 
 
 def _layer_note(spec: ObjectSpec) -> tuple[str, ...]:

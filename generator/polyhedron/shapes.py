@@ -9,6 +9,9 @@ lie above them; F1 is the base, F2 to Fn+1 the sides in order (F2 in front), Fn+
 On a side the frame's origin is its lower left corner seen from outside, x level, y up.
 Pyramid: vertices 1 to n are the base, n + 1 the apex; F1 is the base, F2 to Fn+1 the sides.
 
+Tag: F1 is the top, the only face that carries symbols, F2 the base. With a frame, F1 stands
+`FRAME_STEP_MM` over it, so that clamps and screws stay below a probe.
+
 Cylinder and cone: F1 is the base, F2 the side (its facets go on as F2.2, F2.3, ...
 counter-clockwise seen from above, the first in front), F3 the top. The facets are not inscribed:
 their lines lie so far out that the unrolled side has the width 2 pi r of the round one (a cone:
@@ -25,6 +28,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +38,8 @@ from generator.polyhedron.winged import Developable, Face, FaceLike, Polyhedron,
 
 SHORTEST_MM, LONGEST_MM = 1.0, 5000.0  #: lengths of a named shape
 LENGTH_RATIO = 200.0  #: most a length may exceed another one of the same solid
+TAG_MM = 3.0  #: thickness of a tag: holds still under 30 N, and M3 screws sink into it
+FRAME_STEP_MM = 1.0  #: of a tag's frame below its face
 MOST_SIDES = 64  #: of a prism or pyramid
 #: Of a round face's facets: a tenth of a printed layer; also of round faces that are read.
 CHORD_ERROR_MM = 0.02
@@ -122,6 +128,29 @@ def dodecahedron(side: float) -> Polyhedron:
     towards += [(float(s), 0.0, t * golden) for s, t in signs]
     points = np.array(vertices)
     return polyhedron("dodecahedron", points, [_cap(points, np.array(n)) for n in towards])
+
+
+def tag(size: Sequence[float], thickness: float = TAG_MM, frame: float = 0.0) -> Polyhedron:
+    """Return a plate of `size` = (x, y) with symbols on F1 alone, inside a lower frame if asked."""
+    x, y = size
+    lengths = {"x": x, "y": y, "thickness": thickness, **({"frame": frame} if frame else {})}
+    check_lengths("tag", **lengths)
+    top, base = _rectangle(x, y), _rectangle(x + 2.0 * frame, y + 2.0 * frame)
+    levels = [(base, 0.0), (top, thickness)]
+    if frame:
+        if thickness < 2.0 * FRAME_STEP_MM:
+            fix = f"set thickness to {2.0 * FRAME_STEP_MM:g} mm or more, 3 mm prints well"
+            raise ShapeError(f"a tag of {thickness:g} mm has no room for a lower frame", fix=fix)
+        step = thickness - FRAME_STEP_MM
+        levels[1:1] = [(base, step), (top, step)]
+    low, high, last = (0, 1, 2, 3), (4, 5, 6, 7), 4 * len(levels) - 4
+    faces: list[FaceLike] = [tuple(range(last, last + 4)), (1, 0, 3, 2)]
+    for k in range(0, last, 8):
+        faces += [tuple(k + i for i in (a, b, b + 4, a + 4)) for a, b in pairwise((*low, 0))]
+    if frame:
+        faces.append([high, (8, 11, 10, 9)])
+    vertices = np.concatenate([np.column_stack([ring, np.full(4, z)]) for ring, z in levels])
+    return replace(polyhedron("tag", vertices, faces), blank=tuple(range(1, len(faces))))
 
 
 def polyhedron_of(vertices: ArrayLike, faces: Sequence[FaceLike]) -> Polyhedron:
@@ -287,4 +316,9 @@ def _solid_of_rings(
     return replace(solid, surfaces=(side,))
 
 
-ROUND_SHAPES: dict[str, Callable[..., Polyhedron]] = {"cylinder": cylinder, "cone": cone}
+#: Shapes that are made in one piece, as no flat panels.
+ROUND_SHAPES: dict[str, Callable[..., Polyhedron]] = {
+    "cylinder": cylinder,
+    "cone": cone,
+    "tag": tag,
+}

@@ -106,7 +106,8 @@ class Polyhedron:
     edges: tuple[WingedEdge, ...]
     notes: tuple[str, ...] = ()  #: what was changed to make the solid, for the person to read
     surfaces: tuple[Developable, ...] = ()  #: round faces, each a run of `faces`
-    blank: tuple[int, ...] = ()  #: faces that stand for a surface that does not unroll
+    #: faces without symbols: they stand for a surface that does not unroll, or are held or bored
+    blank: tuple[int, ...] = ()
 
     @property
     def euler_characteristic(self) -> int:

@@ -261,8 +261,11 @@ def _closes(
     face: AnalyticFace, faces: Sequence[AnalyticFace], holders: Mapping[tuple[int, int], int]
 ) -> bool:
     """Whether each rim borders on one planar face, or on the whole rim of another round face."""
-    others = [
-        rim.vertices for other in faces if other is not face for rim in (other.low, other.high)
+    others = [  # as the other face runs along its rims
+        ring
+        for other in faces
+        if other is not face
+        for ring in (other.low.vertices, other.high.vertices[::-1])
     ]
     for rim, seen in ((face.low, face.low.vertices[::-1]), (face.high, face.high.vertices)):
         if rim.radius_mm > 0.0 and seen not in others:

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from encoded_objects.base.output import some_of
 from generator.alphabet.figures import in_figures
@@ -114,9 +115,7 @@ def _marks(
     printer: Printer,
 ) -> BackMarks:
     """Return the name on a panel's back, and the numbers of the edges it had before cuts."""
-    corners = [plain.vertices[list(loop)] for loop in plain.facets[1].loops]
-    T = plane_frame(corners[0][0], corners[0][1] - corners[0][0], face_vector(corners))
-    rings = [in_frame(T, corner)[:, :2] for corner in corners]
+    T, rings = _facet_frame(plain, 1)
     left = [in_frame(T, fitted.vertices[list(loop)])[:, :2] for loop in fitted.facets[1].loops]
     marks = []
     for ring, edges in zip(rings, numbered, strict=True):
@@ -125,6 +124,20 @@ def _marks(
             edge = edges[(len(edges) - 2 - k) % len(edges)]
             marks.append(EdgeMark(str(edge + 1), ring[k], ring[(k + 1) % len(ring)]))
     return marks_on(marks, name, left, 1, T, wall_mm, printer)
+
+
+def with_name(part: Part, facet: int, name: NameMark, wall_mm: float, printer: Printer) -> Part:
+    """Return a part with a name engraved on a facet, where there is room for it."""
+    T, rings = _facet_frame(part, facet)
+    marks = marks_on([], name, rings, facet, T, wall_mm, printer)
+    return replace(part, embossings=part.embossings + marks.embossings)
+
+
+def _facet_frame(part: Part, facet: int) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+    """Return the frame of a facet, and its loops (k, 2) there."""
+    corners = [part.vertices[list(loop)] for loop in part.facets[facet].loops]
+    T = plane_frame(corners[0][0], corners[0][1] - corners[0][0], face_vector(corners))
+    return T, [in_frame(T, corner)[:, :2] for corner in corners]
 
 
 def _no_room(missing: dict[str, tuple[str, ...]]) -> str:

@@ -172,15 +172,25 @@ class Part:
         flat = sum(len(e.labels) for e in self.embossings if e.face is not None)
         return flat + sum(len(w.labels) for w in self.wrapped)
 
-    def moved(self, by_mm: NDArray[np.float64]) -> Part:
-        """Return the part shifted by (3,) mm in its own frame; in the object it stays in place."""
+    def moved(
+        self, by_mm: NDArray[np.float64], R_new_old: NDArray[np.float64] | None = None
+    ) -> Part:
+        """Return the part turned by (3, 3), then shifted by (3,) mm in its own frame.
+
+        In the object it stays in place.
+        """
         T_new_old = np.eye(4)
         T_new_old[:3, 3] = by_mm
         T_object_part = self.T_object_part.copy()
+        vertices = self.vertices
+        if R_new_old is not None:
+            T_new_old[:3, :3] = R_new_old
+            T_object_part[:3, :3] = T_object_part[:3, :3] @ R_new_old.T
+            vertices = vertices @ R_new_old.T
         T_object_part[:3, 3] -= T_object_part[:3, :3] @ by_mm
         return replace(
             self,
-            vertices=self.vertices + by_mm,
+            vertices=vertices + by_mm,
             embossings=tuple(
                 replace(one, T_part_facet=T_new_old @ one.T_part_facet) for one in self.embossings
             ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
 from generator.layout.placement import Layout
@@ -15,12 +16,16 @@ from generator.solid.wrapped import Body, wrapped_onto
 
 
 def emboss_whole(
-    polyhedron: Polyhedron, layout: Layout, tiers: tuple[Tiers, ...], name: str
+    polyhedron: Polyhedron,
+    layout: Layout,
+    tiers: tuple[Tiers, ...],
+    name: str,
+    R_bed_object: NDArray[np.float64] | None = None,
 ) -> Part:
     """Return the body with all its symbols as one solid, its box centred on x and y, on z = 0.
 
-    Faces of the layout without symbols stay plain; `tiers`: one outline per label. Raises
-    `SolidError` if a label has no outline.
+    Faces of the layout without symbols stay plain; `tiers`: one outline per label. `R_bed_object`
+    (3, 3) turns it as it stands on the bed. Raises `SolidError` if a label has no outline.
     """
     facets = [Facet(face.name, face.loops) for face in polyhedron.faces]
     body = Body([polyhedron.vertices], len(polyhedron.vertices), facets)
@@ -46,5 +51,7 @@ def emboss_whole(
         wrapped=tuple(body.wrapped),
         analytic=analytic_faces(polyhedron, bent, tiers, owned),
     )
+    if R_bed_object is not None:
+        part = part.moved(np.zeros(3), R_bed_object)
     low, high = box(part)
     return part.moved(-np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))

@@ -28,6 +28,8 @@ from generator.alphabet.printable import check_printable, is_printable
 from generator.array.definition import array_from
 from generator.array.profiles import PROFILES, SMALLEST, smallest_profile
 from generator.errors import AlphabetError, ArrayError
+from generator.polyhedron.mount import Mount, least_thickness_mm
+from generator.polyhedron.shapes import TAG_MM
 from generator.printers import Printer, printer_named, printer_of_nozzle
 from generator.spec.explain import explain_errors
 from generator.spec.problem import SPEC, SpecError, mark_of
@@ -35,6 +37,7 @@ from generator.spec.resolved import AUTO, EXPLICIT, GAP_MM, ObjectSpec, ShapeSpe
 from generator.spec.settings import (
     AlphabetSettings,
     Encoding,
+    MountSettings,
     NamedSettings,
     ObjectSettings,
     PrinterSettings,
@@ -52,6 +55,7 @@ WALL_STROKES = 2  # least wall, in narrowest strokes of the printer
 FORMATS = ("step", "stl", "3mf")
 DATABASE = "sqlite:///lab.db"
 PRINTER = "fdm-0.4"
+MOUNTS = ("flange", "screws", "magnets", "rod", "hole")
 COARSER_MM = (3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 12.0)
 """`auto` takes the pitch that the sensor type proposes, for `fsr-16` the 5 mm that touches are read
 best at, on nozzles of 0.4 and 0.6 mm and CAD surfaces alike (docs/pitches.md); and the first of
@@ -103,6 +107,7 @@ def resolve(
     shape = solid
     if isinstance(settings, ObjectSettings):
         shape = _shape(settings.shape, tree, refuse)
+    mount = _mount(settings.mount, refuse)
     sensor = _sensor(settings, tree, problems)
     named = _alphabet(settings, tree, problems)
     profile = _array_profile(settings, sensor, named)
@@ -136,6 +141,11 @@ def resolve(
             f"a gap of {gap:g} mm is wider than the wall of {wall:g} mm",
             f"set gap to {GAP_MM:g} mm, or more for much glue",
         )
+    if shape is not None and shape.kind == "tag" and "thickness" not in shape.parameters:
+        thickness = printer.printed_mm(
+            max(TAG_MM, least_thickness_mm(mount) + printer.layer_mm / 2)
+        )
+        shape = replace(shape, parameters={**shape.parameters, "thickness": thickness})
     if problems or shape is None:
         raise SpecError(problems)
     spec = ObjectSpec(
@@ -150,6 +160,9 @@ def resolve(
         wall_mm=wall,
         gap_mm=gap,
         printer=printer,
+        mount=mount,
+        down=settings.print.down or "",
+        blank=tuple(settings.print.blank or ()),
         colours=settings.print.colours,
         formats=tuple(dict.fromkeys(settings.output.formats or _usual_formats(printer))),
         folder=Path(settings.output.folder or f"out/{folder_name(settings.name)}"),
@@ -461,6 +474,18 @@ def _shape(shape: Shape, tree: Tree, refuse: Refuse) -> ShapeSpec | None:
         refuse(f"shape.{kind}", f"'{kind}' has {given_sizes}", f"write shape: {EXAMPLES[kind]}")
         return None
     return ShapeSpec(kind, sizes)
+
+
+def _mount(settings: MountSettings | None, refuse: Refuse) -> Mount | None:
+    """Return the one mount that is given, if any."""
+    if settings is None:
+        return None
+    given = [kind for kind in MOUNTS if getattr(settings, kind) is not None]
+    if len(given) != 1:
+        cause = f"a part is held in one way, not by {' and '.join(given) or 'none'}"
+        refuse("mount", cause, "write mount: {screws: M3}, or leave it out")
+        return None
+    return Mount(given[0], getattr(settings, given[0]), settings.face or "")
 
 
 def _check_faces(faces: list[tuple[tuple[int, ...], ...]], vertices: int, refuse: Refuse) -> None:

@@ -15,6 +15,7 @@ from encoded_objects.base.yaml_tree import Tree
 from generator.alphabet.known import ALPHABETS, Alphabet
 from generator.alphabet.outline import SymbolStyle
 from generator.errors import GeneratorError
+from generator.polyhedron.mount import Mount
 from generator.printers import Printer, printer_named
 
 AUTO = "auto"  # profile by default: array and pitch are chosen when the objects are made
@@ -35,6 +36,7 @@ class ShapeSpec:
     prism, pyramid                                sides, height, side or radius
     cylinder                                      diameter, height
     cone                                          diameter, height, top_diameter (0 if left out)
+    tag                                           size: [x, y], thickness, frame (0 if left out)
     polyhedron                                    vertices: [[x, y, z], ...],
                                                   faces: [[loop, hole, ...], ...]
     file                                          sha256 (of the content of `file`), scale (1 if
@@ -71,6 +73,9 @@ class ObjectSpec:
     database: str  #: URL
     source: Tree = field(repr=False, compare=False)  #: its settings as written, and their places
     lab_key: str = ""  #: of the database, where the spec says it
+    down: str = ""  #: face that one body stands on, or none; empty where it is chosen
+    blank: tuple[str, ...] = ()  #: names of faces that carry no symbols
+    mount: Mount | None = None  #: holes by which it is held
     colours: int = 1  #: of the filament: 2 where it is changed for the symbols
     density_kg_m3: float = 1240.0  #: of what is printed, for robots and simulators
     collision: Literal["touch", "body"] = "touch"  #: what other bodies hit there
@@ -87,6 +92,8 @@ class ObjectSpec:
         as if it had been written; a file counts by its content.
         """
         gap = {} if self.gap_mm == GAP_MM else {"gap_mm": self.gap_mm}  # older specs had none
+        down = {"down": self.down} if self.down else {}
+        blank = {"blank": sorted(set(self.blank))} if self.blank else {}
         alphabet, name = self.alphabet, self.alphabet.name
         style = {name: round(value, 9) for name, value in asdict(self.style).items()}
         return {
@@ -99,6 +106,9 @@ class ObjectSpec:
             "wall_mm": self.wall_mm,
             "printer": self._printer_meaning(),
             **gap,
+            **({"mount": asdict(self.mount)} if self.mount else {}),
+            **down,
+            **blank,
         }
 
     def _printer_meaning(self) -> Any:

@@ -23,6 +23,8 @@ from encoded_objects.base.settings import (
     Length,
     LengthOrZero,
     PathText,
+    diameter_and_height,
+    length_mm,
     may_name_files,
     refuse,
     refuse_files,
@@ -32,6 +34,7 @@ from generator.alphabet.known import ALPHABETS
 from generator.array.lab_key import read_lab_key
 from generator.errors import GeneratorError, LabKeyError
 from generator.export.formats import EXPORTERS
+from generator.polyhedron.mount import FLANGES, SCREWS
 from generator.printers import MACHINES, PRINTERS, printer_named
 from generator.spec.shape import EXAMPLES, Shape
 
@@ -79,9 +82,54 @@ def shape_block(value: Any) -> Any:
     return value
 
 
-def format_list(value: Any) -> Any:
-    """Return a list of formats; `step, stl` is one too."""
+def name_list(value: Any) -> Any:
+    """Return a list of names; `step, stl` is one too."""
     return [part.strip() for part in value.split(",")] if isinstance(value, str) else value
+
+
+def face_name(value: Any) -> str:
+    """Return the name of a face as it is written in lists and pictures: F4."""
+    if isinstance(value, str) and re.fullmatch(r"\s*[Ff][1-9][0-9]{0,6}\s*", value):
+        return value.strip().upper()
+    raise refuse(f"{value!r:.60} is no name of a face", "write, for example, F4")
+
+
+def down_name(value: Any) -> str:
+    """Return the name of the face that is down, or none."""
+    return "none" if value == "none" else face_name(value)
+
+
+def flange_name(value: Any) -> str:
+    """Return the designation of a flange; the standard's number may be left out."""
+    name = re.sub(r"^iso[ -]?9409-1-", "", str(value).strip(), flags=re.IGNORECASE).upper()
+    found = f"ISO 9409-1-{name}"
+    if found not in FLANGES:
+        raise refuse(
+            f"'{value!s:.40}' is no flange known here", f"choose one of {', '.join(FLANGES)}"
+        )
+    return found
+
+
+def thread_name(value: Any) -> str:
+    """Return the name of a metric thread."""
+    name = str(value).strip().upper()
+    if name not in SCREWS:
+        raise refuse(
+            f"'{value!s:.40}' is no screw known here", f"choose one of {', '.join(SCREWS)}"
+        )
+    return name
+
+
+def hole_mm(value: Any) -> float:
+    """Return the diameter of a hole; of a thread the hole that it passes through."""
+    if isinstance(value, str) and value.strip().upper().startswith("M"):
+        return SCREWS[thread_name(value)].clear_mm
+    return length_mm(value)
+
+
+def mount_block(value: Any) -> Any:
+    """Return the block that the name of a flange stands for."""
+    return {"flange": value} if isinstance(value, str) else value
 
 
 def database_url(value: Any) -> str:
@@ -224,8 +272,9 @@ Copies = Annotated[int, Field(ge=1, le=COPIES_MAX), whole_number(1, COPIES_MAX, 
 FormatList = Annotated[
     list[Format],
     Field(min_length=1),
-    BeforeValidator(format_list, json_schema_input_type=list[Format] | str),
+    BeforeValidator(name_list, json_schema_input_type=list[Format] | str),
 ]
+FaceName = Annotated[str, BeforeValidator(face_name)]
 SensorTypeName = Annotated[str, BeforeValidator(sensor_type_name)]
 DatabaseUrl = Annotated[
     str,
@@ -395,6 +444,31 @@ class Symbols(Block):
     """The symbols themselves: a name, a YAML file, or a block of one's own."""
 
 
+class MountSettings(Block):
+    """Holes by which a part is held: exactly one of these; symbols keep clear of them."""
+
+    flange: Annotated[str, BeforeValidator(flange_name)] | None = None
+    """Flange of a robot: ISO 9409-1-50-4-M6, or 50-4-M6. Holes with sunk heads, and a pin."""
+    screws: Annotated[str, BeforeValidator(thread_name)] | None = None
+    """A through hole in each corner for such a screw, M3, its head sunk."""
+    magnets: (
+        Annotated[
+            tuple[Length, Length],
+            BeforeValidator(diameter_and_height, json_schema_input_type=list[Any] | str),
+        ]
+        | None
+    ) = None
+    """A pocket in each corner for a round magnet: 8 x 2 mm, diameter and height."""
+    rod: Length | None = None
+    """A socket in the middle for a rod of this diameter, two diameters deep where there is room."""
+    hole: Annotated[float, BeforeValidator(hole_mm, json_schema_input_type=float | str)] | None = (
+        None
+    )
+    """A hole through the middle: its diameter, or the thread of a bolt that passes, M8."""
+    face: FaceName | None = None
+    """Face that is mounted, F1; it stays blank. The face that is down if left out."""
+
+
 class Print(Block):
     """How the object is printed."""
 
@@ -410,6 +484,17 @@ class Print(Block):
     colours: Literal[1, 2] = 1
     """2: the filament is changed where the symbols begin (panels in PrusaSlicer). Bambu Studio's
     projects print symbols of panels in another filament anyhow, with 2 those of one body too."""
+    down: Annotated[str, BeforeValidator(down_name)] | None = None
+    """Face that one body stands on, F4; it stays blank. Chosen if left out: the model's own way
+    up, or a large face under which little hangs over. none: no face is blank for the bed."""
+    blank: (
+        Annotated[
+            list[FaceName],
+            BeforeValidator(name_list, json_schema_input_type=list[FaceName] | str),
+        ]
+        | None
+    ) = None
+    """Faces without symbols: [F4, F7]."""
 
 
 class Robot(Block):
@@ -454,6 +539,14 @@ class Defaults(Block):
     """net: one lattice runs through the unfolded object; faces: each face alone; auto: what
     shows more places."""
     symbols: Symbols = Symbols()
+    mount: (
+        Annotated[
+            MountSettings, BeforeValidator(mount_block, json_schema_input_type=MountSettings | str)
+        ]
+        | None
+    ) = None
+    """Holes by which it is held: {flange: ISO 9409-1-50-4-M6}, {screws: M3}, {magnets: 8 x 2 mm},
+    {rod: 12 mm}, {hole: M8}; none if left out."""
     print: Print = Print()
     robot: Robot = Robot()
     copies: Copies = 1

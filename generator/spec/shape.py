@@ -17,6 +17,7 @@ from encoded_objects.base.settings import (
     coordinates,
     refuse,
     sides,
+    two_sides,
     whole_number,
 )
 
@@ -80,6 +81,17 @@ BoxSides = Annotated[
 ]
 
 
+TagSides = Annotated[
+    tuple[Length, Length],
+    BeforeValidator(two_sides, json_schema_input_type=tuple[Length, Length] | str),
+]
+
+
+def tag_block(value: Any) -> Any:
+    """Return the block that the two sides of a tag stand for."""
+    return value if isinstance(value, dict) else {"size": value}
+
+
 class TriangularPrism(Block):
     """A prism on an equilateral triangle."""
 
@@ -135,6 +147,18 @@ class Cone(Block):
     """Distance between base and top, mm unless a unit is written."""
 
 
+class Tag(Block):
+    """A flat plate with symbols on one side."""
+
+    size: TagSides
+    """Length and width of the side with symbols: [40 mm, 40 mm] or 40 x 40 mm."""
+    thickness: Length | None = None
+    """Of the plate; 3 mm, or what magnets need."""
+    frame: Length | None = None
+    """Width of a blank frame around the symbols, 1 mm lower, for clamps and screws; none if left
+    out."""
+
+
 class VerticesAndFaces(Block):
     """Any polyhedron with planar faces."""
 
@@ -163,6 +187,10 @@ class Shape(Block):
     pyramid: Pyramid | None = None
     cylinder: Cylinder | None = None
     cone: Cone | None = None
+    tag: (
+        Annotated[Tag, BeforeValidator(tag_block, json_schema_input_type=Tag | TagSides)] | None
+    ) = None
+    """Sides of a flat plate with symbols on one side: [40, 40] or 40 x 40 mm."""
     polyhedron: VerticesAndFaces | None = None
     file: PathText | None = None
     """A model, relative to the spec: a .stl or .obj file, whose curved regions stay blank, or a
@@ -184,6 +212,7 @@ EXAMPLES = {
     "pyramid": "{pyramid: {sides: 4, side: 80 mm, height: 70 mm}}",
     "cylinder": "{cylinder: {diameter: 60 mm, height: 80 mm}}",
     "cone": "{cone: {diameter: 80 mm, top_diameter: 40 mm, height: 80 mm}}",
+    "tag": "{tag: [40 mm, 40 mm]}",
     "polyhedron": "{polyhedron: {vertices: [[0, 0, 0], ...], faces: [[0, 2, 1], ...]}}",
     "file": "{file: part.step}",
 }
@@ -191,6 +220,7 @@ EXAMPLES = {
 OTHER_NAMES = {
     "parallelepiped": "box", "cuboid": "box", "block": "box", "brick": "box", "rectangle": "box",
     "wedge": "triangular_prism", "hexagonal_prism": "prism", "frustum": "cone", "tube": "cylinder",
+    "plate": "tag", "label": "tag",
     "mesh": "file", "stl": "file", "step": "file", "obj": "file", "model": "file", "path": "file",
 }  # fmt: skip
 """Names people try, and what they are called here."""

@@ -25,6 +25,8 @@ name: {name}
 # sensor_type: fsr-16    # what will touch it: probe-sensor types lists them; or a YAML file
 # layout: auto           # auto | net (one lattice through the unfolded object) | faces
 # copies: 1              # each copy has cells of its own, so that two are told apart
+# holes to hold it by, symbols keep clear:  mount: {{screws: M3}}, {{rod: 12 mm}}, {{hole: M8}},
+# {{magnets: 8 x 2 mm}}, or the flange of a robot: ISO 9409-1-50-4-M6
 
 # symbols:
 #   pitch: 5 mm          # distance between neighbouring symbols
@@ -38,6 +40,7 @@ name: {name}
 #   parts: panels        # panels (mitred plates, no supports) | whole (one body)
 #   wall: 3 mm           # thickness of the panels
 #   gap: 0.14 mm         # between panels in the finished object
+#   blank: []            # faces without symbols: [F4, F7]; down: F4  is what one body stands on
 #   printer: fdm-0.4     # encode-object printers lists them
 
 # robot:                 # what mjcf, urdf, sdf and usd files say

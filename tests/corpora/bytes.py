@@ -64,6 +64,8 @@ SHAPES: Cases = (
     ("cylinder", MOST, "shape: {cylinder: {diameter: 50 mm, height: 40 mm}}"),
     ("cone", ALL, "shape: {cone: {diameter: 60 mm, top_diameter: 30 mm, height: 45 mm}}"),
     ("cone-pointed", "step,stl,usd", "shape: {cone: {diameter: 70 mm, height: 60 mm}}"),
+    ("tag", "step,stl,3mf,glb,usd", "shape: {tag: 40 x 40 mm}\nmount: {screws: M3}"),
+    ("flange", "step,stl", "shape: {cylinder: {diameter: 70 mm, height: 20 mm}}\nmount: 50-4-M6"),
     ("face-with-hole", "step,stl,3mf,glb", _RING),
 )
 _ROD = "shape: {cylinder: {diameter: 40 mm, height: 36 mm}}\n"

@@ -28,7 +28,8 @@ from generator.spec import SpecError, read_specs
 ROOT = Path(__file__).parents[2]
 FIXTURES = ROOT / "fixtures"
 ROBOT = ("mjcf", "urdf", "sdf", "usd")
-BRACKET = f"shape: {{file: {FIXTURES / 'shapes' / 'l_bracket.stl'}}}\nprint: {{parts: whole}}\n"
+BRACKET = f"shape: {{file: {FIXTURES / 'shapes' / 'l_bracket.stl'}}}\n"
+BRACKET += "print: {parts: whole, down: none}\n"
 COARSE = "name: Part\nprofile: one-touch\nsymbols: {pitch: 9 mm}\n"  # few symbols: fast
 TEXTS = {
     "panels": COARSE + "shape: {box: 45 x 35 x 30 mm}\n",

@@ -39,7 +39,7 @@ def test_parts_come_back_as_valid_solids_where_the_solid_was(tmp_path):
     centre = properties.CentreOfMass()
     assert np.abs([centre.X() - 20, centre.Y() - 23.5, centre.Z() - 27]).max() < 0.5
     low, high = box(part)
-    assert high - low == pytest.approx([32, 37, 42])
+    assert high - low == pytest.approx([32, 37, 41])  # F1 is blank: it is down
     assert result.symbols == sum(len(face.labels) for face in result.layout.faces) > 50
 
 

@@ -105,7 +105,7 @@ def test_a_run_opens_the_database_once(tmp_path, monkeypatch, copies):
 
 
 def test_auto_goes_on_where_the_database_is_full(tmp_path):
-    text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole}}\n"
+    text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole, down: none}}\n"
     text += "symbols: {{alphabet: dense-4}}\ncopies: {}\n"
     first = dry(tmp_path, text.format("A", 2), dry_run=False, formats=())
     assert (first.rows, first.columns) == (51, 1285)

@@ -195,7 +195,7 @@ def test_the_build_sheet_and_the_last_line_say_how_parts_lie(tmp_path):
         ET.fromstring(drawing)
     lying = made.objects[1].lying
     assert re.fullmatch(
-        r"F1 down, supports needed under F1 \(\d+ symbols hang over\), \d+ symbols stand out "
+        r"F1 down, no supports needed, \d+ symbols stand out "
         r"sideways; with  parts: panels  nothing hangs over",
         lying,
     )
@@ -203,7 +203,7 @@ def test_the_build_sheet_and_the_last_line_say_how_parts_lie(tmp_path):
     line = next_step(made)
     assert "print Course-plate-1" in line
     assert "Course-build.html" in line
-    assert "Whole: F1 down, supports needed under F1 (" in line
+    assert "Whole: F1 down, no supports needed, " in line
 
 
 def test_a_cube_takes_two_pages_of_paper_and_a_can_one(tmp_path):

@@ -108,7 +108,7 @@ def panels(make_lab):
 
 @pytest.fixture(scope="module")
 def whole(make_lab):
-    spec = "{name: Cube, shape: {cube: 36 mm}, print: {parts: whole}}"
+    spec = "{name: Cube, shape: {cube: 36 mm}, print: {parts: whole, down: none}}"
     return str(make_lab(spec, formats=("stl",)) / "lab.db")
 
 

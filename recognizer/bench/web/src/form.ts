@@ -152,7 +152,7 @@ export class SpecForm {
 function labelled(text: string, field: HTMLElement, tip: string): HTMLElement {
   const label = document.createElement("label"), name = document.createElement("span");
   name.textContent = text;
-  label.title = tip.replaceAll("\n", " ");
+  field.title = label.title = tip.replaceAll("\n", " ");
   label.append(name, field);
   return label;
 }

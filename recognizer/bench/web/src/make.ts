@@ -13,6 +13,8 @@ interface Problem { line?: number | null; place: string; cause: string; fix: str
 interface Face { name: string; place: string; symbols: number; promise: (Promised & { remedy: string }) | null }
 interface Made { objects: { faces: number; symbols: number; parts: number; promise: string[]; warnings: string[]; face_reports: Face[] }[] }
 
+interface Refusal { error?: Problem & { problems?: Problem[] } }
+
 const PAUSE_MS = 250; // without a change, after which it is tried
 
 export class MakeDialog {
@@ -79,9 +81,9 @@ export class MakeDialog {
     const trying = new AbortController(), began = performance.now();
     this.trying = trying;
     const answer = await this.ask("make/try", trying.signal);
-    if (trying.signal.aborted || !answer) return;
+    if (trying.signal.aborted) return;
     this.dialog.removeAttribute("aria-busy");
-    if (!answer.ok) return this.refused(form, await answer.json() as { error?: Problem & { problems?: Problem[] } });
+    if (!answer?.ok) return answer ? this.refused(form, await refusal(answer)) : undefined;
     const { made, shape } = await answer.json() as { made: Made; shape: ObjectShape };
     this.refused(form, {});
     this.show(made, shape);
@@ -90,7 +92,7 @@ export class MakeDialog {
   }
 
   /** Say what is refused, at its field; nothing is where nothing is refused. */
-  private refused(form: SpecForm, { error }: { error?: Problem & { problems?: Problem[] } }): void {
+  private refused(form: SpecForm, { error }: Refusal): void {
     const { paths } = form.spec(), problems = error ? (error.problems?.length ? error.problems : [error]) : [];
     form.mark(problems.flatMap(({ line }) => (line ? paths[line - 1] ?? [] : [])));
     this.go.disabled = !this.making && problems.length > 0;
@@ -128,7 +130,7 @@ export class MakeDialog {
       if (making.signal.aborted || !answer) return say(state, making.signal.aborted ? "given up" : "");
       if (!answer.ok) {
         say(state, "");
-        return this.form ? this.refused(this.form, await answer.json() as { error?: Problem }) : undefined;
+        return this.refused(this.form!, await refusal(answer));
       }
       const kept = this.lab.value !== "", name = answer.headers.get("content-disposition")?.split('"')[1] ?? "part.zip";
       save(await answer.blob(), name);
@@ -152,6 +154,10 @@ export class MakeDialog {
       return null;
     }
   }
+}
+
+async function refusal(answer: Response): Promise<Refusal> {
+  return await answer.json().catch(() => ({ error: { cause: `the server fails (${answer.status})`, fix: "try again", place: "" } })) as Refusal;
 }
 
 function save(content: Blob, name: string): void {

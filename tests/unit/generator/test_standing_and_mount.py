@@ -1,0 +1,273 @@
+"""What a part stands on, and by what it is held: blank faces, tags, holes clear of symbols."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from encoded_objects import Reader, encode, open_lab, simulate
+from generator.database.open import open_database
+from generator.database.read import read_object
+from generator.database.transaction import read_transaction
+from generator.errors import DatabaseError
+from generator.layout.placement import FaceLayout
+from generator.polyhedron import SHAPES, polyhedron, volume
+from generator.polyhedron.frame import face_polygon
+from generator.polyhedron.mount import FLANGES, SCREWS, Mount, with_mount
+from generator.polyhedron.read import read_shape
+from generator.polyhedron.shapes import cylinder, tag
+from generator.polyhedron.standing import best_stance, bridges, stance_on
+from generator.spec import SpecError
+
+SINE = math.sin(math.radians(45.0))
+FIXTURES = Path(__file__).parents[3] / "fixtures"
+WHOLE = {"parts": "whole"}
+
+
+def made(folder, shape, name="Part", formats=(), **settings):
+    spec = {"name": name, "shape": shape, **settings}
+    return encode(spec, database=str(folder / "lab.db"), folder=folder / "out", formats=formats)
+
+
+def registered(folder, name="Part"):
+    with read_transaction(open_database(f"sqlite:///{folder}/lab.db", writable=False)) as one:
+        return read_object(one, name)
+
+
+def bearing(folder, name="Part") -> set[str]:
+    known = registered(folder, name)
+    on = {face.face for face in known.layout.faces if len(face.labels)}
+    return {known.polyhedron.faces[face].name for face in on}
+
+
+def extruded(outline, depth=30.0):
+    """Return a prism along y over an outline (x, z), clockwise as seen from -y."""
+    n = len(outline)
+    points = [(x, y, z) for y in (0.0, depth) for x, z in outline]
+    sides = [(i, (i + 1) % n, (i + 1) % n + n, i + n) for i in range(n)]
+    front, back = tuple(range(n))[::-1], tuple(range(n, 2 * n))
+    return polyhedron("polyhedron", points, [*sides, front, back])
+
+
+def corners_of(stl: Path) -> np.ndarray:
+    kind = np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    return np.frombuffer(stl.read_bytes()[84:], kind)["v"].reshape(-1, 3)
+
+
+TEE = [(0, 0), (0, 20), (-20, 20), (-20, 30), (30, 30), (30, 20), (10, 20), (10, 0)]
+
+
+def stance(solid):
+    flat = set(range(len(solid.faces))) - {f for s in solid.surfaces for f in s.facets}
+    return best_stance(solid, flat, SINE)
+
+
+def test_the_models_own_way_up_is_kept_where_little_hangs_over():
+    for solid in (SHAPES["cube"](40), SHAPES["triangular_prism"](50, 40), cylinder(50, 40)):
+        found = stance(solid)
+        assert (solid.faces[found.face].name, found.as_modelled) == ("F1", True)
+    bracket = read_shape(FIXTURES / "shapes/l_bracket.stl", 1.0)
+    assert stance(bracket).as_modelled
+
+
+def test_a_solid_that_would_hang_over_or_fall_is_turned():
+    solid = extruded(TEE)
+    found = stance(solid)
+    assert not found.as_modelled
+    assert found.overhang_mm2 == 0.0
+    up = solid.vertices @ found.R_bed_object[2]
+    assert up[list(solid.faces[found.face].loops[0])] == pytest.approx(up.min())
+    assert np.linalg.det(found.R_bed_object) == pytest.approx(1.0)
+    octahedron = SHAPES["octahedron"](60)
+    assert not stance(octahedron).as_modelled  # it stood on a corner
+    tower = SHAPES["box"]((10.0, 40.0, 200.0))
+    assert stance(tower).contact_mm2 == pytest.approx(40 * 200)
+    leaning = extruded([(0, 0), (60, 80), (70, 80), (10, 0)])
+    assert not stance_on(leaning, stance(leaning).face, SINE).height_mm > 70
+
+
+def test_faces_that_others_reach_below_are_nothing_to_stand_on():
+    assert all(stance_on(extruded(TEE), ceiling, SINE) is None for ceiling in (1, 5))
+
+
+@pytest.mark.parametrize(
+    ("shape", "down", "blank", "bears"),
+    [
+        ({"cube": 40}, None, None, {"F2", "F3", "F4", "F5", "F6"}),
+        ({"cube": 40}, "F4", "F6, F1", {"F2", "F3", "F5"}),
+        ({"cube": 40}, "none", None, {"F1", "F2", "F3", "F4", "F5", "F6"}),
+        ({"cylinder": {"diameter": 50, "height": 30}}, None, None, {"F2", "F3"}),
+        ({"cylinder": {"diameter": 50, "height": 30}}, "F3", ["F2"], {"F1"}),
+    ],
+)
+def test_what_is_down_or_asked_stays_blank(tmp_path, shape, down, blank, bears):
+    settings = {key: one for key, one in (("down", down), ("blank", blank)) if one is not None}
+    result = made(tmp_path, shape, print={**WHOLE, **settings})
+    assert bearing(tmp_path) == bears
+    lies = result.objects[0].lying
+    assert lies.startswith(f"{down if down not in (None, 'none') else 'F1'} down")
+
+
+def test_a_part_lies_on_the_face_that_is_down(tmp_path):
+    made(tmp_path, {"box": [40, 50, 60]}, formats=("stl",), print={**WHOLE, "down": "F4"})
+    (part,) = registered(tmp_path).parts
+    T = part.T_object_part
+    assert T[:3, :3] @ [0, 0, -1] == pytest.approx([0, 1, 0])  # F4 looks along +y
+    corners = corners_of(tmp_path / "out/Part.stl")
+    assert corners[:, 2].min() == pytest.approx(0.0, abs=1e-5)
+    low, high = corners @ T[:3, :3].T + T[:3, 3], np.array([20, 25, 60])
+    assert (low.max(axis=0) > high).tolist() == [True, False, True]  # symbols, but none on F4
+
+
+def test_panels_may_be_blank_and_lie_on_their_backs(tmp_path):
+    made(tmp_path, {"cube": 40}, print={"blank": "f6"})
+    assert bearing(tmp_path) == {"F1", "F2", "F3", "F4", "F5"}
+
+
+def test_saying_what_holds_already_means_the_same_object(tmp_path):
+    made(tmp_path, {"cube": 40}, print=WHOLE)
+    again = made(tmp_path, {"cube": 40}, print={**WHOLE, "down": "F1", "blank": ["F1"]})
+    assert again.objects[0].reused
+    with pytest.raises(DatabaseError, match="another spec"):
+        made(tmp_path, {"cube": 40}, print={**WHOLE, "down": "F2"})
+
+
+@pytest.mark.parametrize(
+    ("shape", "settings", "cause"),
+    [
+        ({"cube": 40}, {"print": {"blank": ["F7"]}}, "the object has no face F7"),
+        ({"cube": 40}, {"print": {"blank": "top"}}, "'top' is no name of a face"),
+        ({"cube": 40}, {"print": {**WHOLE, "down": "F9"}}, "the object has no face F9"),
+        ({"cube": 40}, {"print": {"down": "F1"}}, "every panel lies on its back"),
+        ({"cube": 40}, {"print": {"blank": "F1,F2,F3,F4,F5,F6"}}, "all faces are blank"),
+        ({"cylinder": {"diameter": 50, "height": 30}}, {"print": {"down": "F2"}}, "cannot stand"),
+        ({"cube": 40}, {"print": {**WHOLE, "blank": "F2,F3,F4,F5,F6", "down": "F1"}}, "only F1"),
+        ({"tag": [40, 40]}, {"print": {"parts": "panels"}}, "a tag is printed in one piece"),
+        ({"tag": [40]}, {}, "a tag has two sides, not 1"),
+        ({"tag": [40, 40]}, {"mount": {"screws": "M3", "rod": 6}}, "held in one way"),
+        ({"tag": [40, 40]}, {"mount": {"screws": "M7"}}, "'M7' is no screw known here"),
+        ({"tag": [40, 40]}, {"mount": "ISO 9409-1-51-4-M6"}, "is no flange known here"),
+        ({"tag": [40, 40]}, {"mount": "50-4-M6"}, "the mount does not fit face F2"),
+        ({"tag": [40, 40]}, {"mount": {"screws": "M6"}}, "too thin to sink the head of M6"),
+        ({"tag": [40, 40]}, {"mount": {"rod": 6}}, "needs 11.5 mm behind face F2"),
+        ({"cube": 40}, {"mount": {"screws": "M3"}, "print": {"parts": "panels"}}, "with a mount"),
+        ({"cylinder": {"diameter": 50, "height": 30}}, {"mount": {"rod": 6, "face": "F2"}}, "flat"),
+        ({"pyramid": {"side": 60, "height": 50}}, {"mount": {"hole": "M8"}}, "one parallel face"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_a_way_out(tmp_path, shape, settings, cause):
+    with pytest.raises(SpecError) as refused:
+        made(tmp_path, shape, **settings)
+    (problem,) = refused.value.problems
+    assert cause in problem.cause
+    assert problem.fix
+    assert problem.mark is not None
+    assert not list(tmp_path.iterdir())
+
+
+def area(radius):
+    """Return the area of the polygon that stands for a circle of a hole."""
+    count = 4 * math.ceil(math.pi * math.sqrt(radius / 0.04) / 4)
+    count = min(max(count, 24), 240)
+    return count / 2 * math.sin(2 * math.pi / count) * radius**2
+
+
+def test_holes_take_what_they_should_of_the_solid():
+    cube, screw = SHAPES["cube"](80.0), SCREWS["M6"]
+    drilled = with_mount(cube, Mount("flange", "ISO 9409-1-50-4-M6"), 0)
+    assert drilled.genus == 4
+    wide, narrow = screw.head_mm / 2, screw.clear_mm / 2
+    share = area(wide) / wide**2  # rings of one hole have one number of corners
+    holes = 4 * share * (9.0 * narrow**2 + 71.0 * wide**2) + area(3.1) * 6.0
+    assert volume(cube) - volume(drilled) == pytest.approx(holes, rel=1e-9)
+    around = [np.hypot(*loop.mean(axis=0)) for loop in face_polygon(drilled, 5)[1:]]
+    assert max(around) < 80 * math.sqrt(2)
+    socket = with_mount(cylinder(60.0, 60.0), Mount("rod", 12.0), 0)
+    gone = area(6.1) * (24.0 + 6.1 / 3)
+    assert volume(cylinder(60.0, 60.0)) - volume(socket) == pytest.approx(gone, rel=1e-9)
+    assert [s.kind for s in socket.surfaces] == ["cylinder", "cylinder", "cone"]
+    assert not bridges(socket, np.array([0.0, 0.0, -1.0]))  # a tip needs none
+
+
+def test_ceilings_of_pockets_are_bridged_and_ledges_are_not():
+    plate = with_mount(tag((60.0, 60.0), 4.0), Mount("magnets", (8.0, 2.0)), 1)
+    down = np.array([0.0, 0.0, -1.0])
+    assert len(bridges(plate, down)) == 4
+    assert bridges(extruded(TEE, 8.0), down) == frozenset()
+
+
+@pytest.mark.parametrize("name", FLANGES)
+def test_screws_of_a_flange_are_on_its_circle_and_the_pin_midway(name):
+    circle, count, thread, _ = FLANGES[name]
+    plate = with_mount(tag((160.0, 160.0), 12.0), Mount("flange", name), 1)
+    loops = face_polygon(plate, 1)[1:]
+    middle = face_polygon(plate, 1)[0].mean(axis=0)
+    arms = np.array([loop.mean(axis=0) - middle for loop in loops])
+    assert np.hypot(*arms.T) == pytest.approx(circle / 2)
+    turns = np.sort(np.degrees(np.arctan2(arms[:-1, 1], arms[:-1, 0])) % 360)
+    assert np.diff(turns) == pytest.approx(360 / count)
+    assert turns[0] == pytest.approx(180 / count)  # the pin is at 0
+    assert np.hypot(*(loops[0] - loops[0].mean(axis=0)).T) == pytest.approx(
+        SCREWS[thread].clear_mm / 2
+    )
+
+
+@pytest.mark.parametrize(
+    ("shape", "mount"),
+    [
+        ({"tag": [40, 40]}, {"screws": "M3"}),
+        ({"tag": {"size": "40 x 40 mm", "frame": 10}}, {"screws": "M3"}),
+        ({"cone": {"diameter": 60, "top_diameter": 40, "height": 20}}, {"hole": "M8"}),
+    ],
+)
+def test_symbols_keep_clear_of_holes_and_files_read_back(tmp_path, shape, mount):
+    spec = {"name": "Part", "shape": shape, "mount": mount}
+    encode(spec, database=str(tmp_path / "lab.db"), folder=tmp_path / "out",
+           formats=("step", "stl"), verify=True)  # fmt: skip
+    text = (tmp_path / "out/Part.step").read_text()
+    assert text.count("CYLINDRICAL_SURFACE") == (4 if "screws" in mount else 1)
+    known = registered(tmp_path)
+    on: list[FaceLayout] = [face for face in known.layout.faces if len(face.labels)]
+    for face in on:
+        loops = face_polygon(known.polyhedron, face.face)[1:]
+        for loop in loops if len(loops) == 4 or "hole" in mount else ():
+            radius = np.hypot(*(loop[0] - loop.mean(axis=0)))
+            away = np.hypot(*(face.centres_mm - loop.mean(axis=0)).T)
+            assert away.min() > radius + 2.0  # half a symbol of 5 mm, and the printer's edge
+    assert bearing(tmp_path) <= {"F1", "F2", "F3"}
+
+
+def test_a_tag_of_one_line_is_made_and_read(tmp_path):
+    result = made(tmp_path, {"tag": "40 x 40 mm"}, formats=("stl",))
+    assert (result.symbols, bearing(tmp_path)) == (49, {"F1"})
+    assert result.objects[0].lying == "F2 down, no supports needed"
+    heights = np.unique(corners_of(tmp_path / "out/Part.stl")[:, 2].round(3))
+    assert heights[:2] == pytest.approx([0.0, 0.32])  # its name, engraved in the back
+    reader = Reader(open_lab(f"{tmp_path}/lab.db"))
+    answers = [
+        reader.read(simulate(f"{tmp_path}/lab.db#Part/F1", x=x, y=20.0, force=40).counts)
+        for x in (15.0, 20.0, 25.0)
+    ]
+    assert {(one.object, one.face) for one in answers} == {("Part", "F1")}
+
+
+def test_a_tag_is_as_thick_as_its_magnets_need(tmp_path):
+    for height, thick in ((1.5, 3.0), (3.0, 4.0)):
+        name = f"Tag {height}"
+        mount = {"magnets": [8, height]}
+        made(tmp_path, {"tag": [40, 40]}, name=name, mount=mount, formats=())
+        assert np.ptp(registered(tmp_path, name).polyhedron.vertices[:, 2]) == pytest.approx(thick)
+
+
+def test_an_object_from_before_lies_as_it_did(tmp_path, monkeypatch):
+    """Symbols were on the base then: the spec means the same object, and it keeps them."""
+    with monkeypatch.context() as before:
+        before.setattr("generator.pipeline.plan.best_stance", lambda *_: None)
+        made(tmp_path, {"octahedron": 60}, print=WHOLE, formats=("stl",))
+    again = made(tmp_path, {"octahedron": 60}, print=WHOLE, formats=("stl",)).objects[0]
+    assert (again.reused, len(bearing(tmp_path))) == (True, 8)
+    assert again.lying.startswith("as the file has it")
+    assert (registered(tmp_path).parts[0].T_object_part[:3, :3] == np.eye(3)).all()
