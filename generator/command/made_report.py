@@ -11,11 +11,18 @@ from typing import Any
 
 from encoded_objects.base import output
 from generator.database.open import without_password
-from generator.layout.recognition_rate import LOW, NOT_READABLE, RecognitionRate
+from generator.layout.recognition_rate import (
+    LOW,
+    NOT_READABLE,
+    PartRate,
+    RecognitionRate,
+    percent,
+)
 from generator.pipeline import Encoded, MadeObject
 from generator.pipeline.faces import FaceReport
 
 NAMED_KINDS = 3  #: kinds of faces that are named one by one
+BLOCKED = 0.1  #: share of places where the sensor meets another face, from which that is said
 
 
 def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
@@ -81,7 +88,7 @@ def _object_text(made: MadeObject, dry_run: bool) -> str:
     if made.touches > 1:
         lines.append(f"  read by a scan: about {made.touches} touches (recognize-object --scan)")
     lines += _face_lines(made.face_reports)
-    lines += rate_lines(made.face_reports)
+    lines += rate_lines(made.face_reports, made.promise)
     if made.fit is not None:
         lines.append(
             f"  panels put together: {made.fit.overlap_mm3:.3f} mm3 overlap, "
@@ -106,6 +113,8 @@ def _face_lines(reports: Sequence[FaceReport]) -> list[str]:
             once, within = face.promise.at_once, face.promise.within_three
             later = "" if within is None else f"{within:.0%} within three, "
             answered = f"{once:.0%} answered at once, {later}"
+            if face.promise.meets:
+                answered += f"{face.promise.obstacle}, "
         text = (
             f"{size} mm, {_count(face.symbols, 'symbol')}, "
             f"{answered}places can be told down to {least} mm"
@@ -145,8 +154,9 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
                 "parts": made.parts,
                 "reused": made.reused,
                 "skipped": made.skipped,
-                "promise": [line.strip() for line in rate_lines(made.face_reports)],
-                "face_reports": [face_values(face) for face in made.face_reports],
+                "surface": None if made.promise is None else asdict(made.promise),
+                "promise": [line.strip() for line in rate_lines(made.face_reports, made.promise)],
+                "face_reports": [asdict(face) for face in made.face_reports],
                 "fit": None if made.fit is None else asdict(made.fit),
                 "warnings": list(made.warnings),
             }
@@ -160,35 +170,32 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
     }
 
 
-def rate_lines(faces: Sequence[FaceReport]) -> list[str]:
+def rate_lines(faces: Sequence[FaceReport], part: PartRate | None) -> list[str]:
     """Return a line on an object, and one on each kind of face that answers too little."""
-    rated = [(face, face.promise) for face in faces if face.promise is not None]
-    if not rated:
+    if part is None:
         return []
-    area = sum(face.area_mm2 for face, _ in rated)
-    share = sum(face.area_mm2 * promise.at_once for face, promise in rated) / area
-    later = [face.area_mm2 * promise.within_three for face, promise in rated
-             if promise.within_three is not None]  # fmt: skip
-    within = f", {_percent(sum(later) / area)} within three" if later else ""
-    lines = [f"  {_percent(share)} of touches are answered at once{within}"]
+    rated = [(face, face.promise) for face in faces if face.promise is not None]
+    lines = [f"  {part.text}"]
     alike: dict[tuple[str, ...], list[FaceReport]] = {}
     for face, promise in sorted(rated, key=lambda one: one[1].at_once):
-        if promise.at_once < LOW:
+        if promise.at_once < LOW or promise.blocked >= BLOCKED:
             key = f"{min(face.size_mm):.3g}", _why(face, promise), promise.remedy
             alike.setdefault(key, []).append(face)
     lines += [_low_text(key[1], key[2], some) for key, some in list(alike.items())[:NAMED_KINDS]]
     if rest := [face.name for some in list(alike.values())[NAMED_KINDS:] for face in some]:
-        lines.append(f"  fewer than half of the touches on {', '.join(rest)} too")
+        lines.append(f"  fewer of the touches on {', '.join(rest)} too")
     return lines
 
 
 def _why(face: FaceReport, promise: RecognitionRate) -> str:
-    """Return why a face answers less than half of its touches."""
+    """Return why a face answers few of its touches."""
     if not face.symbols:
         return "not readable: it is blank"
     if promise.one_row:
         return "not readable by single touches: one row of symbols"
-    return "not readable by single touches" if promise.at_once < NOT_READABLE else ""
+    if promise.at_once < NOT_READABLE * (1 - promise.blocked):
+        return "not readable by single touches"
+    return promise.obstacle if promise.blocked >= BLOCKED else ""
 
 
 def _low_text(why: str, remedy: str, faces: Sequence[FaceReport]) -> str:
@@ -204,29 +211,9 @@ def _low_text(why: str, remedy: str, faces: Sequence[FaceReport]) -> str:
     return f"  {faces[0].name}, {faces[0].place}{others}: {said}{help_}"
 
 
-def face_values(face: FaceReport) -> dict[str, Any]:
-    """Return a face as plain values."""
-    values = asdict(face)
-    if face.promise is not None:
-        values["promise"] = {
-            "at_once": face.promise.at_once,
-            "within_three": face.promise.within_three,
-            "one_row": face.promise.one_row,
-            "remedy": face.promise.remedy,
-        }
-    return values
-
-
 def _range(shares: Sequence[float]) -> str:
-    low, high = _percent(min(shares)), _percent(max(shares))
+    low, high = percent(min(shares)), percent(max(shares))
     return high if low == high else f"{low} to {high}"
-
-
-def _percent(share: float) -> str:
-    """Return a share in per cent, never as all or none where it is not."""
-    if 0 < share < 0.01:
-        return "under 1 %"
-    return "over 99 %" if 0.99 < share < 1 else f"{share:.0%}".replace("%", " %")
 
 
 def next_step(result: Encoded) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from generator.database.registered import ObjectEntry, RegisteredObject
     from generator.database.transfer import CopyReport
     from generator.layout.placement import FaceLayout, Placement
-    from generator.layout.recognition_rate import RecognitionRate
+    from generator.layout.recognition_rate import PartRate, RecognitionRate
 
 
 def print_list(
@@ -58,9 +58,10 @@ def print_object(
     as_json: bool,
 ) -> None:
     """Say all about one object, and the recognition rate of its faces for a sensor."""
-    faces = _faces(held, sensor)
+    faces, part = _faces(held, sensor)
     if as_json:
-        output.write_json(_object_values(held, faces, files) | {"database": without_password(url)})
+        values = _object_values(held, faces, part, files)
+        output.write_json(values | {"database": without_password(url)})
         return
     e, style, alphabet = held.entry, held.style, held.alphabet.get("name", "")
     lengths = f"height {style.height_mm:g}, stroke {style.stroke_mm:g}"
@@ -75,6 +76,12 @@ def print_object(
     if e.retired_utc:
         lines.append(f"  retired      {_minute(e.retired_utc)} UTC; its cells stay taken")
     lines += [f"  warning      {warning}" for warning in held.layout.warnings]
+    lines += [f"  promise      {part.text}"] if part else []
+    lines += [
+        f"  {face.name:12} {face.promise.obstacle}"
+        for face in faces
+        if face.promise is not None and face.promise.meets
+    ]
     output.write("\n".join(lines))
     titles = ("face", "kind", "area", "symbols", "places", "at once", "first cell")
     table = output.table(*titles, broken=())
@@ -175,25 +182,24 @@ class _Face:
     promise: RecognitionRate | None = None  #: None: nothing was measured
 
 
-def _faces(held: RegisteredObject, sensor: SensorType) -> list[_Face]:
-    """Return the faces of an object with their symbols; layouts may be in another order."""
-    from generator.layout.recognition_rate import face_rates
+def _faces(held: RegisteredObject, sensor: SensorType) -> tuple[list[_Face], PartRate | None]:
+    """Return the faces of an object with their symbols, and the rate of all of it.
+
+    Layouts may be in another order.
+    """
+    from generator.alphabet import alphabet_from
+    from generator.layout.recognition_rate import face_rates, part_rate
 
     layouts = {layout.face: layout for layout in held.layout.faces}
     area = {face.face_id: face.area_mm2 for face in held.faces}
     surfaces = {surface.carrier: surface for surface in surfaces_of(held.spec)}
     facets = {facet for surface in surfaces.values() for facet in surface.facets[1:]}
-    flat = [
-        (face.polygon_mm, layouts[face.face_id])
-        for face in held.faces
-        if face.face_id in layouts
-        and len(layouts[face.face_id].labels)
-        and face.face_id not in facets | surfaces.keys()
-    ]
-    array, style = held.array, held.style
-    reach = held.alphabet["reach"] * style.pitch_mm + style.stroke_mm / 2
-    cells = array.rows * array.columns
-    rates = face_rates(flat, array.order, cells, style.pitch_mm, reach, sensor)
+    solid = replace(held.polyhedron, surfaces=tuple(surfaces.values()))
+    array, bearing = held.array, [face for face in held.layout.faces if len(face.labels)]
+    cells, letters = array.rows * array.columns, alphabet_from(held.alphabet)
+    rates = face_rates(solid, bearing, array.order, cells, held.style, letters, sensor)
+    names = {face.face_id: face.name for face in held.faces}
+    part = part_rate(solid, bearing, {names[face]: rate for face, rate in rates.items()})
     found = []
     for face in held.faces:
         if face.face_id not in layouts or face.face_id in facets:
@@ -209,7 +215,7 @@ def _faces(held: RegisteredObject, sensor: SensorType) -> list[_Face]:
                 promise=rates.get(face.face_id),
             )
         )
-    return found
+    return found, part
 
 
 def _by_region(faces: Sequence[_Face]) -> list[_Face]:
@@ -244,10 +250,14 @@ def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
 
 
 def _object_values(
-    held: RegisteredObject, faces: Sequence[_Face], files: Sequence[PartState]
+    held: RegisteredObject,
+    faces: Sequence[_Face],
+    part: PartRate | None,
+    files: Sequence[PartState],
 ) -> dict[str, Any]:
     entry = held.entry
     return _entry_values(entry) | {
+        "surface": asdict(part) if part else None,
         "faces": [_face_values(face) for face in faces],
         "layout": held.layout.kind,
         "warnings": list(held.layout.warnings),
@@ -282,9 +292,7 @@ def _face_values(face: _Face) -> dict[str, Any]:
         "area_mm2": face.area_mm2,
         "symbols": len(on.labels),
         "places": on.places,
-        "promise": None
-        if face.promise is None
-        else {"at_once": face.promise.at_once, "within_three": face.promise.within_three},
+        "promise": asdict(face.promise) if face.promise else None,
         "placement": None
         if place is None
         else {

@@ -1,7 +1,7 @@
 """What each face of an object shows, its expected recognition rate, and what would raise that.
 
 A remedy has been tried: the face is laid out again, wider or at another pitch, and its rate is
-computed again. Round faces have no rate, since none was measured.
+computed again.
 """
 
 from __future__ import annotations
@@ -22,7 +22,15 @@ from generator.layout.lattice import LatticeRequest
 from generator.layout.layout import lay_out_face
 from generator.layout.placement import Layout
 from generator.layout.places import rank_test
-from generator.layout.recognition_rate import LOW, Loops, RecognitionRate, face_rate, face_rates
+from generator.layout.recognition_rate import (
+    LOW,
+    PartRate,
+    RecognitionRate,
+    face_rate,
+    face_rates,
+    part_rate,
+)
+from generator.layout.sensor_view import Loops
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import is_convex, signed_area
 from generator.polyhedron import Polyhedron, face_normal, face_polygon
@@ -92,6 +100,12 @@ def face_reports(
     return tuple(reports)
 
 
+def whole_rate(plan: ObjectPlan, layout: Layout, faces: Sequence[FaceReport]) -> PartRate | None:
+    """Return the rate of the whole part; None where none was measured."""
+    rates = {face.name: face.promise for face in faces}
+    return part_rate(plan.polyhedron, layout.faces, rates)
+
+
 def _place(polyhedron: Polyhedron, face: int, size: Size, kind: str) -> str:
     """Return words by which a person finds a face: its size, and where it lies (mm)."""
     width, height = sorted(size)
@@ -108,45 +122,40 @@ def _place(polyhedron: Polyhedron, face: int, size: Size, kind: str) -> str:
 
 
 def _rates(plan: ObjectPlan, layout: Layout) -> dict[int, RecognitionRate]:
-    """Return the rate of each flat face by its number, low ones with a remedy."""
+    """Return the rate of each face by its number, low ones of flat faces with a remedy.
+
+    A face whose places other faces cover for the most part has none.
+    """
     round_faces = {surface.carrier for surface in plan.polyhedron.surfaces}
-    flat = [
-        (face_polygon(plan.polyhedron, face.face), face)
-        for face in layout.faces
-        if face.face not in plan.blank_faces and face.face not in round_faces
-    ]
-    array, style, sensor = plan.array, plan.spec.style, plan.spec.sensor
+    faces = [face for face in layout.faces if face.face not in plan.blank_faces]
+    array, sensor = plan.array, plan.spec.sensor
     cells = array.rows * array.columns
-    half = _symbol_half_mm(plan, style)
-    rates = face_rates(flat, array.order, cells, layout.pitch_mm, half, sensor)
-    remedies: dict[tuple[float, float, bool], str] = {}
-    for loops, face in flat:
-        rate = rates.get(face.face)
-        if rate is None or rate.at_once >= LOW:
+    rates = face_rates(
+        plan.polyhedron, faces, array.order, cells, plan.spec.style, plan.alphabet, sensor
+    )
+    remedies: dict[tuple[float, float, bool, float], str] = {}
+    for face, rate in list(rates.items()):
+        if rate.at_once >= LOW or rate.blocked >= LOW or face in round_faces:
             continue
         # Faces of one width that are longer than a sensor have one remedy.
+        loops = face_polygon(plan.polyhedron, face)
         narrow, wide = sorted(np.ptp(loops[0], axis=0).round(1).tolist())
-        like = narrow, min(wide, 1.5 * sensor.across_mm), is_convex(loops[0])
+        like = narrow, min(wide, 1.5 * sensor.across_mm), is_convex(loops[0]), rate.blocked
         if like not in remedies:
-            remedies[like] = _remedy(plan, loops, face.face)
-        rates[face.face] = dataclasses.replace(rate, remedy=remedies[like])
+            remedies[like] = _remedy(plan, loops, face, LOW / (1 - rate.blocked))
+        rates[face] = dataclasses.replace(rate, remedy=remedies[like])
     return rates
 
 
-def _symbol_half_mm(plan: ObjectPlan, style: SymbolStyle) -> float:
-    """Return the distance from a symbol's centre to the end of its strokes."""
-    return plan.alphabet.reach * style.pitch_mm + style.stroke_mm / 2
-
-
-def _remedy(plan: ObjectPlan, loops: Loops, face: int) -> str:
-    """Return what would bring the face's rate to `LOW`; empty if nothing that was tried does."""
+def _remedy(plan: ObjectPlan, loops: Loops, face: int, least: float) -> str:
+    """Return what would bring the face's rate to this; empty if nothing that was tried does."""
     style = plan.spec.style
     region = region_of(plan.developed.get(face) or loops, plan.clearances_mm[face])
     found = []
-    width, factor = _wider(plan, loops, region)
+    width, factor = _wider(plan, loops, region, least)
     if width:
         found.append(f"{math.ceil(width * factor - 1e-9):g} mm wide instead of {width:.3g}")
-    elif more := _thicker(plan, loops, plan.clearances_mm[face]):
+    elif more := _thicker(plan, loops, plan.clearances_mm[face], least):
         found.append(f"{more:g} mm wider all along")
     for usual in PITCHES_MM:
         pitch = round(usual * plan.spec.sensor.coarseness, 1)
@@ -155,13 +164,13 @@ def _remedy(plan: ObjectPlan, loops: Loops, face: int) -> str:
         finer = dataclasses.replace(
             style, pitch_mm=pitch, stroke_mm=round(style.stroke_mm * pitch / style.pitch_mm, 2)
         )
-        if _prints(plan, finer) and _rate_of(plan, loops, region, finer) >= LOW:
+        if _prints(plan, finer) and _rate_of(plan, loops, region, finer) >= least:
             found.append(f"pitch {pitch:g} mm")
             break
     return " or ".join(found)
 
 
-def _wider(plan: ObjectPlan, loops: Loops, region: Region) -> tuple[float, float]:
+def _wider(plan: ObjectPlan, loops: Loops, region: Region, least: float) -> tuple[float, float]:
     """Return the width (mm) of a simple face and how many times wider it must be; zeros if not."""
     size = np.ptp(loops[0], axis=0)
     narrow = int(np.argmin(size))
@@ -172,7 +181,7 @@ def _wider(plan: ObjectPlan, loops: Loops, region: Region) -> tuple[float, float
         stretch = np.ones(2)
         stretch[narrow] = factor
         wide = Region(region.start * stretch, region.end * stretch, region.clearance)
-        return _rate_of(plan, (loops[0] * stretch,), wide, plan.spec.style) >= LOW
+        return _rate_of(plan, (loops[0] * stretch,), wide, plan.spec.style) >= least
 
     low, high = 1.0, WIDER
     if not enough(high):
@@ -183,7 +192,7 @@ def _wider(plan: ObjectPlan, loops: Loops, region: Region) -> tuple[float, float
     return float(size[narrow]), high
 
 
-def _thicker(plan: ObjectPlan, loops: Loops, clearances: Sequence[Points]) -> int:
+def _thicker(plan: ObjectPlan, loops: Loops, clearances: Sequence[Points], least: float) -> int:
     """Return by how many mm a face of bars must be thicker, its outline moved outward; 0: none.
 
     Of faces that are not convex and have no holes: an L, a T, a frame that is cut open.
@@ -194,7 +203,7 @@ def _thicker(plan: ObjectPlan, loops: Loops, clearances: Sequence[Points]) -> in
         grown = (inset(loops[0], np.full(len(loops[0]), -more / 2)),)
         if not regular(loops, grown, more):
             return 0
-        if _rate_of(plan, grown, region_of(grown, clearances), plan.spec.style) >= LOW:
+        if _rate_of(plan, grown, region_of(grown, clearances), plan.spec.style) >= least:
             return more
     return 0
 
@@ -211,5 +220,4 @@ def _rate_of(plan: ObjectPlan, loops: Loops, region: Region, style: SymbolStyle)
     """Return the share of touches answered at once on a face that is laid out in a style."""
     half = footprint_half_mm(plan.alphabet, style)
     face = lay_out_face(region, plan.array, style.pitch_mm, half)
-    reach = _symbol_half_mm(plan, style)
-    return face_rate(loops, face, style.pitch_mm, reach, plan.spec.sensor, TRIES).at_once
+    return face_rate(loops, face, style, plan.alphabet, plan.spec.sensor, TRIES).at_once

@@ -25,7 +25,7 @@ from generator.export.formats import EXPORTERS, ExportedObject, stage_formats
 from generator.export.preview import preview_png
 from generator.export.threemf import SlicerSettings
 from generator.layout.placement import Layout, object_code
-from generator.pipeline.faces import FaceReport, face_reports
+from generator.pipeline.faces import FaceReport, face_reports, whole_rate
 from generator.pipeline.made import overhangs, stance_of
 from generator.pipeline.place import BuiltParts
 from generator.pipeline.plan import TAG_BACK, ObjectPlan
@@ -150,14 +150,18 @@ def _draw(
     """Write the picture, the build sheet and the faces on the array."""
     name = plan.spec.name
     size = outer_size_mm(plan.polyhedron, parts).tolist()
-    shares = {
+    promise = whole_rate(plan, layout, faces)
+    shares: dict[str, tuple[float, float | None]] = {}
+    if promise is not None:  # faces of which nothing is said are blank
+        shares = dict.fromkeys([face.name for face in plan.polyhedron.faces], (0.0, None))
+    shares |= {
         face.name: (face.promise.at_once, face.promise.within_three)
         for face in faces
         if face.promise is not None
     }
     picture = preview_png(name, size, parts, meshes, shares)
     staging.write(f"{name}.png", picture)
-    page = build_sheet(plan, layout, parts, plates, picture)
+    page = build_sheet(plan, layout, parts, plates, picture, promise)
     staging.write(f"{name}-build.html", page.encode())
     staging.write(f"{name}-array.svg", _array_picture(plan, layout).encode())
 

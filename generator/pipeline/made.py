@@ -11,7 +11,8 @@ import numpy as np
 
 from generator.array.contract import touches_needed
 from generator.layout.placement import Layout
-from generator.pipeline.faces import FaceReport
+from generator.layout.recognition_rate import PartRate
+from generator.pipeline.faces import FaceReport, whole_rate
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import face_vector
 from generator.polyhedron.standing import DOWN, FLAT, LEVEL, Stance, bridges
@@ -36,6 +37,7 @@ class MadeObject:
     skipped: bool = False  #: registered before, and all its files stand unchanged
     touches: int = 1  #: about so many that overlap name a place; 1: no scan is needed
     face_reports: tuple[FaceReport, ...] = ()  #: of what was made or would be, face by face
+    promise: PartRate | None = None  #: of the whole part; None: none was measured
     fit: FitReport | None = None  #: how its panels fit, where they were verified
     lying: str | None = None  #: of a whole body: what is on the bed, what hangs over
 
@@ -124,6 +126,7 @@ def describe_object(
             sensor_mm=plan.spec.sensor.across_mm,
         ),
         face_reports=faces,
+        promise=whole_rate(plan, layout, faces),
         layout=layout,
     )
 

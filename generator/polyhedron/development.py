@@ -36,6 +36,16 @@ class Development:
         top = self.high[:1] if pointed else self.high[::-1]
         return np.concatenate([self.low, top])
 
+    def facets_of(self, points: Points) -> NDArray[np.int64]:
+        """Return the facet (n,) on which each of the points (n, 2) of the plane lies, or nearly."""
+        corners = (self.low[:-1], self.low[1:], self.high[1:], self.high[:-1])
+        inside = np.full((len(points), len(self.low) - 1), np.inf)
+        for a, b in zip(corners, (*corners[1:], corners[0]), strict=True):
+            left = np.outer(points[:, 1], (b - a)[:, 0]) - np.outer(points[:, 0], (b - a)[:, 1])
+            inside = np.minimum(inside, left + a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+        found: NDArray[np.int64] = inside.argmax(axis=1)
+        return found
+
     def outline_edges(self) -> list[tuple[int, int]]:
         """Return the polyhedron's vertices at both ends of every edge of the outline."""
         low, high = self.vertices[:, 0].tolist(), self.vertices[:, 1].tolist()

@@ -8,8 +8,9 @@ A table that is made from the first of two sets of solids is checked on 60 faces
 second; `--save` keeps a table of both (`generator/layout/answers.json`). In each round every face
 is touched once, anywhere, and in every third round again where the answer's `next` says, up to
 three times; so any number of rounds is a fair sample. A touch is looked at as
-`generator.layout.recognition_rate` sees it. A step over a re-entrant edge may end on another face,
-which counts as not answered. What is there is kept, and an interrupted run goes on.
+`generator.layout.sensor_view` sees it; places where the sensor meets another face are left
+out, since nothing is promised there. A step over a re-entrant edge may end on another face, which
+counts as not answered. What is there is kept, and an interrupted run goes on.
 
 With `--types` touches of other sensor types are held against what `encode-object --sensor-type`
 promises; `--save` sets that: each type's share of the usual sensor's answers (`AnsweredShare`) is
@@ -37,13 +38,17 @@ from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_nam
 from generator.database.open import open_if_there
 from generator.database.read import object_names, read_object
 from generator.database.transaction import read_transaction
+from generator.layout.obstacle import SolidEdges, solid_edges
 from generator.layout.placement import FaceLayout
 from generator.layout.recognition_rate import (
     AnswerTable,
-    SensorView,
     answered_at_once,
     answered_share,
     measured_answers,
+)
+from generator.layout.sensor_view import (
+    SensorView,
+    beside_obstacles,
     sensor_view,
     views_at,
 )
@@ -119,6 +124,9 @@ class Face:
     loops: tuple[Points, ...]
     layout: FaceLayout
     view: SensorView
+    solid: SolidEdges
+    T_object_face: Points
+    height_mm: float  #: of its symbols
 
 
 @dataclass(frozen=True)
@@ -157,6 +165,7 @@ def main() -> None:
         compare_types(asked.output, save=asked.save)
         return
     touches = list(map(_touched, touch_faces(asked.output, asked.rounds, asked.seed)))
+    touches = on_free_places(touches, asked.output)
     table = measured_table([one for one in touches if one.group == "learn"])
     for label, one in (("that ships", measured_answers()), ("of the first set", table)):
         print(f"\nthe second set against the table {label}")
@@ -196,6 +205,19 @@ def touch_faces(folder: Path, rounds: int, seed: int) -> list[runner.Row]:
     return runner.resume(folder / "touches.jsonl", range(rounds * len(faces)), touch)
 
 
+def on_free_places(touches: Sequence[Touched], folder: Path) -> list[Touched]:
+    """Return the touches at which the sensor met no other face."""
+    found = []
+    for face in (one for group in SETS for one in faces_of(folder / f"{group}.db", group)):
+        own = [touch for touch in touches if touch.face == face.name]
+        at = np.array([(touch.x_mm, touch.y_mm, touch.turn_rad) for touch in own]).reshape(-1, 3)
+        views = views_at(face.loops, face.layout, face.pitch_mm, face.view, at[:, :2], at[:, 2])
+        views = beside_obstacles(views, face.solid, face.T_object_face, face.height_mm, face.view)
+        found += [touch for touch, met in zip(own, views.blocked, strict=True) if not met]
+    print(f"{len(found)} of {len(touches)} touches met no other face")
+    return found
+
+
 def faces_of(lab: Path, group: str) -> Iterator[Face]:
     """Yield the faces of a set that bear symbols, one of those that are equal."""
     engine = open_if_there(f"sqlite:///{lab}", writable=False)
@@ -208,6 +230,7 @@ def faces_of(lab: Path, group: str) -> Iterator[Face]:
             reach = held.alphabet["reach"] * pitch + held.style.stroke_mm / 2
             view = sensor_view(USUAL_SENSOR, reach)
             layouts = {one.face: one for one in held.layout.faces}
+            solid = solid_edges(held.polyhedron)
             for face in held.faces:
                 layout = layouts[face.face_id]
                 low, high = sorted(np.ptp(face.polygon_mm[0], axis=0).round(1).tolist())
@@ -215,7 +238,8 @@ def faces_of(lab: Path, group: str) -> Iterator[Face]:
                     continue
                 known.add((k, low, high))
                 name = f"{group} {k + 1}/{face.name}"
-                yield Face(group, name, pitch, (low, high), face.polygon_mm, layout, view)
+                yield Face(group, name, pitch, (low, high), face.polygon_mm, layout, view,
+                           solid, face.T_object_face, held.style.height_mm)  # fmt: skip
 
 
 def touch_face(face: Face, lab: str, number: int, most: int, reader: Reader, seed: int) -> Touched:
@@ -354,7 +378,7 @@ def _seen(row: dict[str, Any], held: Any, sensor: SensorType) -> tuple[float, fl
     view = sensor_view(sensor, held.alphabet["reach"] * pitch + held.style.stroke_mm / 2)
     at, turn = np.array([[row["x_mm"], row["y_mm"]]]), np.radians([row["theta_deg"]])
     views = views_at(face.polygon_mm, layout, pitch, view, at, turn)
-    table = measured_answers()
+    table = measured_answers(held.alphabet["name"])
     usual = table.at(pitch / sensor.coarseness, views.seen, views.loaded)
     return float(usual[0]), float(views.loaded[0]), row["verdict"] == "right"
 

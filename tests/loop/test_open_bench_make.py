@@ -64,7 +64,7 @@ def test_a_part_has_the_bytes_that_the_command_writes(page, shape, tmp_path, mon
 
 def test_what_is_promised_is_seen_and_a_link_opens_it_again(page, own, browser):
     making(page, {"shape": "box", "shape.box": "[60 mm, 60 mm, 8 mm]", "name": "Flat"})
-    expect(page.get_by_test_id("make-told")).to_contain_text("of touches are answered at once")
+    expect(page.get_by_test_id("make-told")).to_contain_text("of touches anywhere on the part")
     faces = page.get_by_test_id("make-faces")
     expect(faces.locator("li")).to_have_count(6)
     expect(faces).to_contain_text("would help")

@@ -1,26 +1,42 @@
 """What a face promises, against geometry done one pose and one edge at a time."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
+from generator.alphabet import ALPHABETS
+from generator.alphabet.outline import SymbolStyle
 from generator.array import profile
 from generator.layout.layout import lay_out
+from generator.layout.obstacle import solid_edges
 from generator.layout.placement import FaceLayout, Placement
 from generator.layout.recognition_rate import (
+    ROUND,
     AnswerTable,
-    SensorView,
     answered_at_once,
     answered_share,
     answered_shares,
-    face_views,
+    face_rates,
     measured_answers,
     measured_types,
+    part_rate,
 )
-from generator.polyhedron import face_polygon, shapes
+from generator.layout.sensor_view import (
+    MEETS_MM2,
+    SAG_MM,
+    SensorView,
+    beside_obstacles,
+    face_views,
+    felt_band,
+    round_views,
+)
+from generator.polyhedron import face_polygon, polyhedron, shapes
+from generator.polyhedron.development import development
+from generator.polyhedron.frame import face_area, face_frame, face_normal
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
 VIEW = SensorView((12.7, 9.0), 2.52)
@@ -47,7 +63,7 @@ def lattice(loop, pitch=7.0, rotation=0.3, anchor=(60, 61)):
     )  # fmt: skip
 
 
-def cut(polygon, normal, limit):
+def cut(polygon, normal, limit, dimensions=2):
     """The part of a polygon at normal . x <= limit (Sutherland and Hodgman)."""
     kept = []
     for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
@@ -56,7 +72,7 @@ def cut(polygon, normal, limit):
             kept.append(a)
         if at * bt < 0:
             kept.append(a + (b - a) * at / (at - bt))
-    return np.array(kept).reshape(-1, 2)
+    return np.array(kept).reshape(-1, dimensions)
 
 
 def area(polygon):
@@ -166,3 +182,126 @@ def test_a_type_of_your_own_is_taken_for_the_one_most_like_it():
     assert answered_share(fine) is measured_types()["gel-24x32"]
     same = SensorType(name="same")
     assert answered_share(same) is None
+
+
+def profile_solid(outline, depth=60.0):
+    """A solid of this outline (x, z) along y."""
+    n = len(outline)
+    vertices = [[x, y, z] for y in (0, depth) for x, z in outline]
+    faces = [list(range(n)), list(range(2 * n - 1, n - 1, -1))]
+    faces += [[k, k + n, (k + 1) % n + n, (k + 1) % n] for k in range(n)]
+    return polyhedron("profile", vertices, faces)
+
+
+STAIRS = [(0, 0), (120, 0), (120, 20), (80, 20), (80, 35), (40, 35), (40, 50), (0, 50)]
+RAMP = [(0, 0), (110, 0), (110, 50), (60, 20), (0, 20)]
+LOW = [(0, 0), (90, 0), (90, 20), (45, 20), (45, 20.9), (0, 20.9)]  # a step lower than a symbol
+
+
+@pytest.mark.parametrize("outline", [STAIRS, RAMP, LOW])
+def test_a_sensor_meets_what_rises_inside_its_rectangle(outline):
+    """Each face cut at the height of symbols, then by the rectangle, one pose after the other."""
+    solid, height = profile_solid(outline), 1.0
+    for number in range(len(solid.faces)):
+        loops, frame = face_polygon(solid, number), face_frame(solid, number)
+        views = face_views(loops, lattice(loops[0]), 7.0, VIEW, 60)
+        views = beside_obstacles(views, solid_edges(solid), frame, height, VIEW)
+        for k in range(60):
+            c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
+            axes = np.array([[c, s, 0], [-s, c, 0]])
+            met = 0.0
+            for other, face in enumerate(solid.faces):
+                if face_normal(solid, other) @ frame[:3, 2] < 1e-9:
+                    continue
+                part = (solid.vertices[list(face.loops[0])] - frame[:3, 3]) @ frame[:3, :3]
+                part = cut(part - [*views.centre_mm[k], 0], np.array([0, 0, -1.0]), -height, 3)
+                for normal, limit in zip((*axes, *-axes), (12.7, 9, 12.7, 9), strict=True):
+                    part = cut(part, normal, limit, 3)
+                met += area(part[:, :2]) if len(part) else 0.0
+            assert views.blocked[k] == (met > MEETS_MM2)
+        assert bool(views.meets) == views.blocked.any()
+
+
+def test_what_the_sensor_meets_is_the_wall_not_its_top():
+    def met(outline, number):
+        solid = profile_solid(outline)
+        loops, frame = face_polygon(solid, number), face_frame(solid, number)
+        views = face_views(loops, lattice(loops[0]), 7.0, VIEW)
+        views = beside_obstacles(views, solid_edges(solid), frame, 1.0, VIEW)
+        return views.meets, views.blocked.mean()
+
+    assert met(STAIRS, 4) == (("F6",), pytest.approx(0.33, abs=0.02))  # the wall at x = 80
+    assert met(STAIRS, 6)[0] == ("F8",)
+    assert met(STAIRS, 5)[0] == ("F5",)  # the wall meets its floor
+    assert met(STAIRS, 8) == ((), 0.0)  # the top
+    assert met(RAMP, 5) == (("F5",), pytest.approx(0.185, abs=0.02))
+    assert met(LOW, 4) == ((), 0.0)
+    assert not any(met(STAIRS, number)[0] for number in (2, 3))
+
+
+def test_a_round_face_shows_what_lies_near_the_line_that_it_is_touched_along():
+    radius, height = 30.0, 80.0
+    solid = shapes.cylinder(2 * radius, height)
+    (surface,) = solid.surfaces
+    flat = development(solid, surface)
+    width = float(np.ptp(flat.outline[:, 0]))
+    at = np.stack(np.meshgrid(np.arange(4, width, 7), np.arange(4, height, 7)), -1).reshape(-1, 2)
+    none = np.zeros(len(at), np.int64)
+    face = FaceLayout(surface.carrier, Placement(0, 0, 0.0, -0.5, -0.5), none, none, none, at, 1)
+    style = SymbolStyle(pitch_mm=7.0)
+    views = round_views(solid_edges(solid), surface, flat, face, style, VIEW, 200)
+    half = radius * math.acos(1 - SAG_MM / radius)
+    for k in range(200):
+        c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
+        axes, there = np.array([[c, s], [-s, c]]), at - views.centre_mm[k]
+        x, y = axes @ there.T
+        inside = (abs(x) <= 12.7 - 2.52) & (abs(y) <= 9.0 - 2.52) & (abs(there[:, 0]) <= half)
+        assert views.seen[k] == inside.sum()
+        part = flat.outline - views.centre_mm[k]
+        for normal, limit in zip((*axes, *-axes), (12.7, 9, 12.7, 9), strict=True):
+            part = cut(part, normal, limit)
+        assert views.loaded[k] == pytest.approx(area(part) / (4 * 12.7 * 9.0), abs=1e-9)
+    assert not views.blocked.any()
+    at_rim = [lies < 4 for lies in np.minimum(views.centre_mm[:, 1], 80 - views.centre_mm[:, 1])]
+    table, flat_face = measured_answers(), replace(views, round=False)
+    assert answered_shares(views, table, 7.0)[0] < answered_shares(flat_face, table, 7.0)[0] - 0.05
+    assert ROUND.at(views.loaded)[at_rim].mean() < 0.4 < 0.9 < ROUND.at(np.ones(1))[0]
+
+
+def test_a_cone_is_felt_along_its_lines_the_narrower_the_nearer_its_tip():
+    solid = shapes.cone(80.0, 90.0)
+    (surface,) = solid.surfaces
+    flat = development(solid, surface)
+    tip, slant = flat.high[0], math.hypot(40, 90)
+    middles = (flat.low[:-1] + flat.low[1:]) / 2
+    for away in (0.9, 0.5, 0.1):  # of the way from the tip to the base
+        at = tip + away * (middles - tip)
+        assert np.array_equal(flat.facets_of(at), np.arange(len(middles)))
+        band = felt_band(surface, flat, at)
+        towards = (tip - at) / np.hypot(*(tip - at).T)[:, None]
+        assert np.c_[np.cos(band.along_rad), np.sin(band.along_rad)] == pytest.approx(towards)
+        radius = away * slant * 40 / 90  # across the line: how far the axis lies along the normal
+        half = radius * math.acos(1 - SAG_MM / radius)
+        assert band.half_mm == pytest.approx(np.full(len(at), half), rel=1e-3)
+
+
+def test_the_rate_of_a_part_counts_all_of_its_surface():
+    array, solid = profile().array(), profile_solid(STAIRS)
+    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in solid.faces]
+    layout = lay_out(solid, array, 7.0, 2.73, clearances, NONE, blank_faces=[0, 1],
+                     allow_blank_faces=True)  # fmt: skip
+    cells, style = array.rows * array.columns, SymbolStyle(pitch_mm=7.0)
+    rates = face_rates(solid, layout.faces, array.order, cells, style, ALPHABETS["dense-4"])
+    assert rates[4].blocked > 0.2 > rates[8].blocked == 0
+    assert rates[4].obstacle == f"the sensor meets F6 at {rates[4].blocked:.0%}".replace(
+        "%", " % of its places"
+    )
+    assert rates[4].at_once < rates[8].at_once
+    names = {face.name: rates[number] for number, face in enumerate(solid.faces)}
+    part = part_rate(solid, layout.faces, names)
+    areas = [face_area(solid, number) for number in range(len(solid.faces))]
+    shares = [rates[number].at_once * area for number, area in enumerate(areas)]
+    assert part.at_once == pytest.approx(sum(shares) / sum(areas), abs=1e-3)
+    bearing = sum(a for a, face in zip(areas, layout.faces, strict=True) if len(face.labels))
+    assert part.encoded == pytest.approx(bearing / sum(areas), abs=1e-3)
+    assert part_rate(solid, layout.faces, {}) is None

@@ -118,12 +118,13 @@ def test_every_cause_has_words_and_a_way_out():
     numbers = dict.fromkeys(
         ("plateau", "signal_to_noise", "newtons", "loaded", "symbols", "direction_deg",
          "sharpness", "silent", "explained", "explained_anywhere",
-         "symbols_anywhere", "slope", "width_mm", "variation", "columns"), 0.5
+         "symbols_anywhere", "slope", "width_mm", "variation", "columns",
+             "pitch_mm", "best_mm"), 0.5
     )  # fmt: skip
     named = [value for name, value in vars(cause).items() if name.isupper() and name[0] != "_"]
     words = {*cause.WAYS_OUT, cause.CHECKED, cause.UNCHECKED}
     codes = [one for one in named if isinstance(one, str) and one not in words]
-    assert len(codes) == 12
+    assert len(codes) == 13
     for code in codes:
         one = Cause(code, numbers)
         assert str(one)
