@@ -44,12 +44,17 @@ def describe_blank(
     )
 
 
-def remedies(regions: Sequence[Region], request: LatticeRequest) -> str:
-    """Return what would give every face a place; each remedy with a number has been tried."""
+def remedies(
+    regions: Sequence[Region], request: LatticeRequest, prints: Callable[[float], bool]
+) -> str:
+    """Return what would give every face a place; each remedy with a number has been tried.
+
+    `prints`: whether symbols of a pitch (mm) can be made.
+    """
     different = {_key(region): region for region in regions}
     ways = []
     pitch = min(_pitch(region, request) for region in different.values())
-    if pitch > 0.0:
+    if pitch > 0.0 and prints(pitch):
         ways.append(f"set pitch to {pitch:g} mm or less")
     rows, columns = request.window
     ways.append(f"take a profile with a smaller window than {rows}x{columns}")

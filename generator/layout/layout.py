@@ -9,7 +9,7 @@ out). Either way a face ends with one rigid transform to the array. Thesis 6.3.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -59,6 +59,7 @@ def lay_out(
     blank_faces: Collection[int] = (),
     allow_blank_faces: bool = False,
     developed: Outlines = NONE,
+    prints: Callable[[float], bool] = lambda _: True,
 ) -> Layout:
     """Choose the cells of every face, none of them used before.
 
@@ -81,6 +82,8 @@ def lay_out(
     developed
         Outlines in place of a face's own: of a round face, unrolled, for the facet that stands for
         it; of a face less what others cover. Such an object has no net.
+    prints
+        Whether symbols of a pitch (mm) can be made, for what a refusal proposes.
 
     Raises
     ------
@@ -118,7 +121,7 @@ def lay_out(
         plans.append(net_plan(task, unfold(polyhedron)))
     plans.sort(key=lambda plan: plan.worth, reverse=True)  # stable: faces first among equals
 
-    warning = _without_place(task, plans[0], allow_blank_faces)
+    warning = _without_place(task, plans[0], allow_blank_faces, prints)
     if not isinstance(occupied, Occupancy):
         occupied = Occupancy.from_cells(*occupied, array)
     for plan in plans:
@@ -127,7 +130,7 @@ def lay_out(
         placed = _place_plan(task, plan, occupied)
         if placed is not None:
             if placed[0] is not plans[0]:  # other pieces may show other faces
-                warning = _without_place(task, placed[0], allow_blank_faces)
+                warning = _without_place(task, placed[0], allow_blank_faces, prints)
             return _layout(task, *placed, warning)
     raise _full_array_error(plans[0], occupied)
 
@@ -142,7 +145,9 @@ def lay_out_face(
     return _face_layout(array, pitch_mm, piece, 0, TorusPosition(0, 0, 0))
 
 
-def _without_place(task: LayoutTask, plan: LayoutPlan, allowed: bool) -> tuple[str, ...]:
+def _without_place(
+    task: LayoutTask, plan: LayoutPlan, allowed: bool, prints: Callable[[float], bool]
+) -> tuple[str, ...]:
     """Return the warning about faces without a place; raise it unless they are allowed."""
     shown = {
         face: places
@@ -161,7 +166,7 @@ def _without_place(task: LayoutTask, plan: LayoutPlan, allowed: bool) -> tuple[s
         raise LayoutError(
             f"{cause} in the net's lattice", fix="set layout to faces, which turns each lattice"
         )
-    raise LayoutError(cause, fix=remedies(list(names.values()), task.request))
+    raise LayoutError(cause, fix=remedies(list(names.values()), task.request, prints))
 
 
 def _place_plan(

@@ -150,8 +150,14 @@ def choose_array(
         plans = plan_objects(
             [with_profile(one, candidate.name, AUTO, *made) for one in specs], solid
         )
-        alone = _layouts(plans)
         room = _room(array, connection)
+        try:
+            alone = _layouts(plans)
+        except GeneratorError:  # an object shows no place at all, unless its symbols are finer
+            finer = _choose_finer(ArrayChoice(plans), room, solid)
+            if finer.alone:
+                return finer
+            raise
         size = f"{candidate.name} {array.rows}x{array.columns}"
         if alone is None:
             short.append(f"one object alone does not fit into {size}")
@@ -173,7 +179,8 @@ def choose_array(
 
 def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> ArrayChoice:
     """Take finer symbols on the same array where they show faces that stay blank otherwise."""
-    blank = left = _blank(coarse.plans, coarse.alone)
+    shown = sum(len(plan.polyhedron.faces) - len(plan.blank_faces) for plan in coarse.plans)
+    blank = left = _blank(coarse.plans, coarse.alone) if coarse.alone else shown
     found, specs = coarse, [plan.spec for plan in coarse.plans]
     for share in FINER_SHARES:
         try:
@@ -185,8 +192,8 @@ def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> A
             ]
             plans = plan_objects(finer, solid)
             alone = _layouts(plans)
-        except GeneratorError:  # the printer cannot make them
-            break
+        except GeneratorError:  # the printer cannot make them, or they show no place either
+            continue
         if alone is None or _cells(alone) > room:
             continue
         if (now := _blank(plans, alone)) < left:

@@ -14,8 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from generator.alphabet.outline import SymbolStyle, footprint_half_mm
-from generator.alphabet.printable import check_printable
-from generator.errors import GeneratorError
 from generator.layout.blank import extent_mm, smallest_mm
 from generator.layout.footprint import Points, Region, region_of
 from generator.layout.lattice import LatticeRequest
@@ -161,10 +159,8 @@ def _remedy(plan: ObjectPlan, loops: Loops, face: int, least: float) -> str:
         pitch = round(usual * plan.spec.sensor.coarseness, 1)
         if pitch >= style.pitch_mm:
             continue
-        finer = dataclasses.replace(
-            style, pitch_mm=pitch, stroke_mm=round(style.stroke_mm * pitch / style.pitch_mm, 2)
-        )
-        if _prints(plan, finer) and _rate_of(plan, loops, region, finer) >= least:
+        finer = plan.style_at(pitch)
+        if finer is not None and _rate_of(plan, loops, region, finer) >= least:
             found.append(f"pitch {pitch:g} mm")
             break
     return " or ".join(found)
@@ -206,14 +202,6 @@ def _thicker(plan: ObjectPlan, loops: Loops, clearances: Sequence[Points], least
         if _rate_of(plan, grown, region_of(grown, clearances), plan.spec.style) >= least:
             return more
     return 0
-
-
-def _prints(plan: ObjectPlan, style: SymbolStyle) -> bool:
-    try:
-        check_printable(plan.alphabet, style, plan.printer)
-    except GeneratorError:
-        return False
-    return True
 
 
 def _rate_of(plan: ObjectPlan, loops: Loops, region: Region, style: SymbolStyle) -> float:

@@ -114,6 +114,7 @@ def lay_out_object(plan: ObjectPlan, others: Occupancy | Cells) -> Layout:
             blank_faces=plan.blank_faces,
             allow_blank_faces=allow_blank_faces,
             developed=plan.developed,
+            prints=lambda pitch_mm: plan.style_at(pitch_mm) is not None,
         )
 
     layout = attempt(allow_blank_faces=True)

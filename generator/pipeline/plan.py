@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from generator.alphabet.known import Alphabet
-from generator.alphabet.outline import Tiers, footprint_half_mm, outlines
+from generator.alphabet.outline import SymbolStyle, Tiers, footprint_half_mm, outlines
 from generator.alphabet.printable import check_printable
 from generator.array import SymbolArray, array_from
-from generator.errors import LayoutError, SolidError
+from generator.errors import GeneratorError, LayoutError, SolidError
 from generator.layout.layout import Clearances, Outlines
 from generator.polyhedron import Polyhedron, dihedral, face_polygon
 from generator.polyhedron.development import Development, development
@@ -62,6 +62,17 @@ class ObjectPlan:
     def printer(self) -> Printer:
         """What prints it."""
         return self.spec.printer
+
+    def style_at(self, pitch_mm: float) -> SymbolStyle | None:
+        """Return the symbols at another pitch, strokes in proportion; None: they do not print."""
+        style = self.spec.style
+        stroke = round(style.stroke_mm * pitch_mm / style.pitch_mm, 2)
+        style = replace(style, pitch_mm=pitch_mm, stroke_mm=stroke)
+        try:
+            check_printable(self.alphabet, style, self.printer)
+        except GeneratorError:
+            return None
+        return style
 
     @property
     def meaning(self) -> dict[str, Any]:

@@ -128,8 +128,12 @@ def hole_mm(value: Any) -> float:
 
 
 def mount_block(value: Any) -> Any:
-    """Return the block that the name of a flange stands for."""
-    return {"flange": value} if isinstance(value, str) else value
+    """Return the block that a text stands for: `screws M3`, or a flange by its name alone."""
+    if not isinstance(value, str):
+        return value
+    kind = "|".join(MountSettings.model_fields)
+    found = re.fullmatch(rf"\s*{{?\s*({kind})\s*:?\s+(.*?)\s*}}?\s*", value)
+    return {found[1]: found[2]} if found else {"flange": value}
 
 
 def database_url(value: Any) -> str:

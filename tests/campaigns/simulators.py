@@ -1,22 +1,31 @@
 """Files for simulators, in the simulators and validators that are installed: parts that rest.
 
-    encode-object SPEC.yaml... --format mjcf,urdf,sdf,usd -o DIR
-    python tests/campaigns/simulators.py DIR...
+    encode-object SPEC.yaml -o DIR --format mjcf,urdf,sdf,usd --database lab.db
+    python tests/campaigns/simulators.py DIR... --press 18
+    python tests/campaigns/simulators.py DIR... --read lab.db
 
-Imports nothing of ours: `pip install drake newton omniverse-asset-validator` may stand in an
-environment of its own. Every part is dropped on a table in MuJoCo and Drake; printed are the height
-of the lowest face over the table, and what the mesh with symbols says it is where it rests on them.
-Then what OpenUSD's validators, NVIDIA's, and Newton's importer say of the USD file.
+Imports nothing of ours but to read: `pip install drake newton omniverse-asset-validator` may stand
+in an environment of its own. Every part is dropped on a table in MuJoCo and Drake; printed are the
+height of the lowest face over the table, and what the mesh with symbols says it is where it rests
+on them. Then what OpenUSD's validators, NVIDIA's, and Newton's importer say of the USD file.
+
+`--press N` presses amid the faces, N times in turn: a pad of 256 compliant boxes up to 60 N in
+Drake, by URDF and SDF, and, .4 mm deep, 48 x 48 points that measure their depth in the first mesh
+of the USD file by Warp, as FlexiTac's simulation does. `--read` reads the images that are left.
 """
 
 from __future__ import annotations
 
+import argparse
 import importlib.util
+import math
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -26,6 +35,9 @@ Array = np.ndarray
 SECONDS = 1.5  #: of simulated time, until it rests
 ABOVE_M = 0.002  #: of the table, when it is let go, tilted
 TILT = np.array([1.0, 0.01, 0.006, 0.0])  #: quaternion: 1.3 degrees
+PITCH_M, TIP_M, YOUNG_PA = 0.0254 / 16, 0.00112, 2e6  #: of the sensor fsr-16, its tips square
+CENTRES_M = (np.arange(16) - 7.5) * PITCH_M
+SYMBOL_M = 0.001
 
 
 def points(path: Path) -> Array:
@@ -46,7 +58,7 @@ def rotation(quaternion: Array) -> Array:
     )
 
 
-class Dropped:
+class Part:
     """A part as its files say: frames of its faces, and the corners of what collides."""
 
     def __init__(self, folder: Path) -> None:
@@ -56,7 +68,7 @@ class Dropped:
         self.faces = {
             site.attrib["name"]: (
                 np.array(site.attrib["pos"].split(), float),
-                rotation(np.array(site.attrib["quat"].split(), float))[:, 2],
+                rotation(np.array(site.attrib["quat"].split(), float)),
             )
             for site in root.iter("site")
         }
@@ -69,7 +81,9 @@ class Dropped:
 
     def report(self, simulator: str, R: Array, at: Array, seconds: float) -> None:
         """Print how a part came to rest: the lowest face, its height, and by the mesh."""
-        down = {name: (R @ p + at)[2] for name, (p, z) in self.faces.items() if (R @ z)[2] < -0.99}
+        down = {
+            name: (R @ p + at)[2] for name, (p, F) in self.faces.items() if (R @ F)[2, 2] < -0.99
+        }
         face = min(down, key=lambda name: down[name], default="")
         lowest = float((self.corners @ R.T + at)[:, 2].min())
         height = 1e3 * down[face] if face else float("nan")
@@ -79,7 +93,7 @@ class Dropped:
         )  # fmt: skip
 
 
-def drop_in_mujoco(part: Dropped) -> None:
+def drop_in_mujoco(part: Part) -> None:
     """Drop a part by its MJCF."""
     import mujoco
 
@@ -95,7 +109,7 @@ def drop_in_mujoco(part: Dropped) -> None:
     part.report("MuJoCo", rests.xmat.reshape(3, 3), rests.xpos, seconds)
 
 
-def drop_in_drake(part: Dropped, suffix: str) -> None:
+def drop_in_drake(part: Part, suffix: str) -> None:
     """Drop a part by its URDF or SDF, on a half space that yields a little."""
     from pydrake.geometry import (
         AddCompliantHydroelasticPropertiesForHalfSpace,
@@ -129,6 +143,134 @@ def drop_in_drake(part: Dropped, suffix: str) -> None:
     Simulator(diagram, context).AdvanceTo(SECONDS)
     rests = plant.EvalBodyPoseInWorld(own, body)
     part.report(f"Drake {suffix}", rests.rotation().matrix(), rests.translation(), seconds)
+
+
+def touches(part: Part, count: int) -> Iterator[tuple[str, Array, Array, Array]]:
+    """Yield face, place (x, y mm, turn), and the sensor on the face: rotation, place (m)."""
+    rng, faces = np.random.default_rng(5), list(part.faces.items())
+    for number in range(count):
+        name, (p, F) = faces[number % len(faces)]
+        x, y, turn = *rng.uniform(16, 44, 2), rng.uniform(-3, 3)
+        R = F @ rotation(np.array([math.cos(turn / 2), 0, 0, math.sin(turn / 2)]))
+        yield name, np.array([x, y, turn]), R, p + F @ [1e-3 * x, 1e-3 * y, 0]
+
+
+def press_in_drake(part: Part, suffix: str, count: int) -> list[Array]:
+    """Return what 256 compliant tips bear when they press 60 N on a part, N."""
+    from pydrake.geometry import AddCompliantHydroelasticProperties, Box, ProximityProperties
+    from pydrake.math import RigidTransform, RotationMatrix
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, ContactModel
+    from pydrake.multibody.tree import SpatialInertia
+    from pydrake.systems.framework import DiagramBuilder
+
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    [model] = Parser(plant).AddModels(str(part.xml.with_suffix(suffix)))
+    own = plant.get_body(plant.GetBodyIndices(model)[0])
+    plant.WeldFrames(plant.world_frame(), own.body_frame())
+    inertia = SpatialInertia.SolidBoxWithMass(0.1, 0.03, 0.03, 0.01)
+    pad = plant.AddRigidBody("pad", plant.AddModelInstance("sensor"), inertia)
+    tactels = {}
+    for row, column in np.ndindex(16, 16):
+        rubber = ProximityProperties()
+        AddCompliantHydroelasticProperties(TIP_M, YOUNG_PA, rubber)
+        at = RigidTransform([CENTRES_M[column], -CENTRES_M[row], 0.002])
+        tip = (at, Box(TIP_M, TIP_M, 0.004), f"{row}-{column}", rubber)
+        tactels[plant.RegisterCollisionGeometry(pad, *tip)] = row, column
+    plant.set_contact_model(ContactModel.kHydroelasticsOnly)
+    plant.Finalize()
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    plants = plant.GetMyContextFromRoot(context)
+
+    def image(R: Array, at: Array) -> Array:
+        forces = np.zeros((16, 16))
+        plant.SetFreeBodyPose(plants, pad, RigidTransform(RotationMatrix(R), at))
+        results = plant.get_contact_results_output_port().Eval(plants)
+        for number in range(results.num_hydroelastic_contacts()):
+            contact = results.hydroelastic_contact_info(number)
+            surface = contact.contact_surface()
+            tactel = tactels.get(surface.id_M()) or tactels[surface.id_N()]
+            forces[tactel] += abs(contact.F_Ac_W().translational() @ R[:, 2])
+        return forces
+
+    images = []
+    for _, _, R, at in touches(part, count):
+        low, high = 0.0002, 0.001
+        for _ in range(5):
+            height = (low + high) / 2
+            forces = image(R, at + height * R[:, 2])
+            low, high = (height, high) if forces.sum() > 60 else (low, height)
+        images.append(forces)
+    return images
+
+
+def press_on_usd(part: Part, count: int) -> list[Array]:
+    """Return how deep 48 x 48 points, .4 mm below the tops, are in the first mesh; m, by tactel."""
+    import warp as wp
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(part.xml.with_suffix(".usdc")))
+    meshes = (UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh))
+    mesh = next(meshes)
+    corners = wp.array(np.array(mesh.GetPointsAttr().Get(), np.float32), dtype=wp.vec3)
+    felt = wp.Mesh(corners, wp.array(mesh.GetFaceVertexIndicesAttr().Get(), dtype=int))
+    steps = (np.arange(48) - 23.5) * PITCH_M / 3
+    grid = np.array([[x, -y, SYMBOL_M - 0.0004] for y in steps for x in steps])
+    images = []
+    for _, _, R, at in touches(part, count):
+        where = wp.array((grid @ R.T + at).astype(np.float32), dtype=wp.vec3)
+        apart = wp.zeros(len(grid), dtype=float)
+        wp.launch(signed_distance(), dim=len(grid), inputs=[felt.id, where, apart])
+        images.append(np.maximum(-apart.numpy(), 0).reshape(16, 3, 16, 3).mean((1, 3)))
+    return images
+
+
+@cache
+def signed_distance() -> Any:
+    """Return the kernel: mesh, points -> their distance, below 0 inside."""
+    import warp as wp
+
+    def distance(mesh: wp.uint64, points: wp.array(dtype=wp.vec3), out: wp.array(dtype=float)):  # type: ignore[valid-type]
+        at = wp.tid()
+        found = wp.mesh_query_point_sign_normal(mesh, points[at], 1.0)
+        if found.result:
+            near = wp.mesh_eval_position(mesh, found.face, found.u, found.v)
+            out[at] = found.sign * wp.length(points[at] - near)
+
+    return wp.Kernel(distance)
+
+
+def press(part: Part, count: int) -> None:
+    """Press on a part in what is installed; write the images beside its files."""
+    images = {}
+    if importlib.util.find_spec("pydrake"):
+        for suffix in (".urdf", ".sdf"):
+            images[f"Drake {suffix}"] = press_in_drake(part, suffix, count)
+    if importlib.util.find_spec("warp"):
+        images["first mesh of USD"] = press_on_usd(part, count)
+    np.savez(part.xml.with_suffix(".npz"), **images)
+
+
+def read(part: Part, database: str) -> None:
+    """Read the images of `--press`, as a board gives them: gains of 10 %, 4 counts of noise."""
+    from encoded_objects import Reader, open_lab
+
+    reader, rng = Reader(open_lab(database)), np.random.default_rng(1)
+    for simulator, images in np.load(part.xml.with_suffix(".npz")).items():
+        right, wrong, errors = 0, 0, []
+        for image, (face, at, _, _) in zip(images, touches(part, len(images)), strict=True):
+            counts = 900 * (image / image.max()) ** 0.8
+            counts = counts * rng.normal(1, 0.1, counts.shape) + rng.normal(0, 4, counts.shape)
+            answer = reader.read(np.clip(counts, 0, 1023))
+            if answer:
+                off = np.linalg.norm(answer.T_face_probe[:2, 3] - at[:2])
+                right += (hit := face.endswith(f"-{answer.face}") and off < 2)
+                wrong += not hit
+                errors.append(off)
+        rms = float(np.sqrt(np.mean(np.square(errors))))
+        runner.row(part.name, simulator, f"{right} of {len(images)}", wrong, rms)
 
 
 def validate_usd(path: Path) -> str:
@@ -174,11 +316,19 @@ CHECKS: dict[str, tuple[str, Callable[[Path], str]]] = {
 
 def main() -> None:
     """Drop and check the parts of all folders."""
-    import argparse
-
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folders", type=Path, nargs="+")
-    parts = [Dropped(folder) for folder in parser.parse_args().folders]
+    parser.add_argument("--press", type=int, metavar="N", default=0)
+    parser.add_argument("--read", metavar="DATABASE")
+    given = parser.parse_args()
+    parts = [Part(folder) for folder in given.folders]
+    if given.read:
+        runner.table(("part", "pressed in", "right", "wrong", "rms mm"))
+        for part in parts:
+            read(part, given.read)
+        return
+    for part in parts if given.press else ():
+        press(part, given.press)
     runner.table(("part", "dropped in", "lies on", "face at mm", "symbols mm", "loaded s"))
     for part in parts:
         if importlib.util.find_spec("mujoco"):

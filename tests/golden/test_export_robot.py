@@ -182,6 +182,35 @@ def test_dropped_on_a_table_it_comes_to_rest_on_its_symbols(part):
     assert min(heights) < on_symbols
 
 
+def test_a_notch_is_open_and_what_is_in_it_can_be_felt(part):
+    """MuJoCo finds the touch mesh in contact, by its hull, and lets it bear nothing."""
+    import mujoco
+    import trimesh
+
+    if part.kind != "whole":
+        return
+    pieces = [trimesh.load(file, force="mesh") for file in part.folder.glob("*-collision-*.obj")]
+    hull = trimesh.util.concatenate(pieces).convex_hull
+    steps = np.linspace(*hull.bounds, 15).T
+    grid = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 3)
+    heights = [
+        (grid @ body.face_normals.T - (body.face_normals * body.triangles[:, 0]).sum(axis=1)).max(1)
+        for body in (hull, *pieces)
+    ]
+    notch = grid[np.minimum(-heights[0], np.min(heights[1:], axis=0)).argmax()]
+    spec = mujoco.MjSpec.from_file(str(part.folder / "Part.xml"))
+    ball = spec.worldbody.add_body(mocap=True, pos=notch)
+    ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.002, 0, 0])
+    model = spec.compile()
+    data, force = mujoco.MjData(model), np.zeros(6)
+    mujoco.mj_forward(model, data)
+    [contact] = data.contact
+    assert "Part-touch" in [model.geom(number).name for number in contact.geom]
+    assert contact.dist < -0.004  # the ball's radius and more
+    mujoco.mj_contactForce(model, data, 0, force)
+    assert np.abs(force).max() < 1e-3
+
+
 def test_sdf_keeps_to_its_specification(part):
     assert faults((part.folder / "Part.sdf").read_bytes()) == []
 

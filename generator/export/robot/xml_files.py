@@ -41,9 +41,10 @@ from generator.export.robot.model import (
 
 LINK = "body"  #: of an SDFormat model
 DRAKE = "http://drake.mit.edu"  #: namespace of what Drake alone reads
-#: Of contacts of the touch mesh: listed, so that a tactile sensor finds them, and almost without
-#: force (MuJoCo takes an impedance of 0 as 1e-4); as its hull, the mesh would fill every notch.
-_FORCELESS = {"priority": "1", "solimp": "0 0 0.001"}
+#: Of contacts of the touch mesh: listed, so that a tactile sensor finds them, and without force
+#: (MuJoCo's least impedance is 1e-4, and a stiffness is divided by it). A mesh collides as its
+#: hull: in a notch it would push away what does not touch it.
+_FORCELESS = {"priority": "1", "solimp": "0 0 0.001", "solref": "-1e-6 -1e-6"}
 _MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
 ElementTree.register_namespace("drake", DRAKE)
 

@@ -104,6 +104,18 @@ def test_a_run_opens_the_database_once(tmp_path, monkeypatch, copies):
         assert len(calls) == 1
 
 
+def test_auto_takes_finer_symbols_where_the_usual_ones_show_no_place(tmp_path):
+    small = choice(tmp_path, "name: A\nshape: {cube: 16 mm}\n")
+    assert {plan.spec.style.pitch_mm for plan in small.plans} == {4.5}
+    assert "shows places on 6 of the 6 faces" in small.notes[-1]
+    with pytest.raises(SpecError) as refused:
+        choice(tmp_path, "name: A\nshape: {cube: 10 mm}\n")
+    (problem,) = refused.value.problems
+    assert "5 mm pitch" in problem.cause
+    assert "set pitch" not in problem.fix  # 2.7 mm, which no nozzle of .4 mm prints
+    assert "1.7 times larger" in problem.fix
+
+
 def test_auto_goes_on_where_the_database_is_full(tmp_path):
     text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole, down: none}}\n"
     text += "symbols: {{alphabet: dense-4}}\ncopies: {}\n"

@@ -254,6 +254,12 @@ def test_a_tag_of_one_line_is_made_and_read(tmp_path):
     assert {(one.object, one.face) for one in answers} == {("Part", "F1")}
 
 
+def test_a_mount_may_be_a_text_as_the_page_sends_it(tmp_path):
+    for number, text in enumerate(("screws M3", "{screws: M3}", {"screws": "M3"})):
+        made(tmp_path, {"tag": [40, 40]}, mount=text)
+        assert len(registered(tmp_path).polyhedron.faces[0].loops) == 5, number
+
+
 def test_a_tag_is_as_thick_as_its_magnets_need(tmp_path):
     for height, thick in ((1.5, 3.0), (3.0, 4.0)):
         name = f"Tag {height}"
