@@ -10,7 +10,7 @@ import { faceRows, shade, words } from "./tint";
 import type { ObjectShape, Promised, Sensor } from "./types";
 
 interface Problem { line?: number | null; place: string; cause: string; fix: string }
-interface Face { name: string; place: string; symbols: number; promise: (Promised & { remedy: string }) | null }
+interface Face { name: string; place: string; symbols: number; promise: (Promised & { remedy: string; meets: string[] }) | null }
 interface Made { objects: { faces: number; symbols: number; parts: number; promise: string[]; warnings: string[]; face_reports: Face[] }[] }
 
 interface Refusal { error?: Problem & { problems?: Problem[] } }
@@ -116,7 +116,7 @@ export class MakeDialog {
     const heads = [...one.promise, `${count > 1 ? `${count} alike, each ` : ""}${one.faces} faces, ${one.symbols.toLocaleString("en")} symbols, ${one.parts} ${one.parts === 1 ? "part" : "parts"} to print`, ...(shape ? [] : ["it has too many symbols to be drawn"]), ...one.warnings];
     element("make-told").replaceChildren(...heads.map((text) => Object.assign(document.createElement("p"), { textContent: text })));
     faceRows(element("make-faces"), one.face_reports.map(({ name, place, symbols, promise }) => [
-      name, `${place}, ${symbols} symbols; ${promise ? words(promise) : "nothing is promised of single touches"}${promise?.remedy ? `; would help: ${promise.remedy}` : ""}`,
+      name, `${place}, ${symbols} symbols; ${promise ? words(promise) : "nothing is promised of single touches"}${promise?.meets.length ? `; the sensor meets ${promise.meets.join(", ")}` : ""}${promise?.remedy ? `; would help: ${promise.remedy}` : ""}`,
       colours.get(name) ?? "",
     ]));
   }
