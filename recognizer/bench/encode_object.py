@@ -30,6 +30,7 @@ from recognizer.bench.options import LAB
 EXAMPLE = "name: Example\nshape: {cube: 60 mm}\n"
 SHORT_S = 60.0  #: of processor time, to try a part and to show one; most take 1 to 3 s
 MAKE_S = 300.0  #: to make a part; a cube takes 2 s
+DRAWN = 100_000  #: symbols of a part that is drawn: a cube of 600 mm, 6 MB
 MEMORY = 4 * 1024**3  #: bytes of addresses of the command; the example takes 0.6 GB
 WRITTEN = 1024**3  #: bytes of a file that it writes
 ZIPPED = 512 * 1024**2  #: bytes of all files of a zip; a cube takes 12 MB
@@ -58,6 +59,8 @@ def part_settings() -> dict[str, Any]:
 def try_part(text: str, name: str, database: str, gone: Callable[[], bool]) -> dict[str, Any]:
     """Return what `encode-object --dry-run` says of a spec, and its first object to be drawn.
 
+    None in place of an object of more than `DRAWN` symbols.
+
     Parameters
     ----------
     text, name
@@ -77,13 +80,19 @@ def try_part(text: str, name: str, database: str, gone: Callable[[], bool]) -> d
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         spec, trial = _write_spec(folder, text, name), folder / "trial.db"
-        made = _ask(
-            spec.name, "--no-files", "--dry-run", "--trial", trial.name,
-            "--database", _address(database), folder=folder, longest_s=SHORT_S, gone=gone,
-        )  # fmt: skip
+        try:
+            made = _ask(
+                spec.name, "--no-files", "--dry-run", "--trial", trial.name,
+                "--database", _address(database), folder=folder, longest_s=SHORT_S, gone=gone,
+            )  # fmt: skip
+        finally:
+            load_ahead()
+        first = made["objects"][0]
+        if first["symbols"] > DRAWN:
+            return {"made": made, "shape": None}
         engine = open_database(str(trial), writable=False)
         with read_transaction(engine) as connection:
-            shape = object_json(connection, made["objects"][0]["name"])
+            shape = object_json(connection, first["name"])
         engine.dispose()
     return {"made": made, "shape": shape}
 
@@ -177,10 +186,11 @@ def end_all() -> None:
 
 
 def load_ahead() -> None:
-    """Begin a process for the next command: somebody fills in the form."""
-    with _TURN:
+    """Begin a process for the next command, if none runs: somebody fills in the form."""
+    if _TURN.acquire(blocking=False):
         if not _WAITING:
             _WAITING.append(waiting_process(*LOADS))
+        _TURN.release()
     if _ENDING.is_set():
         end_all()
 

@@ -455,21 +455,19 @@ def _add_making_routes(routes: APIRouter, session: Session) -> None:
 
     @routes.get("/make")
     def settings() -> dict[str, Any]:
-        threading.Thread(target=load_ahead, daemon=True).start()
+        schema = part_settings()
+        load_ahead()
         lab = normal_url(session.database or LAB).render_as_string()  # without its password
         return {
-            "schema": part_settings(), "sensor_type": session.sensor.name,
+            "schema": schema, "sensor_type": session.sensor.name,
             "lab": lab.removeprefix("sqlite:///"), "new": not session.database,
         }  # fmt: skip
 
     @routes.post("/make/try")
     async def attempt(body: _Part, request: Request) -> dict[str, Any]:
-        try:
-            return await _while_there(
-                request, lambda gone: try_part(body.spec, body.name, lab_of(body), gone)
-            )
-        finally:
-            threading.Thread(target=load_ahead, daemon=True).start()
+        return await _while_there(
+            request, lambda gone: try_part(body.spec, body.name, lab_of(body), gone)
+        )
 
     @routes.post("/make")
     async def make(body: _Part, request: Request) -> StreamingResponse:

@@ -10,7 +10,7 @@ import { faceRows, shade, words } from "./tint";
 import type { ObjectShape, Promised, Sensor } from "./types";
 
 interface Problem { line?: number | null; place: string; cause: string; fix: string }
-interface Face { name: string; place: string; symbols: number; promise: (Promised & { remedy: string }) | null }
+interface Face { name: string; place: string; symbols: number; promise: (Promised & { remedy: string; meets: string[] }) | null }
 interface Made { objects: { faces: number; symbols: number; parts: number; promise: string[]; warnings: string[]; face_reports: Face[] }[] }
 
 interface Refusal { error?: Problem & { problems?: Problem[] } }
@@ -84,7 +84,7 @@ export class MakeDialog {
     if (trying.signal.aborted) return;
     this.dialog.removeAttribute("aria-busy");
     if (!answer?.ok) return answer ? this.refused(form, await refusal(answer)) : undefined;
-    const { made, shape } = await answer.json() as { made: Made; shape: ObjectShape };
+    const { made, shape } = await answer.json() as { made: Made; shape: ObjectShape | null };
     this.refused(form, {});
     this.show(made, shape);
     figures.tried_ms = performance.now() - began;
@@ -107,15 +107,16 @@ export class MakeDialog {
     }));
   }
 
-  private show(made: Made, shape: ObjectShape): void {
+  private show(made: Made, shape: ObjectShape | null): void {
     const one = made.objects[0]!, count = made.objects.length;
     const colours = new Map(one.face_reports.flatMap(({ name, promise }) => (promise ? [[name, shade(promise.at_once)]] : []) as [string, string][]));
-    this.part?.show(shape, true);
+    element("make-part").hidden = !shape;
+    if (shape) this.part?.show(shape, true);
     this.part?.tint(colours, new Map(), false);
-    const heads = [...one.promise, `${count > 1 ? `${count} alike, each ` : ""}${one.faces} faces, ${one.symbols.toLocaleString("en")} symbols, ${one.parts} ${one.parts === 1 ? "part" : "parts"} to print`, ...one.warnings];
+    const heads = [...one.promise, `${count > 1 ? `${count} alike, each ` : ""}${one.faces} faces, ${one.symbols.toLocaleString("en")} symbols, ${one.parts} ${one.parts === 1 ? "part" : "parts"} to print`, ...(shape ? [] : ["it has too many symbols to be drawn"]), ...one.warnings];
     element("make-told").replaceChildren(...heads.map((text) => Object.assign(document.createElement("p"), { textContent: text })));
     faceRows(element("make-faces"), one.face_reports.map(({ name, place, symbols, promise }) => [
-      name, `${place}, ${symbols} symbols; ${promise ? words(promise) : "nothing is promised of single touches"}${promise?.remedy ? `; would help: ${promise.remedy}` : ""}`,
+      name, `${place}, ${symbols} symbols; ${promise ? words(promise) : "nothing is promised of single touches"}${promise?.meets.length ? `; the sensor meets ${promise.meets.join(", ")}` : ""}${promise?.remedy ? `; would help: ${promise.remedy}` : ""}`,
       colours.get(name) ?? "",
     ]));
   }
