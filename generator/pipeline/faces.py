@@ -73,7 +73,7 @@ def face_reports(
     known: dict[bytes, Size] = {}
     reports = []
     for face in layout.faces:
-        if face.face in plan.blank_faces:
+        if face.face in plan.blank_faces and not len(face.labels):
             continue
         outline = plan.developed.get(face.face) or face_polygon(plan.polyhedron, face.face)
         region = region_of(outline, plan.clearances_mm[face.face])
@@ -125,7 +125,7 @@ def _rates(plan: ObjectPlan, layout: Layout) -> dict[int, RecognitionRate]:
     A face whose places other faces cover for the most part has none.
     """
     round_faces = {surface.carrier for surface in plan.polyhedron.surfaces}
-    faces = [face for face in layout.faces if face.face not in plan.blank_faces]
+    faces = [face for face in layout.faces if len(face.labels) or face.face not in plan.blank_faces]
     array, sensor = plan.array, plan.spec.sensor
     cells = array.rows * array.columns
     rates = face_rates(
