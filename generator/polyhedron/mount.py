@@ -103,10 +103,17 @@ class Bore:
 
 
 def least_thickness_mm(mount: Mount | None) -> float:
-    """Return how thick a plate must be for the pockets of a mount; 0 where there are none."""
-    if mount is not None and isinstance(mount.size, tuple):
+    """Return how thick a plate must be for the pockets and the sunk heads of a mount; or 0."""
+    if mount is None or isinstance(mount.size, float):
+        return 0.0
+    if isinstance(mount.size, tuple):
         return mount.size[1] + FIT_MM + SKIN_MM
-    return 0.0
+    thread, pocket = mount.size, 0.0
+    if mount.kind == "flange":
+        _, _, thread, pin = FLANGES[mount.size]
+        pocket = pin / 2 + SKIN_MM
+    screw = SCREWS[thread]
+    return max((screw.sunk_mm - screw.clear_mm) / 2 + LAND_MM, pocket)
 
 
 def with_mount(solid: Polyhedron, mount: Mount, face: int) -> Polyhedron:
@@ -224,7 +231,7 @@ class _Space:
             profile: Profile = ((0.0, clear), (seat, clear), (seat, head), (deep, head))
             return Bore(place, profile, behind)
         seat = deep - (sunk - clear)
-        if seat < LAND_MM:
+        if seat < LAND_MM - 1e-9:
             raise ShapeError(
                 f"{deep:.3g} mm of plastic are too thin to sink the head of {thread}, which needs "
                 f"{sunk - clear + LAND_MM:.3g} mm",

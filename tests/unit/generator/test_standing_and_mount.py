@@ -151,7 +151,11 @@ def test_saying_what_holds_already_means_the_same_object(tmp_path):
         ({"tag": [40, 40]}, {"mount": {"screws": "M7"}}, "'M7' is no screw known here"),
         ({"tag": [40, 40]}, {"mount": "ISO 9409-1-51-4-M6"}, "is no flange known here"),
         ({"tag": [40, 40]}, {"mount": "50-4-M6"}, "the mount does not fit face F2"),
-        ({"tag": [40, 40]}, {"mount": {"screws": "M6"}}, "too thin to sink the head of M6"),
+        (
+            {"tag": {"size": [40, 40], "thickness": 3}},
+            {"mount": {"screws": "M6"}},
+            "too thin to sink the head of M6",
+        ),
         ({"tag": [40, 40]}, {"mount": {"rod": 6}}, "needs 11.5 mm behind face F2"),
         ({"cube": 40}, {"mount": {"screws": "M3"}, "print": {"parts": "panels"}}, "with a mount"),
         ({"cylinder": {"diameter": 50, "height": 30}}, {"mount": {"rod": 6, "face": "F2"}}, "flat"),
@@ -260,11 +264,14 @@ def test_a_mount_may_be_a_text_as_the_page_sends_it(tmp_path):
         assert len(registered(tmp_path).polyhedron.faces[0].loops) == 5, number
 
 
-def test_a_tag_is_as_thick_as_its_magnets_need(tmp_path):
-    for height, thick in ((1.5, 3.0), (3.0, 4.0)):
-        name = f"Tag {height}"
-        mount = {"magnets": [8, height]}
-        made(tmp_path, {"tag": [40, 40]}, name=name, mount=mount, formats=())
+def test_a_tag_is_as_thick_as_its_mount_needs(tmp_path):
+    flange = {"flange": "ISO 9409-1-50-4-M6"}
+    for side, mount, thick in (
+        (40, {"magnets": [8, 1.5]}, 3.0), (40, {"magnets": [8, 3.0]}, 4.0),
+        (40, {"screws": "M3"}, 3.0), (40, {"screws": "M6"}, 3.4), (70, flange, 3.8),
+    ):  # fmt: skip
+        name = f"Tag {side} {thick} {next(iter(mount))}"
+        made(tmp_path, {"tag": [side, side]}, name=name, mount=mount, formats=())
         assert np.ptp(registered(tmp_path, name).polyhedron.vertices[:, 2]) == pytest.approx(thick)
 
 
