@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 
 
 # Chosen on 40 touches of each cause, own engine, `typical`, seed 61 (`docs/recognizer.md`).
-TOO_FINE = 0.75  #: of the pitch that a type reads best: few touches of finer ones are answered
+TOO_FINE = 2.0  #: tactels a symbol: few touches of finer ones are answered
 FULL_LOAD = 90.0  #: percentile of the envelope that counts as loaded in full
 PLATEAU = 95.0  #: percentile of the readings that stands for a symbol's
 PART = 0.2  #: of the full load, from which a place is loaded ...
@@ -133,8 +133,9 @@ def diagnose(touch: TouchImages, found: list[VerifiedHypothesis]) -> Cause:
     if not signal.contact:
         return Cause(cause.NO_LOAD, {})
     pitch = min(each.style.pitch_mm for each in reader.lab.arrays)
-    best_mm = reader.sensor.symbol_pitch_mm
-    if max(each.style.pitch_mm for each in reader.lab.arrays) < TOO_FINE * best_mm:
+    coarsest = max(each.style.pitch_mm for each in reader.lab.arrays)
+    if coarsest < TOO_FINE * reader.sensor.pitch_mm:
+        best_mm = reader.sensor.symbol_pitch_mm
         return Cause(cause.TOO_FINE, {"pitch_mm": pitch, "best_mm": best_mm})
     image = image_features(reader.sensor, signal, pitch)
     evidence = found[0].evidence if found else None

@@ -194,7 +194,7 @@ def test_loads_that_tell_too_little_are_refused_where_it_is_asked(page):
 
 
 def test_files_and_pictures_can_be_had(page, lab):
-    page.locator("summary").click()
+    page.get_by_text("Files of this object").click()
     with page.expect_download() as download:
         page.get_by_test_id("files").get_by_role("link").first.click()
     name = download.value.suggested_filename

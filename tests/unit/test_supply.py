@@ -16,7 +16,7 @@ from supply import CONSTRAINTS, ROOT, canonical, declared, needed
 
 OURS = ("encoded_objects", "generator", "decoder", "probe", "recognizer")
 #: peers of benchmarks and campaigns, which say how to install them
-APART = {"calib_targets", "newton", "pydrake"}
+APART = {"calib_targets", "newton", "pydrake", "warp"}
 
 
 def imported(folder):

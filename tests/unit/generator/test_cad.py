@@ -108,7 +108,7 @@ def test_a_spec_is_a_file_its_text_or_its_settings(tmp_path):
     text = "name: Cube\nshape: {cube: 30 mm}\n"
     (tmp_path / "cube.yaml").write_text(text)
     settings = {"name": "Cube", "shape": {"cube": "30 mm"}}
-    given = {"database": str(tmp_path / "lab.db"), "formats": (), "folder": tmp_path / "out"}
+    given = {"database": str(tmp_path / "lab.db"), "formats": ("stl",), "folder": tmp_path / "out"}
     first = encode(settings, **given)
     assert (first.name, first.faces, first.symbols) == ("Cube", 6, 150)
     assert first.folder == tmp_path / "out"

@@ -90,13 +90,12 @@ def test_a_trial_takes_down_what_would_be_made_and_nothing_else(bench, capsys):
     path = spec(bench)
     assert encode_object([path, "--dry-run", "--trial", "trial.db", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)["objects"][0]
-    assert said["promise"][0].endswith("within three")
+    assert "answered at once, " in said["promise"][0]
     assert [one.name for one in bench.rglob("*.db")] == ["trial.db"]
     assert encode_object(["show", "Cube", "--database", "trial.db", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
-    assert [face["symbols"] for face in shown["faces"]] == [
-        face["symbols"] for face in said["face_reports"]
-    ]
+    counted = [face["symbols"] for face in shown["faces"]]
+    assert [one for one in counted if one] == [face["symbols"] for face in said["face_reports"]]
     assert encode_object([path, "--trial", "other.db"]) == 2
 
 

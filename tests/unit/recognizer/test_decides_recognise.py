@@ -23,6 +23,7 @@ from recognizer.touch.recognition import (
     NOT_ENCODED,
     OUTSIDE,
     TOO_FEW,
+    UNCLEAR,
     Cause,
     RunnerUp,
 )
@@ -392,9 +393,10 @@ def test_halves_are_exchanged_only_where_that_may_be(reads, exchanged, monkeypat
 
 def test_only_what_is_refused_has_a_cause(reads, monkeypatch):
     other = [reads.one(explained=0.1)]
-    for found, cause in (([reads.one()], None), (other, "its cause")):
+    why = Cause(UNCLEAR, {})
+    for found, cause in (([reads.one()], None), (other, why)):
         reads.read(found, found, doubt=0.0)
-        monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: "its cause")
+        monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: why)
         monkeypatch.setattr(
             recognizer.touch.recognise, "verify_hypotheses", lambda *_, found=found: found
         )
