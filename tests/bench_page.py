@@ -118,7 +118,7 @@ def opened_to_make(browser, address):
     """Open the page to make a part, or at a link to one; it has been tried."""
     page = browser.new_page(viewport={"width": 1440, "height": 900})
     page.add_init_script("localStorage.setItem('toured', 'yes')")
-    page.goto(address)
+    page.goto(address, wait_until="networkidle")  # before that the button does nothing
     if "#" not in address:
         page.get_by_test_id("make-open").click()
     until(page, "bench.tried > 0")
