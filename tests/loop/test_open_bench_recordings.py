@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import resource
 import signal
 import subprocess
 import threading
 import time
-from contextlib import contextmanager
-from pathlib import Path
+from contextlib import contextmanager, suppress
 
 import httpx
+import psutil
 import pytest
 from bench_page import running
 from hostile_recordings import HOSTILE, SECRET, write_hostile, write_zeros
@@ -118,8 +117,11 @@ def test_recognize_object_refuses_it(folder, lab, capsys, monkeypatch):
 def ended(process, number):
     """Send a signal; return how many seconds of CPU it took to end, and the exit code."""
     others_s = children_s()
-    times = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:15]
-    before_s = sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
+    server = psutil.Process(process.pid)
+    before_s = sum(server.cpu_times()[:4])
+    for child in server.children(recursive=True):
+        with suppress(psutil.NoSuchProcess):
+            before_s += sum(child.cpu_times()[:4])
     process.send_signal(number)
     code = process.wait(PATIENCE_S)
     return children_s() - others_s - before_s, code
