@@ -111,9 +111,7 @@ installed; pip install 'encoded-objects[report]'
         except ImportError as error:
             absent = isinstance(error, ModuleNotFoundError)
             why = "is not installed" if absent else f"cannot be loaded ({error})"
-            raise MissingExtraError(
-                f"{purpose} needs {module.partition('.')[0]}, which {why}", fix=install_line(extra)
-            ) from error
+            raise _missing(module, extra, purpose, why) from error
 
 
 TOUCH_LIBRARIES = ("cobs", "h5py", "scipy", "serial")  #: of the extra `touch`
@@ -124,8 +122,14 @@ def without_touch(error: ModuleNotFoundError, purpose: str) -> MissingExtraError
     module = (error.name or "").partition(".")[0]
     if module not in TOUCH_LIBRARIES:
         return None
-    cause = f"{purpose} needs {module}, which is not installed"
-    return MissingExtraError(cause, fix=install_line("touch"))
+    return _missing(module, "touch", purpose)
+
+
+def _missing(
+    module: str, extra: str, purpose: str, why: str = "is not installed"
+) -> MissingExtraError:
+    cause = f"{purpose} needs {module.partition('.')[0]}, which {why}"
+    return MissingExtraError(cause, fix=install_line(extra))
 
 
 def install_line(extra: str) -> str:

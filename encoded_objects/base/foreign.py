@@ -151,8 +151,10 @@ def waiting_process(*loads: str) -> subprocess.Popen[bytes]:
     """
     import subprocess
 
+    from encoded_objects.base.console import MATRIX_LIBRARIES
+
     path = os.pathsep.join(entry for entry in sys.path if entry)
-    one_thread = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
+    one_thread = {f"{name}_NUM_THREADS": "1" for name in MATRIX_LIBRARIES}
     return subprocess.Popen(  # noqa: S603 - our own module, no shell
         [sys.executable, "-m", __name__, *loads],
         env={**os.environ, **one_thread, "PYTHONPATH": path, "PYTHONSAFEPATH": "1"},

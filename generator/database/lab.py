@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, func, select
 
-from generator.array import PROFILES, FoldedArray, ProductArray, Profile
+from generator.array import PROFILES, FoldedArray, ProductArray, Profile, array_from
 from generator.array.contract import symbols_seen, touches_needed
 from generator.array.lab_key import read_lab_key
-from generator.database.read import make_array, read_array
+from generator.database.read import read_array
 from generator.database.registered import RegisteredArray
 from generator.database.tables import arrays, cells, meta, objects
 from generator.database.transaction import of_rows, place_of
@@ -77,9 +77,9 @@ def lab_arrays(connection: Connection) -> LabArrays:
     key = lab_key(connection)
     query = select(arrays.c.array_id, arrays.c.profile).order_by(arrays.c.array_id.desc())
     mine = query.where(arrays.c.lab_key.is_not_distinct_from(key or None))
-    rows = connection.execute(mine).all()
-    made = {name: read_array(connection, number) for number, name in rows}
-    return LabArrays(key, made, {number: make_array(connection, number) for number, _ in rows})
+    made = {name: read_array(connection, number) for number, name in connection.execute(mine)}
+    symbols = {one.array_id: array_from(one.definition) for one in made.values()}
+    return LabArrays(key, made, symbols)
 
 
 MOST_FILLED = 0.8  #: share of an array that faces of all shapes fill without a search

@@ -29,6 +29,11 @@ from generator.export.bed import Size
 from generator.export.colours import BODY_RGB, SYMBOL_RGB, hexadecimal
 from generator.export.formats import ExportedObject, Files
 from generator.export.threemf import (
+    BED_C,
+    FILAMENT_MM,
+    FIRST_LAYER_C,
+    INFILL,
+    LAYERS_C,
     MODEL,
     PLACES,
     SYMBOLS,
@@ -37,7 +42,7 @@ from generator.export.threemf import (
     PartText,
     PrintFile,
     SlicerSettings,
-    deflated,
+    deflate_pieces,
     mesh_object,
     package_head,
     relationships,
@@ -103,7 +108,7 @@ class _Texts:
         meshes: list[str | DeflatedText] = [_HEAD, "<resources>\n"]
         for number, mesh in zip(numbers, part.meshes, strict=True):
             meshes += mesh_object(number, mesh, self.uuid(number))
-        self.files[path] = deflated([*meshes, "</resources>\n<build/>\n</model>\n"])
+        self.files[path] = deflate_pieces([*meshes, "</resources>\n<build/>\n</model>\n"])
         own, (x, y) = numbers.stop, part.centre_mm
         components = "".join(
             f'<component p:path="/{path}" objectid="{number}" {self.uuid(own, number)} '
@@ -163,7 +168,7 @@ def project_3mf(title: str, plates: Sequence[PrintFile]) -> bytes:
         "Metadata/model_settings.config": described,
         "Metadata/project_settings.config": _print_settings(SlicerSettings(printer, supports)),
     }
-    more = {name: deflated([text]) for name, text in written.items()}
+    more = {name: deflate_pieces([text]) for name, text in written.items()}
     return zip_package(package_head() | more | texts.files)
 
 
@@ -174,7 +179,7 @@ def _print_settings(settings: SlicerSettings) -> str:
     ours: dict[str, str | list[str]] = {
         "layer_height": f"{printer.layer_mm:g}",
         "initial_layer_print_height": f"{printer.first_layer_mm:g}",
-        "sparse_infill_density": "15%",
+        "sparse_infill_density": INFILL,
         "enable_support": str(int(settings.supports)),
         "enable_prime_tower": "0",  # plates are full: it would stand on parts
     }
@@ -203,11 +208,11 @@ def _print_settings(settings: SlicerSettings) -> str:
         "curr_bed_type": "Textured PEI Plate",
         "filament_colour": [hexadecimal(BODY_RGB), hexadecimal(SYMBOL_RGB)],
         "filament_type": ["PLA"] * 2,
-        "filament_diameter": ["1.75"] * 2,
-        "nozzle_temperature_initial_layer": ["215"] * 2,
-        "nozzle_temperature": ["210"] * 2,
-        "textured_plate_temp_initial_layer": ["60"] * 2,
-        "textured_plate_temp": ["60"] * 2,
+        "filament_diameter": [FILAMENT_MM] * 2,
+        "nozzle_temperature_initial_layer": [FIRST_LAYER_C] * 2,
+        "nozzle_temperature": [LAYERS_C] * 2,
+        "textured_plate_temp_initial_layer": [BED_C] * 2,
+        "textured_plate_temp": [BED_C] * 2,
         "flush_volumes_matrix": ["0", _FLUSH_MM3, _FLUSH_MM3, "0"],
     }
     return json.dumps(rest | presets | ours, indent=4) + "\n"

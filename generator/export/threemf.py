@@ -60,6 +60,12 @@ _RELATIONSHIPS = (
 _TO_TRIANGLES, _TO_END = "</vertices><triangles>\n", "</triangles></mesh></object>\n"
 
 
+# Of PLA, as every project says it.
+INFILL = "15%"
+FILAMENT_MM = "1.75"
+FIRST_LAYER_C, LAYERS_C, BED_C = "215", "210", "60"  #: of the nozzle, then of the bed
+
+
 @dataclass(frozen=True, slots=True)
 class SlicerSettings:
     """How a plate is printed in filament; projects say it by their slicer's names."""
@@ -79,16 +85,16 @@ class SlicerSettings:
             "printer_settings_id": "encoded-objects",
             "bed_shape": f"0x0,{width}x0,{width}x{depth},0x{depth}",
             "nozzle_diameter": f"{printer.nozzle_mm:g}",
-            "filament_diameter": "1.75",
+            "filament_diameter": FILAMENT_MM,
             "filament_density": "1.24",
             "filament_type": "PLA",
-            "first_layer_temperature": "215",
-            "temperature": "210",
-            "first_layer_bed_temperature": "60",
-            "bed_temperature": "60",
+            "first_layer_temperature": FIRST_LAYER_C,
+            "temperature": LAYERS_C,
+            "first_layer_bed_temperature": BED_C,
+            "bed_temperature": BED_C,
             "layer_height": f"{printer.layer_mm:g}",
             "first_layer_height": f"{printer.first_layer_mm:g}",
-            "fill_density": "15%",
+            "fill_density": INFILL,
             "support_material": str(int(self.supports)),
         }
 
@@ -300,7 +306,7 @@ def mesh_object(number: int, mesh: MeshText, properties: str = "") -> list[str |
 def _model(pieces: Iterable[str | DeflatedText], items: Iterable[int]) -> list[DeflatedText]:
     """Return a model of objects, of which `items` lie on the bed, where their vertices are."""
     built = "".join(f'<item objectid="{number}"/>\n' for number in items)
-    return deflated([*pieces, f"</resources>\n<build>\n{built}</build>\n</model>\n"])
+    return deflate_pieces([*pieces, f"</resources>\n<build>\n{built}</build>\n</model>\n"])
 
 
 def _mesh_head(number: int, name: str, properties: str) -> str:
@@ -369,15 +375,15 @@ def _volume_settings(file: PrintFile) -> str:
 
 def _package(model: Sequence[DeflatedText], more: Mapping[str, str] | None = None) -> bytes:
     """Return the zip of a model, of the two files that every 3MF has, and of some more."""
-    texts = {name: deflated([text]) for name, text in (more or {}).items()}
+    texts = {name: deflate_pieces([text]) for name, text in (more or {}).items()}
     return zip_package(package_head() | {MODEL: model} | texts)
 
 
 def package_head() -> dict[str, Sequence[DeflatedText]]:
     """Return the two files that every 3MF begins with."""
     return {
-        "[Content_Types].xml": deflated([_CONTENT_TYPES]),
-        "_rels/.rels": deflated([relationships([f"/{MODEL}"])]),
+        "[Content_Types].xml": deflate_pieces([_CONTENT_TYPES]),
+        "_rels/.rels": deflate_pieces([relationships([f"/{MODEL}"])]),
     }
 
 
@@ -424,7 +430,7 @@ def deflate_text(pieces: Iterable[bytes]) -> DeflatedText:
     return DeflatedText(b"".join(blocks), size, crc)
 
 
-def deflated(pieces: Iterable[str | DeflatedText]) -> list[DeflatedText]:
+def deflate_pieces(pieces: Iterable[str | DeflatedText]) -> list[DeflatedText]:
     """Return pieces of a text, each deflated."""
     return [deflate_text([one.encode()]) if isinstance(one, str) else one for one in pieces]
 
