@@ -31,9 +31,8 @@ def glyphs(draw):
 def union(glyph, width):
     turns = (np.arange(8) + 0.5) * math.pi / 4
     nib = width / 2 / math.cos(math.pi / 8) * np.stack([np.cos(turns), np.sin(turns)], 1)
-    # GEOS loses a polygon where another one comes twice.
-    pairs = [np.concatenate([np.array(a) + nib, np.array(b) + nib]) for a, b in dict.fromkeys(glyph)]
-    hulls = [MultiPoint(pair) for pair in pairs]
+    once = dict.fromkeys(glyph)  # GEOS loses a polygon where another one comes twice
+    hulls = [MultiPoint(np.concatenate([np.array(a) + nib, np.array(b) + nib])) for a, b in once]
     return shapely.union_all([hull.convex_hull for hull in hulls])
 
 
