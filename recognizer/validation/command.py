@@ -141,8 +141,8 @@ class SetOptions(Options):
     engine: Annotated[
         str,
         Option(
-            "Who computes the contact; own. mujoco shares no model with the reader; .3 to .5 s "
-            "of CPU a touch.",
+            "Who computes the contact; own. mujoco and drake share no model with the reader; 1.7 "
+            "and .8 s of CPU a touch.",
             "|".join(ENGINES),
         ),
     ] = ""

@@ -40,7 +40,8 @@ def test_names_of_crowded_points_do_not_overlap():
 def test_every_engine_is_in_the_picture_and_says_what_it_leaves_out():
     series = {line["series"] for line in contact_study().counted}
     assert series == {"tab, own engine", "pad, own engine", "tab, mujoco"}
-    assert {line.engine for line in engine_table()} == set(ENGINES) - {"own"}
+    # Drake takes no points of a tip, so that no image of its own is finer.
+    assert {line.engine for line in engine_table()} == set(ENGINES) - {"own", "drake"}
     errors = [line.error for line in engine_table()]
     assert errors == sorted(errors, reverse=True)  # more points err less
     lines = engine_lines()
