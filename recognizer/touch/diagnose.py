@@ -41,6 +41,8 @@ SMEARED = 0.85  #: variation below which contours may be smeared ...
 SHARP = 0.6  #: ... if they are so much less sharp one way than across
 SOFT = 16.0  #: signal to noise below which a touch is soft
 SOFT_N = 0.15  #: plateau below which it is, where readings are newtons
+HARD_N = 250.0  #: sum of the readings from which contrast is lost, where they are newtons ...
+HARD = 0.08  #: ... or share of all that they can read: 120 N .071, 250 N .080, 1000 N .097
 FALLING = 0.42  #: share of the load by which it falls from the middle to the rim ...
 LYING = 0.65  #: ... of a plate that lies on so much of the sensor: less is an edge
 NARROW_MM = 7.5  #: width of one row of symbols
@@ -139,7 +141,7 @@ def diagnose(touch: TouchImages, found: list[VerifiedHypothesis]) -> Cause:
         return Cause(cause.TOO_FINE, {"pitch_mm": pitch, "best_mm": best_mm})
     image = image_features(reader.sensor, signal, pitch)
     evidence = found[0].evidence if found else None
-    seen = _by_image(image, signal)
+    seen = _by_image(reader.sensor, image, signal)
     if seen is not None and not (seen.code == cause.PLAIN and _is_there(evidence)):
         return seen
     symbols = 0 if evidence is None else evidence.inliers
@@ -173,9 +175,20 @@ def diagnose(touch: TouchImages, found: list[VerifiedHypothesis]) -> Cause:
     return Cause(cause.UNCLEAR, numbers)
 
 
-def _by_image(image: ImageFeatures, signal: Signal) -> Cause | None:
+def _hard_from(sensor: SensorType, signal: Signal) -> float:
+    """Return the sum of readings from which a sensor is pressed too hard, inf if not known."""
+    if signal.newtons:
+        return HARD_N
+    return HARD * sensor.full * signal.forces.size if sensor.exponent == 1.0 else math.inf
+
+
+def _by_image(sensor: SensorType, image: ImageFeatures, signal: Signal) -> Cause | None:
     """Return the cause that the image shows by itself; None if none."""
     if image.variation < SMEARED and image.sharpness < SHARP:
+        total, most = float(signal.forces.sum()), _hard_from(sensor, signal)
+        if total > most:
+            numbers = {"sum": total, "most": most, "newtons": float(signal.newtons)}
+            return Cause(cause.HARD, numbers)
         return Cause(cause.MOVING, {"sharpness": image.sharpness,
                                     "direction_deg": image.direction_deg})  # fmt: skip
     if image.variation < EVEN:

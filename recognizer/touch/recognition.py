@@ -26,6 +26,7 @@ OUTSIDE = "outside every face"
 # Codes of causes.
 NO_LOAD = "no_contact"
 SOFT = "soft"
+HARD = "hard"
 TILTED = "tilted"
 MOVING = "moving"
 EDGE = "edge"
@@ -276,6 +277,14 @@ _CAUSES: dict[str, tuple[Callable[[Numbers], str], str]] = {
             + f", {n['signal_to_noise']:.0f} times their noise"
         ),
         "press harder",
+    ),
+    HARD: (
+        lambda n: (
+            "pressed too hard: readings add up to "
+            + (f"{n['sum']:.0f} N" if n["newtons"] else f"{n['sum']:.0f} counts")
+            + f" where {n['most']:.0f} are usual, and gaps read nearly as much as strokes"
+        ),
+        "press with 30 to 120 N",
     ),
     TILTED: (
         lambda n: f"tilted: the load falls by {_percent(n['slope'])} across the sensor",

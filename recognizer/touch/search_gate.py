@@ -22,7 +22,7 @@ from recognizer.touch.chance import LEAST_SHARE
 from recognizer.touch.evidence import VerifiedHypothesis, symbols_to_name
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.prepare import PreparedLab
-from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, TOO_FEW, Recognition
+from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, Recognition
 from recognizer.touch.signal import Signal, mean_of_strongest, quantile, sorted_around
 from recognizer.touch.verdict import Evidence
 
@@ -64,8 +64,6 @@ def may_find_more(
     inliers = best.evidence.inliers
     if answer.reason == AMBIGUOUS and inliers < symbols_to_name(best.embossed):
         return False  # the image is explained, and it shows no more
-    if answer.reason == TOO_FEW:
-        return False
     return _may_show_symbols(reader, signal)
 
 

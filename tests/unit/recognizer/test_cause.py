@@ -60,6 +60,12 @@ def test_what_the_image_shows_by_itself(reader, monkeypatch):
     assert found.code == cause.MOVING
     away = (found.evidence["direction_deg"] + 90) % 180 - 90
     assert away == pytest.approx(0, abs=10)  # along the columns
+    hard = diagnose(TouchImages(reader, signal_of(2.0 * smeared)), [])
+    assert hard.code == cause.HARD
+    assert str(hard).startswith("pressed too hard: readings add up to ")
+    for share, code in ((1.01, cause.HARD), (0.99, cause.MOVING)):
+        newtons = signal_of(smeared * share * 250 / smeared.sum(), floor=0.0, newtons=True)
+        assert diagnose(TouchImages(reader, newtons), []).code == code
 
 
 def test_the_numbers_of_an_image():
@@ -119,12 +125,12 @@ def test_every_cause_has_words_and_a_way_out():
         ("plateau", "signal_to_noise", "newtons", "loaded", "symbols", "direction_deg",
          "sharpness", "silent", "explained", "explained_anywhere",
          "symbols_anywhere", "slope", "width_mm", "variation", "columns",
-             "pitch_mm", "best_mm"), 0.5
+             "pitch_mm", "best_mm", "sum", "most"), 0.5
     )  # fmt: skip
     named = [value for name, value in vars(cause).items() if name.isupper() and name[0] != "_"]
     words = {*cause.WAYS_OUT, cause.CHECKED, cause.UNCHECKED}
     codes = [one for one in named if isinstance(one, str) and one not in words]
-    assert len(codes) == 13
+    assert len(codes) == 14
     for code in codes:
         one = Cause(code, numbers)
         assert str(one)

@@ -122,7 +122,6 @@ PAD, ROUND, SOME_ROUND = {"kind": "pad"}, {"radii": (20.0,)}, {"radii": (20.0,),
         ({"inliers": 9, "log_likelihood_ratio": 90.0, "explained": 0.1}, True),
         # an image that is explained shows no more
         ({"reason": AMBIGUOUS, "inliers": 2}, False), ({"reason": AMBIGUOUS, "inliers": 3}, True),
-        ({"reason": TOO_FEW, "inliers": 3}, False),
         ({"reason": AMBIGUOUS, "inliers": 5, "order": 2}, False),  # six of two kinds name a cell
         ({"reason": NOT_ENCODED, "inliers": 5, "order": 2}, True),
         # an answer is given; where that was not measured it is confirmed if chance nearly allows it
