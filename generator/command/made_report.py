@@ -154,7 +154,7 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
                 "parts": made.parts,
                 "reused": made.reused,
                 "skipped": made.skipped,
-                "surface": None if made.promise is None else asdict(made.promise),
+                "surface": None if made.promise is None else made.promise.shares,
                 "promise": [line.strip() for line in rate_lines(made.face_reports, made.promise)],
                 "face_reports": [asdict(face) for face in made.face_reports],
                 "fit": None if made.fit is None else asdict(made.fit),

@@ -257,7 +257,7 @@ def _object_values(
 ) -> dict[str, Any]:
     entry = held.entry
     return _entry_values(entry) | {
-        "surface": asdict(part) if part else None,
+        "surface": part.shares if part else None,
         "faces": [_face_values(face) for face in faces],
         "layout": held.layout.kind,
         "warnings": list(held.layout.warnings),

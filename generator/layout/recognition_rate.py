@@ -88,11 +88,25 @@ class PartRate:
     at_once: float  #: share of touches that are answered
     within_three: float | None  #: None: not measured
     encoded: float  #: share of the surface that faces with symbols have
+    one_side: bool = False  #: a tag, of which that side alone is touched
+
+    @property
+    def shares(self) -> dict[str, float | None]:
+        """Return the shares by name, for programs."""
+        return {name: getattr(self, name) for name in ("at_once", "within_three", "encoded")}
 
     @property
     def text(self) -> str:
         """Say all of it."""
-        later = "" if self.within_three is None else f", {percent(self.within_three)} within three"
+        side = self.encoded if self.one_side else 1.0
+        later = ""
+        if self.within_three is not None:
+            later = f", {percent(self.within_three / side)} within three"
+        if self.one_side:
+            return (
+                f"of touches on its encoded side {percent(self.at_once / side)} are answered at "
+                f"once{later}; that is {percent(side)} of its surface"
+            )
         return (
             f"of touches anywhere on the part {percent(self.at_once)} are answered at once{later}; "
             f"{percent(self.encoded)} of its surface is encoded"
@@ -218,7 +232,8 @@ def part_rate(
             within += own * (math.nan if rate.within_three is None else rate.within_three)
     whole = sum(area)
     later = None if math.isnan(within) else _to_three_places(within / whole)
-    return PartRate(_to_three_places(once / whole), later, _to_three_places(encoded / whole))
+    shares = _to_three_places(once / whole), later, _to_three_places(encoded / whole)
+    return PartRate(*shares, one_side=polyhedron.kind == "tag" and encoded > 0.0)
 
 
 def face_rate(

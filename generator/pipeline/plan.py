@@ -29,6 +29,7 @@ from generator.polyhedron.front import Loop, covered_parts
 from generator.polyhedron.mount import with_mount
 from generator.polyhedron.shapes import ROUND_SHAPES, SHAPES
 from generator.polyhedron.standing import Stance, best_stance, stance_on
+from generator.polyhedron.winged import Developable
 from generator.printers import Printer
 from generator.solid.analytic import bend_problem
 from generator.solid.part import edge_numbers
@@ -242,6 +243,8 @@ def _round_faces(
         name = polyhedron.faces[surface.carrier].name
         if not problem and not covered.keys().isdisjoint(surface.facets):
             problem = f"another face is nearer than {reach:.2g} mm in front of it"
+        if not problem and surface.concave:
+            problem = _bore_problem(surface, spec)
         if problem:
             notes.append(f"{surface.kind} {name} stays blank: {problem}")
             blank |= set(surface.facets)
@@ -254,6 +257,15 @@ def _round_faces(
         fix = "give it a planar face, or a cylinder or cone face between two circles"
         raise LayoutError(f"no face of the object carries symbols: {why}", fix=fix)
     return found
+
+
+def _bore_problem(surface: Developable, spec: ObjectSpec) -> str:
+    """Return why a sensor does not reach the wall of a hole; "" where it does."""
+    radius, half = surface.radius_mm, min(spec.sensor.half_mm)
+    gap = radius - math.sqrt(max(radius**2 - half**2, 0.0))
+    if gap <= spec.style.height_mm:
+        return ""
+    return f"a sensor {2 * half:.3g} mm wide does not reach the wall of this hole"
 
 
 def _blank_faces(
@@ -295,7 +307,7 @@ def _blank_faces(
         names = ", ".join(polyhedron.faces[face].name for face in stance.on_bed)
         on_it = "it" if len(stance.on_bed) == 1 else "them"
         note = f"{names} stay{'s' * (on_it == 'it')} blank: the part is printed standing on {on_it}"
-        carried = carried.without(stance.on_bed, note)
+        carried = carried.without(stance.on_bed, *([note] if polyhedron.kind != "tag" else []))
         kept = [name for name, facets in asked.items() if facets[0] not in stance.on_bed]
         spec = replace(spec, blank=tuple(kept))
     return spec, carried, stance

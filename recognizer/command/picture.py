@@ -120,7 +120,7 @@ def _say_why(axes: Axes, found: Recognition) -> None:
     axes.set_axis_off()
     lines = [found.reason]
     if found.margin is not None:
-        lines.append(f"margin {found.margin:.1f} nats")
+        lines.append(f"margin {found.margin / math.log(2):.1f} bits")
     if found.runner_up is not None:
         lines.append(f"also possible: {found.runner_up.object}, face {found.runner_up.face}")
     axes.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", transform=axes.transAxes)

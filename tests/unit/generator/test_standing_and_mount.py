@@ -248,6 +248,10 @@ def test_a_tag_of_one_line_is_made_and_read(tmp_path):
     result = made(tmp_path, {"tag": "40 x 40 mm"}, formats=("stl",))
     assert (result.symbols, bearing(tmp_path)) == (49, {"F1"})
     assert result.objects[0].lying == "F2 down, no supports needed"
+    assert result.objects[0].warnings == ()  # its back is blank by its meaning
+    said = "of touches on its encoded side 96 % are answered at once, "
+    assert result.objects[0].promise.text.startswith(said)
+    assert set(result.objects[0].promise.shares) == {"at_once", "within_three", "encoded"}
     heights = np.unique(corners_of(tmp_path / "out/Part.stl")[:, 2].round(3))
     assert heights[:2] == pytest.approx([0.0, 0.32])  # its name, engraved in the back
     reader = Reader(open_lab(f"{tmp_path}/lab.db"))
@@ -256,6 +260,14 @@ def test_a_tag_of_one_line_is_made_and_read(tmp_path):
         for x in (15.0, 20.0, 25.0)
     ]
     assert {(one.object, one.face) for one in answers} == {("Part", "F1")}
+
+
+def test_the_wall_of_a_hole_stays_blank_where_no_sensor_reaches(tmp_path):
+    model = Path(__file__).parents[3] / "fixtures" / "shapes" / "block_with_bore.step"
+    result = made(tmp_path, {"file": str(model)})
+    said = "cylinder F7 stays blank: a sensor 25.4 mm wide does not reach the wall of this hole"
+    assert said in result.objects[0].warnings
+    assert "F7" not in bearing(tmp_path)
 
 
 def test_a_mount_may_be_a_text_as_the_page_sends_it(tmp_path):
