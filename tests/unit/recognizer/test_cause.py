@@ -129,6 +129,7 @@ def test_every_cause_has_words_and_a_way_out():
     )  # fmt: skip
     named = [value for name, value in vars(cause).items() if name.isupper() and name[0] != "_"]
     words = {*cause.WAYS_OUT, cause.CHECKED, cause.UNCHECKED}
+    words |= {cause.AS_DESIGNED, cause.AS_BUILT, cause.NOT_MEASURED}
     codes = [one for one in named if isinstance(one, str) and one not in words]
     assert len(codes) == 14
     for code in codes:
