@@ -1,7 +1,7 @@
 """Contact engines: programs that share no model press the same touch.
 
 An engine takes a surface, a sensor, a touch and the tips' defects, and gives the force on every
-tactel and the plate at rest. A third one is a module with a value `ENGINE`, and a line in
+tactel and the plate at rest. Another one is a module with a value `ENGINE`, and a line in
 `ENGINES`.
 """
 
@@ -44,6 +44,11 @@ ENGINES = {
         "probe.contact.mujoco",
         "friction; a tip that sinks deeper into a stroke than half the stroke's width is felt as "
         "if it had slid off to the side; and what is finer than 0.1 mm on a print",
+    ),
+    "drake": EngineEntry(
+        "probe.contact.drake",
+        "friction; domes of tips, which are square; forces beyond a box's own, for which all are "
+        "stiffer; and what is finer than 0.1 mm on a print",
     ),
 }
 

@@ -2,9 +2,9 @@
 
 Sources: .npy and .npz, MATLAB files (v4 to v7 by scipy, v7.3 is HDF5), HDF5, a Zarr store as FTP-1
 has it, a table (.csv), a folder of grey pictures in the order of their names. Time may be the first
-axis of an array or, as MATLAB users have it, the last. A table holds an image a line (rows * columns numbers, row 0 first;
-a head line is skipped, and where it names `r0c0`, `r0c1`, ... as our own tables do, those columns
-are taken), or one image (rows lines of columns numbers).
+axis of an array or, as MATLAB users have it, the last. A table holds an image a line (rows * columns
+numbers, row 0 first; a head line is skipped, and where it names `r0c0`, `r0c1`, ... as our own
+tables do, those columns are taken), or one image (rows lines of columns numbers).
 
 Whole numbers 0 ... 65535 are taken as they are. Other values of a sensor type that says what
 one count is (depth in mm, force in N) are counted in that unit, below 0 as 0. Anything else
@@ -68,8 +68,9 @@ def import_array(
     ----------
     path
         A .npy, .npz, .mat or HDF5 file, or the folder of a Zarr store, with an array
-        (N, rows, columns), (rows, columns, N) or (rows, columns), the first axis taken for time where both would do; a table (.csv) or a
-        folder of pictures. Of an FTP-1 store `NAME/k` is pad k of the group `NAME`.
+        (N, rows, columns), (rows, columns, N) or (rows, columns), the first axis taken for time
+        where both would do; a table (.csv) or a folder of pictures. Of an FTP-1 store `NAME/k` is
+        pad k of the group `NAME`.
     out, replace
         The recording to be made, also in place of an older one.
     dataset

@@ -30,7 +30,7 @@ from recognizer.touch.reader import Reader
 from recognizer.validation.draw import FOREIGN
 from recognizer.validation.encoded_set import COPY, DECOY, DECOYS, NEAR, SAME_PROFILE, SIDE, SMALL
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.touch_plan import TouchPlan
+from recognizer.validation.touch_plan import ROW, TouchPlan
 from recognizer.validation.trial import ONE, POLICY_NAMES
 
 SHARD = 1000  #: touches in a file, lost at most with a run
@@ -41,7 +41,7 @@ STUDY = 200
 
 TOUCHES = "touches"  #: name of the series that is counted
 BLANK, STRANGE = "blank", "foreign"
-ON_FACES = ("face", "edge", "corner", "worn", COPY, NEAR, SMALL, SIDE)
+ON_FACES = ("face", ROW, "edge", "corner", "worn", COPY, NEAR, SMALL, SIDE)
 #: What is touched: the written STL files, what a printer leaves of them, the registered faces.
 FILES, PRINTED, REGISTERED = SURFACES = ("files", "printed", "database")
 

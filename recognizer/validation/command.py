@@ -144,8 +144,8 @@ class SetOptions(Options):
     engine: Annotated[
         str,
         Option(
-            "Who computes the contact; own. mujoco shares no model with the reader; .3 to .5 s "
-            "of CPU a touch.",
+            "Who computes the contact; own. mujoco and drake share no model with the reader; 1.7 "
+            "and .8 s of CPU a touch.",
             "|".join(ENGINES),
         ),
     ] = ""
@@ -352,12 +352,13 @@ def _print_comparison(found: dict[str, Any]) -> None:
 def _print_worlds(found: dict[str, Any]) -> None:
     names = [f"{w['run']}: {w['engine']}, {w['surface']}, {w['sensor']}" for w in found["worlds"]]
     wide = max(map(len, names), default=0)
-    heads = ("touches", "right", "wrong", "refused", "mm rms", "deg rms", "inside")
+    heads = ("touches", "right", "wrong", "refused", "mm rms", "deg rms", "inside", "err2/var")
     output.write(f"{'':{wide}}" + "".join(f"{head:>9}" for head in heads))
     for name, line in zip(names, found["worlds"], strict=True):
         cells = [f"{line[key]:,}" for key in ("touches", "right", "wrong", "rejected")]
+        inside, normalised = line["inside_95"]["share"], line["normalised"]["mean"]
         values = ((line["rms_mm"], ".3f"), (line["rms_deg"], ".3f"),
-                  (line["inside_95"]["share"], ".1%"))  # fmt: skip
+                  (inside, ".1%"), (normalised, ".2f"))  # fmt: skip
         cells += ["-" if value is None else f"{value:{digits}}" for value, digits in values]
         output.write(f"{name:{wide}}" + "".join(f"{cell:>9}" for cell in cells))
 

@@ -50,7 +50,7 @@ from recognizer.validation.encoded_set import (
     TURNED,
 )
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.touch_plan import TouchPlan, faces_of_kind, faces_of_lab
+from recognizer.validation.touch_plan import ROW, TouchPlan, faces_of_kind, faces_of_lab
 
 #: A touch inside a face keeps this far from its edges: a sensor of 25 mm then shows most of its
 #: window; nearer ones are of the kind `edge`, or `corner` about a corner.
@@ -246,6 +246,9 @@ def _sample_scene(
     if plan.kind in DECOYS:
         return _reseated(plan, encoding, face, ranges, rng)
     touch = _draw_on_face(plan, scene, most, rng, ranges)
+    if plan.kind == ROW:
+        quarters = round((touch.theta_rad + face.rotation_rad) / (math.pi / 2))
+        touch = replace(touch, theta_rad=quarters * math.pi / 2 - face.rotation_rad)
     if plan.kind == "worn":
         pitch_mm = encoding.style.pitch_mm
         scene = worn_scene(scene, face.centres_mm, face.rotation_rad, pitch_mm, plan.worn, rng)

@@ -156,7 +156,9 @@ def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: in
             fix="name a set of two objects or more, or leave out side and decoy",
             place="--kinds",
         )
-    first = members[0]
+    with read_transaction(open_database(database, writable=False)) as connection:
+        spec = read_object(connection, members[0]["name"]).spec
+    first = members[0] | {"printer": spec.get("printer", "") if isinstance(spec, dict) else ""}
     for kind in EXTRA:  # one after the other: they may be on different arrays
         if kind in kinds:
             specs = list(_extra_specs(kind, first["pitch_mm"]))
@@ -246,11 +248,13 @@ def _make(
     database: str,
     output: dict[str, str] | None = None,
 ) -> None:
-    """Make objects in the profile and at the pitch of a member of the set."""
-    style = {
+    """Make objects in the profile, at the pitch and for the printer of a member of the set."""
+    style: dict[str, Any] = {
         "profile": like["array"].rpartition(" ")[0],
         "symbols": {"pitch": f"{like['pitch_mm']:g} mm"},
     }
+    if like["printer"]:
+        style["print"] = {"printer": like["printer"]}
     whole: dict[str, Any] = {"version": 1, "objects": [style | spec for spec in specs]}
     text = json.dumps(whole | ({"output": output} if output else {}), indent=1)
     file.write_text(text + "\n", "utf-8")

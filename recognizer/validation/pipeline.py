@@ -84,6 +84,9 @@ class ValidationResult:
     bounds: tuple[ValidationBound, ...]
     folder: Path  #: with report.html, results.json and trials.parquet
     faces: int = 0  #: touches of registered faces that were followed (policy `next`)
+    normalised: tuple[float, float, float] | None = None
+    """Squared error over variance of the right answers: mean (1 is honest), median, 95 % quantile;
+    None without any."""
     within: tuple[int, ...] = ()  #: of these, right at once, within two touches, within three
 
     def __str__(self) -> str:
@@ -92,6 +95,12 @@ class ValidationResult:
             f"{self.rejected:,} refused; pose {_size(self.rms_mm, 'mm')}, "
             f"{_size(self.rms_deg, 'degrees')} rms ({self.seconds:.1f} s)"
         )
+        if self.normalised is not None:
+            mean, median, q95 = self.normalised
+            head += (
+                f"\n  squared error over variance: mean {mean:.2f}, median {median:.2f}, "
+                f"95 % quantile {q95:.2f} (1, .79, 2.6 where the covariance is right)"
+            )
         if self.within:
             shares = (f"{count:,} within {n}" for n, count in enumerate(self.within, start=1))
             head += f"\n  right of {self.faces:,} touches of registered faces: {', '.join(shares)}"
@@ -106,6 +115,7 @@ class ValidationResult:
         """Return what `validate-set --json` prints."""
         names = ("touches", "right", "wrong", "rejected", "rms_mm", "rms_deg", "seconds")
         values = {name: getattr(self, name) for name in names}
+        values["normalised"] = None if self.normalised is None else list(self.normalised)
         within = {"faces": self.faces, "within": list(self.within)} if self.within else {}
         return values | within | {"folder": str(self.folder), "holds": self.holds}
 
@@ -266,6 +276,9 @@ def result_from(results: dict[str, Any], seconds: float, folder: Path) -> Valida
         bounds=tuple(map(bound_from, results["verdict"])),
         folder=folder,
         faces=followed["touches"],
+        normalised=tuple(totals["normalised"][name] for name in ("mean", "median", "q95"))
+        if totals["right"]
+        else None,
         within=tuple(share["count"] for share in followed["within"]),
     )  # fmt: skip
 

@@ -181,7 +181,7 @@ def provenance(work: Work, folder: Path) -> dict[str, Any]:
     campaign = work.campaign
     engine = "tabs" if campaign.engine == "own" else campaign.engine
     points = engine_named(campaign.engine).points
-    contact, level = f"{engine}, {points} points a tab", f"{engine}-{points}"
+    contact, level = f"{engine}, {points} point{'s' * (points > 1)} a tab", f"{engine}-{points}"
     if campaign.overlay != "tab":
         contact = "layer" if campaign.overlay == "pad" else campaign.overlay
         level = level_for(campaign.sensor)

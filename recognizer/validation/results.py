@@ -22,6 +22,7 @@ from recognizer.validation.statistics import (
     HOLDS,
     calibration,
     inside_of,
+    normalised_errors,
     quantiles_of,
     rms,
     round_digits,
@@ -38,7 +39,7 @@ INSIDE = (0.90, 0.98)  #: of the errors inside the 95 % ellipsoid
 FACE_ANSWERED = 0.5  #: of all touches of a face; with less, the face is no use
 HARDEST = "mismatch"  #: wrong in everything at once
 
-FORMAT = 2  #: of `results.json`; 1 had no states of lines and no intervals of errors
+FORMAT = 3  #: of `results.json`; 2 had no normalised errors
 WORST = 20
 QUANTILES = (0.5, 0.9, 0.99, 1.0)
 
@@ -62,9 +63,10 @@ def line_of(rows: Columns, where: Mask) -> dict[str, Any]:
     `answered` and `wrongly` are shares of all these touches, `expected` of those that show enough
     symbols; `rms_mm` and `rms_deg` are of the right answers, `rms_mm_95` and `rms_deg_95` their
     intervals; `inside_95` is how many of these errors lie inside the answer's own 95 % ellipsoid;
-    `drawn_anew` counts draws that were no touch. `state` fails by one wrong answer, and where fewer
-    than `ANSWERED` of the touches with enough symbols are answered; `inside_state` by `INSIDE`;
-    both are empty where no bound applies.
+    `normalised` these errors squared over the answer's variances; `drawn_anew` counts draws that
+    were no touch. `state` fails by one wrong answer, and where fewer than `ANSWERED` of the touches
+    with enough symbols are answered; `inside_state` by `INSIDE`; both are empty where no bound
+    applies.
     """
     verdicts = rows["verdict"][where]
     right = where & (rows["verdict"] == RIGHT)
@@ -80,6 +82,7 @@ def line_of(rows: Columns, where: Mask) -> dict[str, Any]:
         **{f"rms_{name}": size["rms"] for name, size in sizes.items()},
         **{f"rms_{name}_95": [size["low"], size["high"]] for name, size in sizes.items()},
         "inside_95": inside_of(rows["chi2"][right]),
+        "normalised": normalised_errors(rows["chi2"][right]),
         "drawn_anew": _resampled(rows, where),
     }
     expected, inside = line["expected"], line["inside_95"]
@@ -319,6 +322,7 @@ def _pose(rows: Columns, order: Any) -> dict[str, Any]:
             "rms_mm": rms(rows["error_mm"][here]),
             "rms_deg": rms(rows["error_deg"][here]),
             "inside_95": inside_of(rows["chi2"][here]),
+            "normalised": normalised_errors(rows["chi2"][here]),
         }
         for level in names_in(rows["level"][right], order)
         if (here := right & (rows["level"] == level)).any()

@@ -34,6 +34,7 @@ from recognizer.validation.errors import SetError
 
 FORCE_N = (20.0, 120.0)  #: as a hand or an arm presses
 TILT_RAD = math.radians(2.0)  #: at most, of the wrist
+ROW = "row"
 WORN = 0.2  #: probability that a symbol of a worn face is gone
 
 
@@ -41,11 +42,12 @@ WORN = 0.2  #: probability that a symbol of a worn face is gone
 class TouchPlan:
     """How a touch is drawn.
 
-    `kind` is `face` (the sensor's centre at least `draw.INSIDE_MM` from the edges), `edge` (nearer
-    than that), `corner` (that near a corner), `worn` (a face with a share of its symbols gone),
-    `copy`, `near` or `small` (inside faces of these members, `encoded_set`), `side` (near an edge
-    next to another object), `same_profile` (a part of another lab), `anywhere` (uniform over a
-    face), one of `encoded_set.DECOYS`, or one of the surfaces of `draw.FOREIGN`.
+    `kind` is `face` (the sensor's centre at least `draw.INSIDE_MM` from the edges), `row` (the
+    same, with rows of tactels along rows or columns of symbols), `edge` (nearer to the edges),
+    `corner` (that near a corner), `worn` (a face with a share of its symbols gone), `copy`, `near`
+    or `small` (inside faces of these members, `encoded_set`), `side` (near an edge next to another
+    object), `same_profile` (a part of another lab), `anywhere` (uniform over a face), one of
+    `encoded_set.DECOYS`, or one of the surfaces of `draw.FOREIGN`.
     """
 
     database: str

@@ -3,14 +3,17 @@
     python tests/campaigns/million.py -o out/million -j 2            # about two hours
     python tests/campaigns/million.py -o out/million -j 2            # again: goes on where it was
     python tests/campaigns/million.py -o out/million --touches 5000  # the same in small
+    python tests/campaigns/million.py -o out/million --cluster HOST:PORT  # on workers of a cluster
     python tests/campaigns/million.py -o out/million --table         # of what is there
 
 Each world is a run of `validate-set` with a share of the touches: 40 objects and 40 small ones,
-own engine and MuJoCo, written files and prints, with what is wrong with sensors, light presses,
-other labs' parts and steps to a next touch. Stopped by Ctrl-C it says so (exit code 130) and goes
+letters of today and of before, every sensor type, own engine and MuJoCo, written files and prints,
+with what is wrong with sensors, light and heavy presses, touches along rows, other labs' parts and
+steps to a next touch. Stopped by Ctrl-C it says so (exit code 130) and goes
 on by the same command; at most a thousand touches are made again. What became of a world stands in
 DIR/million.json once it is finished, every wrong answer in full: with that file alone another
-machine goes on after it. Prints need PrusaSlicer.
+machine goes on after it. Prints need PrusaSlicer. `--worlds` names some of them, `own` and `small`
+before those that touch their parts.
 """
 
 from __future__ import annotations
@@ -51,6 +54,7 @@ class World:
     options: tuple[str, ...] = ()
     spec: str = "forty"  #: set that is touched
     makes: bool = False  #: the parts, as all other worlds of the set touch them
+    profile: str = ""  #: of the parts that it makes; empty: as the specs say
 
 
 def _printed(faults: str) -> tuple[str, ...]:
@@ -60,6 +64,8 @@ def _printed(faults: str) -> tuple[str, ...]:
 NEXT = ("--policy", "next", "--kinds", "face=.5,edge=.4,corner=.1")
 KNOWN = ("--kinds", "face=.55,edge=.1,corner=.05,worn=.1")
 LIGHT = ("--kinds", "face", "--levels", "light")
+HEAVY = ("--kinds", "face,row,edge", "--levels", "heavy")
+TYPES = ("fsr-8x8", "flexitac-12x32", "flexitac-16x32", "gel-24x32", "mat-32x32")
 MUJOCO = ("--engine", "mujoco", *KNOWN)
 WORLDS = {
     "own": World(0.0002, 300, makes=True),
@@ -75,6 +81,13 @@ WORLDS = {
     "small-printed-bad": World(0.01, 41, _printed("bad"), "small"),
     "light": World(0.02, 312, LIGHT),
     "small-light": World(0.01, 313, LIGHT, "small"),
+    "rows": World(0.02, 321, ("--kinds", "row")),
+    "small-rows": World(0.01, 322, ("--kinds", "row"), "small"),
+    "heavy": World(0.01, 323, HEAVY),
+    "small-heavy": World(0.005, 324, HEAVY, "small"),
+    "large": World(0.04, 325, makes=True, profile="large"),
+    "tactel-16": World(0.04, 326, makes=True, profile="tactel-16"),
+    **{name: World(0.01, 327, ("--sensor-type", name), makes=True) for name in TYPES},
     "next": World(0.01, 314, NEXT),
     "small-next": World(0.005, 315, NEXT, "small"),
     "sensors": World(0.048, 316, ("--kinds", "face,edge", "--levels", SENSORS)),
@@ -82,8 +95,8 @@ WORLDS = {
     "pad": World(0.02, 318, ("--overlay", "pad")),
     "registered": World(0.021, 319, ("--surfaces", "database")),
     "anything": World(0.0235, 320, ("--kinds", "blank,foreign")),
-    **{f"own-{k}": World(0.09, 300 + k) for k in range(1, 6)},
-    **{f"small-{k}": World(0.09, 300 + k, spec="small") for k in range(1, 3)},
+    **{f"own-{k}": World(0.06, 300 + k) for k in range(1, 6)},
+    **{f"small-{k}": World(0.0725, 300 + k, spec="small") for k in range(1, 3)},
 }
 
 
@@ -98,14 +111,20 @@ def touch(name: str, asked: argparse.Namespace) -> None:
     touches = touches_of(name, asked)
     options = [*world.options]
     if world.makes:
-        options = [str(SPECS / f"{world.spec}.yaml"), *options]
+        spec = SPECS / f"{world.spec}.yaml"
+        if world.profile:
+            text = f"profile: {world.profile}\n{spec.read_text()}"
+            spec = asked.output / f"{name}.yaml"
+            spec.write_text(text)
+        options = [str(spec), *options]
     else:
         made = "small" if world.spec == "small" else "own"
         options += ["--database", str(asked.output / made / "lab.db")]
+    workers = ("--cluster", asked.cluster) if asked.cluster else ("-j", asked.jobs)
     if "printed" in name:
         options += ["--prints", str(asked.output / f"prints-{world.spec}")]
     runner.run("recognizer.validation", *options, "--touches", touches, "--seed", world.seed,
-               "--study", 0, "--resume", "-j", asked.jobs, "-o", folder)  # fmt: skip
+               "--study", 0, "--resume", *workers, "-o", folder)  # fmt: skip
 
 
 def line_of(rows: list[runner.Row]) -> dict[str, Any]:
@@ -145,12 +164,13 @@ def table(lines: Mapping[str, dict[str, Any]]) -> None:
 
 def run(asked: argparse.Namespace, finished: dict[str, dict[str, Any]]) -> None:
     """Run the worlds that are left, each put down as soon as it is finished."""
-    for number, (name, world) in enumerate(WORLDS.items(), 1):
+    for number, name in enumerate(asked.worlds, 1):
+        world = WORLDS[name]
         there = finished.get(name, {}).get("touches") == touches_of(name, asked)
         if there and (not world.makes or (asked.output / name / "lab.db").exists()):
             continue
         start = time.monotonic()
-        print(f"run {number} of {len(WORLDS)}: {name}", end="", flush=True, file=sys.stderr)
+        print(f"run {number} of {len(asked.worlds)}: {name}", end="", flush=True, file=sys.stderr)
         touch(name, asked)
         finished[name] = line_of(runner.rows_of(asked.output / name))
         (asked.output / SUMMARY).write_text(json.dumps(finished, indent=1) + "\n")
@@ -159,7 +179,8 @@ def run(asked: argparse.Namespace, finished: dict[str, dict[str, Any]]) -> None:
 
 def main() -> int:
     """Run what is left and print the table."""
-    asked = runner.asked(__doc__, output=True, touches=1_000_000, jobs=1, table=False)
+    asked = runner.asked(__doc__, output=True, touches=1_000_000, jobs=1, cluster="",
+                         worlds=[*WORLDS], table=False)  # fmt: skip
     asked.output = asked.output.absolute()
     summary = asked.output / SUMMARY
     finished = json.loads(summary.read_text()) if summary.exists() else {}

@@ -216,14 +216,15 @@ recognize-object touch.h5 --touches 1 --overlay pad --json
 recognize-object touch.h5 --sensor-type gel-24x32 [twice]
 recognize-object touch.h5 --mcap answers.mcap --json
 recognize-object old.h5 --database old.db [twice]
-recognize-object {blank0.h5,load20.h5} [twice]
+recognize-object blank0.h5 [twice]
+recognize-object load20.h5
 recognize-object built.h5 --learn state.json --json
 recognize-object touch.h5 --sensor-state state.json --json
-recognize-object as-built built.h5 [twice]
+recognize-object as-built built.h5 --json
 recognize-object as-built built.h5 --store --material PETG
 recognize-object as-built touch.h5 [twice]
 recognize-object check touch.h5 --at Cube/F1 [twice]
-recognize-object check touches.h5 --at Cube/F3 --every [twice]
+recognize-object check touches.h5 --at Cube/F3 --every
 recognize-object check touch.h5 --at Cube/F9
 recognize-object check touch.h5
 recognize-object {gone.h5,text.h5,newer.h5,damaged.h5,bad-type.h5,other-shape.h5} [twice]
@@ -462,5 +463,5 @@ def _provide(commands: Commands) -> None:
     (folder / "blank.yaml").write_text("name: Slab\nshape: {box: [50, 40, 5]}\n")
     (folder / "set.yaml").write_text(
         "name: Pair\nobjects:\n  - {name: A, shape: {cube: 36 mm}, copies: 2}\n"
-        "  - {name: B, shape: {cone: {diameter: 50 mm, height: 40 mm}}}\n"
+        "  - {name: B, shape: {prism: {sides: 3, side: 40 mm, height: 30 mm}}}\n"
     )

@@ -22,10 +22,12 @@ from probe.recording.ros import DEFINITIONS, IMAGE
 
 CASES = {
     "step": 25,
-    "database": 60,
-    "import": 60,
-    "command": 25,
-    "spec": 250,
+    "3mf": 60,
+    "array": 60,
+    "database": 30,
+    "import": 30,
+    "command": 15,
+    "spec": 100,
 }  #: of a kind; others have `USUAL`
 USUAL = 150
 

@@ -16,7 +16,9 @@ from supply import CONSTRAINTS, ROOT, canonical, declared, needed
 
 OURS = ("encoded_objects", "generator", "decoder", "probe", "recognizer")
 #: peers of benchmarks and campaigns, which say how to install them
-APART = {"calib_targets", "newton", "pydrake", "warp"}
+APART = {"calib_targets", "newton", "warp"}
+#: of an extra that tests do not bring: the package that a module is of
+ELSEWHERE = {"pydrake": ["drake"]}
 
 
 def imported(folder):
@@ -40,7 +42,7 @@ def test_direct_imports_are_declared(folder):
     extras = declared()
     shipped = [extra for extra in extras if folder == "tests" or extra not in ("test", "docs")]
     known = {canonical(one.name) for extra in shipped for one in extras[extra]}
-    brings = packages_distributions()
+    brings = ELSEWHERE | dict(packages_distributions())
     local = {file.stem for part in ("tests", "docs/examples") for file in (ROOT / part).rglob("*")}
     missing = {}
     for name, file in imported(folder).items():

@@ -78,6 +78,7 @@ LEVELS = {
         replace(TYPICAL, name="slide-6", slide_mm=6.0),
         replace(TYPICAL, name="tilt-5", tilt_rad=math.radians(5)),
         replace(TYPICAL, name="light", force_n=(3.0, 20.0)),
+        replace(TYPICAL, name="heavy", force_n=(120.0, 400.0)),
         replace(TYPICAL, name="quarter-turn", mounting="quarter turn"),
         replace(TYPICAL, name="mirrored", mounting="mirrored"),
         replace(TYPICAL, name="transposed", mounting="transposed"),

@@ -1,9 +1,10 @@
-"""Engines of contact: MuJoCo's against numbers worked by hand, and against our own."""
+"""Engines of contact: MuJoCo's and Drake's against numbers worked by hand, and our own."""
 
 from __future__ import annotations
 
 import math
 import sys
+from importlib.util import find_spec
 from types import ModuleType
 
 import numpy as np
@@ -12,10 +13,13 @@ from manifold3d import Manifold
 from reference.indenters import Formula, block
 from scipy.optimize import brentq
 
+from encoded_objects import validate
+from encoded_objects.base.errors import MissingExtraError
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Contact, Touch, WristStiffness
 from probe.contact.engines import ENGINES, Engine, EngineEntry, engine_named
-from probe.contact.mujoco import AROUND_MM, DEEP_MM, STIFFER, mesh_under
+from probe.contact.meshes import AROUND_MM, DEEP_MM, mesh_under
+from probe.contact.mujoco import STIFFER
 from probe.contact.tips import Tips
 from probe.errors import ProbeError
 from probe.simulate.scene import bare_scene
@@ -51,17 +55,55 @@ def compression_mm(force_n, overlay=SENSOR.overlay):
     return brentq(miss, 0, 0.9 * overlay.height_mm)
 
 
-@pytest.fixture(scope="module")
-def press():
-    return engine_named("mujoco").press
+DRAKE = pytest.param(
+    "drake",
+    marks=pytest.mark.skipif(
+        find_spec("pydrake") is None, reason="pip install 'encoded-objects[drake]'"
+    ),
+)
+
+
+@pytest.fixture(scope="module", params=["mujoco", DRAKE])
+def press(request):
+    return engine_named(request.param).press
 
 
 def test_a_plane_bears_all_tabs_alike(press):
     plate = mesh(block((-30, -30, -5), (30, 30, 0)))
     found = press(plate, SENSOR, Touch(0, 0, 0.3, 100.0, wrist=RIGID), TIPS)
-    assert found.forces_n.sum() == pytest.approx(100, rel=1e-3)
+    assert found.forces_n.sum() == pytest.approx(100, rel=2e-3)
     assert found.forces_n == pytest.approx(np.full((16, 16), 100 / 256), rel=5e-3)
-    assert -found.z_mm == pytest.approx(compression_mm(100 / 256), rel=5e-3)
+    deep = compression_mm(100 / 256) if found.level == "mujoco" else 0.2  # as Drake's are stiffened
+    assert -found.z_mm == pytest.approx(deep, rel=5e-3)
+
+
+@pytest.mark.parametrize("engine", [DRAKE])
+def test_boxes_bear_as_their_pressure_field_says(engine):
+    """A box of modulus E, pressed d deep, bears 4 E / 3 a of a^3 - (a - d)^3; a, half its side."""
+    from probe.contact.drake import half_side_mm
+
+    plate = mesh(block((-30, -30, -5), (30, 30, 0)))
+    found = engine_named(engine).press(plate, SENSOR, Touch(0, 0, 0.3, 3.0, wrist=RIGID), TIPS)
+    a, d = half_side_mm(SENSOR), -found.z_mm
+    modulus = SENSOR.overlay.young_mpa * a / SENSOR.overlay.height_mm
+    assert 0 < d < 0.1
+    one = 4 * modulus / (3 * a) * (a**3 - (a - d) ** 3)
+    assert found.forces_n == pytest.approx(np.full((16, 16), one), rel=5e-3)
+
+
+@pytest.mark.parametrize("engine", [DRAKE])
+def test_touches_in_another_engine_are_read(engine, tmp_path):
+    spec = tmp_path / "cube.yaml"
+    spec.write_text("name: Cube\nshape: {cube: 45 mm}\n")
+    found = validate(spec, folder=tmp_path / "run", touches=3, kinds="face", engine=engine)
+    assert (found.right, found.wrong) == (3, 0)
+
+
+def test_an_engine_that_is_not_installed_says_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pydrake", None)
+    monkeypatch.delitem(sys.modules, "probe.contact.drake", raising=False)
+    with pytest.raises(MissingExtraError, match=r"engine drake needs pydrake.*objects\[drake\]"):
+        engine_named("drake")
 
 
 def test_rows_and_columns_stand_as_the_sensor_frame_says(press):
@@ -121,6 +163,14 @@ def test_heights_alone_feel_as_their_body_does(press):
     assert heights.z_mm == pytest.approx(body.z_mm, abs=0.02)
 
 
+def test_triangles_that_close_no_body_are_taken_as_heights():
+    upper = block((-30, -30, -5), (30, 30, 0))
+    upper = upper[(upper[:, :, 2] == 0).all(axis=1)]
+    corners, faces = mesh_under(mesh(upper), SENSOR, Touch(0, 0, 0, 1.0))
+    assert (corners[:, 2].min(), corners[:, 2].max()) == (-2 * DEEP_MM, 0)
+    assert len(faces) == 12
+
+
 @pytest.mark.parametrize(
     ("surface", "sensor", "touch", "says"),
     [
@@ -136,7 +186,7 @@ def test_what_cannot_be_touched_is_refused(press, surface, sensor, touch, says):
         press(given, sensor, touch, TIPS)
 
 
-def test_a_third_engine_is_one_module_and_one_line(monkeypatch):
+def test_another_engine_is_one_module_and_one_line(monkeypatch):
     def press_alike(surface, sensor, touch, tips):
         assert tips.points == 19
         each = touch.force_n / (sensor.rows * sensor.columns)

@@ -23,6 +23,7 @@ from recognizer.validation.statistics import (
     calibration,
     chi2_quantile,
     clopper_pearson,
+    normalised_errors,
     rms_interval,
     round_digits,
     share_of,
@@ -66,6 +67,12 @@ def test_an_honest_covariance_is_calibrated_and_a_proud_one_is_not():
     for line in calibration(errors):
         assert line["low"] - 0.01 < line["expected"] < line["high"] + 0.01
     assert calibration(4 * errors)[2]["share"] < 0.7
+    honest, proud = normalised_errors(errors), normalised_errors(4 * errors)
+    assert honest["low"] < 1 < honest["high"]
+    assert (honest["median"], honest["q95"]) == pytest.approx((0.789, 2.605), rel=0.05)
+    assert proud["mean"] == pytest.approx(4 * honest["mean"], rel=1e-5)
+    none = normalised_errors(errors[:0])
+    assert (none["of"], none["mean"], none["high"]) == (0, None, None)
 
 
 def test_numbers_are_rounded_to_six_digits_and_nothing_counted_says_nothing():
