@@ -2,9 +2,9 @@
 
 Sources: .npy and .npz, MATLAB files (v4 to v7 by scipy, v7.3 is HDF5), HDF5, a Zarr store as FTP-1
 has it, a table (.csv), a folder of grey pictures in the order of their names. Time may be the first
-axis of an array or, as MATLAB users have it, the last. A table holds an image a line (rows * columns
-numbers, row 0 first; a head line is skipped, and where it names `r0c0`, `r0c1`, ... as our own
-tables do, those columns are taken), or one image (rows lines of columns numbers).
+axis of an array or, as MATLAB users have it, the last. A table holds an image a line (rows *
+columns numbers, row 0 first; a head line is skipped, and where it names `r0c0`, `r0c1`, ... as our
+own tables do, those columns are taken), or one image (rows lines of columns numbers).
 
 Whole numbers 0 ... 65535 are taken as they are. Other values of a sensor type that says what
 one count is (depth in mm, force in N) are counted in that unit, below 0 as 0. Anything else
