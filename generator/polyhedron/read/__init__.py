@@ -1,4 +1,4 @@
-"""Polyhedra from files: STL and OBJ, whose curved regions stay blank, and STEP with round faces.
+"""Polyhedra from files: STL, OBJ and STEP; cylinders and cones are round faces, the rest is blank.
 
 A mesh file holds triangles or polygons in mm; coplanar ones that hang together become one
 face with its holes. A STEP file's own unit is honoured. One body per file.
@@ -33,8 +33,9 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
 
     `scale` in [1e-6, 1e6] makes the model larger about its origin; round faces are divided at that
     size. The solid is of kind `file`; its faces F1, F2, ... are in the order in which the file
-    first shows them, coordinates mm. Cylinder and cone faces of STEP are runs of facets, its
-    `surfaces`; other round faces are facets that stay `blank`.
+    first shows them, coordinates mm. Cylinder and cone faces of STEP, and walls of a
+    mesh that were divided from rim to rim, are runs of facets, its `surfaces`; other round faces
+    are facets that stay `blank`.
 
     Raises `ShapeError` with file, place, cause and way out: no such file, too large, truncated, not
     closed, several bodies, a mesh of too many faces, larger than 10 m.

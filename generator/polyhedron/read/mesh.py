@@ -1,4 +1,4 @@
-"""Polygons of a mesh -> the solid that they enclose, its curved regions `blank`.
+"""Polygons of a mesh -> the solid that they enclose: round walls, other curved regions `blank`.
 
 Where a mesh makes no solid as it stands, points a little farther apart are welded: programs
 that round what they cut leave walls of a thousandth of a millimetre, which touch themselves.
@@ -20,20 +20,19 @@ from generator.errors import ShapeError
 from generator.plane.polygon import face_vector
 from generator.polyhedron.read.merge import merge_triangles
 from generator.polyhedron.read.soup import Soup, cluster_labels, weld_coarsely
-from generator.polyhedron.winged import Face, Polyhedron, polyhedron
+from generator.polyhedron.read.walls import BEND, SMOOTH_RAD, round_walls
+from generator.polyhedron.winged import Face, Polyhedron, polyhedron, winged_edges
 
 Floats = NDArray[np.float64]
 Loops = tuple[tuple[int, ...], ...]
 MOST_FACES = 100  #: of more, those that bend belong to curved surfaces, and stay blank
-SMOOTH_RAD = 0.36  #: facets of one curved surface meet at no more: circles of 18 sides and more
-BEND = 0.5  #: radius, as a share of the size, above which narrow faces are planar ones
 FAINT_RAD = 0.02  #: strips that meet at less belong to one curved surface of any radius
 STRIP = 0.05  #: width of such a strip, as a share of the size
 LISTED = 6  # regions that a note names with their places
 
 
 def solid_of_soup(soup: Soup, kind: str, scale: float = 1.0) -> Polyhedron:
-    """Return the solid of closed polygons, `scale` times larger, its curved regions `blank`.
+    """Return the solid of closed polygons, `scale` times larger.
 
     Raises `ShapeError` as `merge_triangles` and `polyhedron` do of the mesh as it stands.
     """
@@ -59,28 +58,45 @@ def _solid(soup: Soup, kind: str, scale: float) -> Polyhedron:
 def _mesh_polyhedron(kind: str, vertices: Floats, faces: list[Loops]) -> Polyhedron:
     """Return the solid of a mesh; of more than `MOST_FACES`, curved regions stay blank.
 
-    Planar faces are called F1, F2, ... in the order of the file, then each curved region is one
-    face of many facets: F9, F9.2, F9.3, ...
+    Planar faces are called F1, F2, ... in the order of the file, then each round wall and each
+    curved region is one face of many facets: F9, F9.2, F9.3, ...
     """
-    if len(faces) <= MOST_FACES:
-        return polyhedron(kind, vertices, faces)
-    regions = _curved_regions(vertices, faces)
-    curved = {face for region in regions for face in region}
-    names = {}
-    for number, face in enumerate((f for f in range(len(faces)) if f not in curved), 1):
-        names[face] = f"F{number}"
+    solid = polyhedron(kind, vertices, faces)
+    vertices, loops = solid.vertices, [face.loops for face in solid.faces]
+    normals, areas = _normals(vertices, loops)
+    walls = round_walls(solid, normals)
+    round_facets = {facet for wall, _ in walls for facet in wall.facets}
+    regions = []
+    if len(faces) > MOST_FACES:
+        regions = _curved_regions(vertices, loops, normals, areas)
+        regions = [[f for f in region if f not in round_facets] for region in regions]
+        regions = [region for region in regions if region]
+    if not walls and not regions:
+        return solid
+    for wall, facets in walls:
+        for facet, loop in zip(wall.facets, facets, strict=True):
+            loops[facet] = (loop,)
+    blank = {face for region in regions for face in region}
+    planar = (f for f in range(len(loops)) if f not in blank and f not in round_facets)
+    names = {face: f"F{number}" for number, face in enumerate(planar, 1)}
     first = len(names) + 1
-    for number, region in enumerate(regions, first):
-        names |= {f: f"F{number}.{k}" if k > 1 else f"F{number}" for k, f in enumerate(region, 1)}
-    solid = polyhedron(kind, vertices, [Face(names[k], loops) for k, loops in enumerate(faces)])
-    blank = tuple(sorted(curved))
-    notes = (*solid.notes, *_notes(vertices, faces, regions, first))
-    return replace(solid, blank=blank, notes=notes)
+    runs = [list(wall.facets) for wall, _ in walls] + regions
+    for number, run in enumerate(runs, first):
+        names |= {f: f"F{number}.{k}" if k > 1 else f"F{number}" for k, f in enumerate(run, 1)}
+    return replace(
+        solid,
+        faces=tuple(Face(names[k], own) for k, own in enumerate(loops)),
+        edges=winged_edges(loops),
+        surfaces=tuple(wall for wall, _ in walls),
+        blank=tuple(sorted(blank)),
+        notes=(*solid.notes, *_notes(vertices, loops, regions, first + len(walls))),
+    )
 
 
-def _curved_regions(vertices: Floats, faces: list[Loops]) -> list[list[int]]:
+def _curved_regions(
+    vertices: Floats, faces: list[Loops], normals: Floats, areas: Floats
+) -> list[list[int]]:
     """Return the faces of each curved surface, in order."""
-    normals, areas = _normals(vertices, faces)
     owner: dict[tuple[int, int], int] = {}
     pairs: list[tuple[int, int]] = []
     lengths: list[float] = []

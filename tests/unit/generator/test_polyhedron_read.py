@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 from generator.errors import ShapeError
+from generator.plane.polygon import signed_area
 from generator.polyhedron import SHAPES, volume
+from generator.polyhedron.development import development
+from generator.polyhedron.frame import face_area
 from generator.polyhedron.read import merge, read_shape
 
 SHAPES_FOLDER = Path(__file__).parents[3] / "fixtures" / "shapes"
@@ -210,24 +213,104 @@ def test_too_many_faces_are_counted_not_called_curved(written, monkeypatch):
     assert error.cause.endswith(" mm^2; 1000 are allowed")
 
 
-def rounded_bar(steps):
+def rounded_bar(steps, across=10):
     """Return the triangles of a bar of 60 x 40 x 50 mm, one long edge rounded by 10 mm."""
     turn = np.linspace(0, np.pi / 2, steps + 1)
-    arc = np.stack([50 + 10 * np.cos(turn), 30 + 10 * np.sin(turn)], axis=1)
+    arc = np.stack([60 - across * (1 - np.cos(turn)), 30 + 10 * np.sin(turn)], axis=1)
     ring = [(0, 0), (60, 0), *arc.tolist(), (0, 40)]
     return prism(ring, 50, [(0, k, k + 1) for k in range(1, len(ring) - 1)])
 
 
 def test_planar_faces_of_a_rounded_mesh_keep_their_symbols(written):
-    solid = read_shape(written("r.stl", rounded_bar(100)))
+    solid = read_shape(written("r.stl", rounded_bar(100, across=14)))  # no circle
     blank = [solid.faces[face].name for face in solid.blank]
     assert blank == ["F7", *(f"F7.{k}" for k in range(2, 101))]
     plain = [f.name for k, f in enumerate(solid.faces) if k not in solid.blank]
     assert sorted(plain) == [f"F{k}" for k in range(1, 7)]
-    assert volume(solid) == pytest.approx(50 * (2400 - 100 + 25 * np.pi), rel=1e-4)
-    assert "100 of 106 facets: F7 about (55, 35, 25)" in solid.notes[-1]
-    few = read_shape(written("f.stl", rounded_bar(20)))
-    assert (len(few.faces), few.blank) == (26, ())
+    assert volume(solid) == pytest.approx(50 * (2400 - 140 + 35 * np.pi), rel=1e-4)
+    assert "100 of 106 facets: F7 about (53, 35, 25)" in solid.notes[-1]
+    few = read_shape(written("f.stl", rounded_bar(20, across=14)))
+    assert (len(few.faces), few.blank, few.surfaces) == (26, (), ())
+
+
+def lathe(*rings, sides=40, squash=1.0):
+    """Return the triangles of a solid of revolution through rings (radius, z), from below."""
+    turn = 2 * np.pi * np.arange(sides) / sides
+    p = np.array([np.stack([r * np.cos(turn), squash * r * np.sin(turn), turn * 0 + z], axis=1)
+                  for r, z in rings])  # fmt: skip
+    found = [*fan(p[0][::-1]), *fan(p[-1])]
+    for a, b in itertools.pairwise(p):
+        for k in range(-1, sides - 1):
+            found += [(a[k], a[k + 1], b[k + 1]), (a[k], b[k + 1], b[k])]
+    return found
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(
+    ("triangles", "walls"),
+    [
+        (lathe((30, 0), (30, 60), sides=200), [("cylinder", 200, 30, 0)]),
+        (lathe((40, 0), (40, 80), sides=30), [("cylinder", 30, 40, 0)]),
+        (lathe((25, 0), (35, 80)), [("cone", 40, 35, np.arctan(1 / 8))]),
+        (lathe((30, 0), (30, 40), (20, 40), (20, 70)),
+         [("cylinder", 40, 30, 0), ("cylinder", 40, 20, 0)]),
+        (lathe((30, 0), (30, 60), (29.8, 61), (29.1, 62), (28.2, 62.7), (27, 63)),
+         [("cylinder", 40, 30, 0)]),
+        (rounded_bar(40), [("cylinder", 40, 10, 0)]),
+        (rounded_bar(8), [("cylinder", 8, 10, 0)]),
+    ],
+    ids=["fine", "coarse", "cup", "shoulder", "fillet", "arc", "coarse arc"],
+)  # fmt: skip
+def test_round_walls_of_a_mesh_are_cylinders_and_cones(written, triangles, walls, turned):
+    turn = np.linalg.qr(np.random.default_rng(36).normal(size=(3, 3)))[0] if turned else np.eye(3)
+    solid = read_shape(
+        written("w.stl", np.array(triangles)[:, :: int(np.linalg.det(turn).round())] @ turn)
+    )
+    found = [
+        (one.kind, len(one.facets), one.radius_mm, one.half_angle_rad) for one in solid.surfaces
+    ]
+    assert [one[:2] for one in found] == [one[:2] for one in walls]
+    for one, wanted in zip(found, walls, strict=True):
+        assert one[2:] == pytest.approx(wanted[2:], abs=2e-3)
+    for one in solid.surfaces:
+        flat = development(solid, one)
+        assert sum(face_area(solid, k) for k in one.facets) == pytest.approx(
+            signed_area(flat.outline), rel=1e-5
+        )
+        assert not set(one.facets) & set(solid.blank)
+
+
+@pytest.mark.parametrize(
+    "triangles",
+    [
+        lathe((30, 0), (30, 60), squash=1.01),
+        lathe((30, 0), (30, 60), sides=64, squash=1.03),
+        lathe((30, 0), (30, 60), sides=12),
+        lathe((100, 0), (100, 60), sides=24),  # facets of 26 mm carry symbols themselves
+        sphere(12, 24),
+        lathe(*((20 + 3 * np.sin(z), 10 * z) for z in np.linspace(0.5, 2.6, 8))),
+    ],
+    ids=["oval", "fine oval", "twelve sides", "wide facets", "sphere", "barrel"],
+)
+def test_what_is_nearly_round_is_no_cylinder(written, triangles):
+    assert read_shape(written("n.stl", triangles)).surfaces == ()
+
+
+def test_a_wall_with_a_hole_is_round_beside_the_hole(written):
+    """A window of three facets is cut through the wall of a tube; the others stay one wall."""
+    from manifold3d import Manifold
+
+    tube = Manifold.cylinder(60, 30, 30, 48) - Manifold.cylinder(80, 25, 25, 48).translate(
+        (0, 0, 5)
+    )
+    mesh = (tube - Manifold.cube((40, 9, 20)).translate((0, -3, 20))).to_mesh()
+    corners = np.asarray(mesh.vert_properties)[:, :3][np.asarray(mesh.tri_verts)]
+    solid = read_shape(written("h.stl", corners))
+    assert [(one.kind, one.closed, one.concave) for one in solid.surfaces] == [
+        ("cylinder", False, False),
+        ("cylinder", False, True),
+    ]
+    assert all(43 <= len(one.facets) < 48 for one in solid.surfaces)
 
 
 def test_corners_on_other_edges_are_joined(written):
