@@ -14,7 +14,7 @@ from encoded_objects.base.errors import EncodedObjectsError
 from generator.command import run as encode_object
 from probe.recording.imported import import_array
 from recognizer.validation import encoded_set
-from recognizer.validation.benchmark import FIRST, _figures_of, digest_of, run_benchmark
+from recognizer.validation.benchmark import FIRST, FROZEN, _figures_of, digest_of, run_benchmark
 from recognizer.validation.command import run
 
 PAGE = Path(__file__).parents[2] / "docs" / "benchmark.md"
@@ -41,6 +41,7 @@ def made(tmp_path_factory):
 def test_the_public_half_is_as_frozen_and_the_hidden_one_is_other(made):
     folder, found = made
     assert found["frozen"] == {WORLD: True}
+    assert json.loads(FROZEN.read_text())[WORLD][str(FIRST)]
     public, hidden = (
         dict(np.load(folder / half / f"{WORLD}.npz")) for half in ("public", "hidden")
     )
