@@ -28,6 +28,7 @@ from recognizer.touch.lab import EmbossedArray, Lab
 from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
 from recognizer.touch.recognition import (
     AMBIGUOUS,
+    AS_DESIGNED,
     NO_CONTACT,
     NOT_ENCODED,
     OUTSIDE,
@@ -150,6 +151,7 @@ def _answer_of(
         seq=seq, object=face.object, face=face.face, index=index(place), T_face_probe=pose,
         T_object_probe=pose_on_object(face, pose), covariance=covariance,
         margin=decoded.margin, runner_up=runner_up, reason="",
+        part=AS_DESIGNED if face.printed is None else face.printed.part,
     )  # fmt: skip
 
 

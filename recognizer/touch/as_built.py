@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from generator.database.as_built import AsBuilt
+from recognizer.touch.recognition import AS_BUILT, AS_DESIGNED, NOT_MEASURED
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 SCALE_SD = 0.004  #: of the part that both axes have in common
 APART_SD = 0.002  #: of the difference between the two
 SKEW_SD_RAD = 0.001
+UNUSUAL = 6.25  #: times these variances at most, where a touch shows another scale: to one of 1 %
 ASIDE_SD_MM = 0.02  #: each way, of the place of symbols, beyond scale and skew
 DIFFERENCE = 1e-6  #: of scales and skew, of the differences that stand for derivatives
 
@@ -50,10 +52,14 @@ def usual_print() -> AsBuilt:
     covariance = np.zeros((4, 4))
     covariance[:2, :2] = common
     covariance[[0, 1, 2], [0, 1, 2]] += apart, apart, SKEW_SD_RAD**2
-    return AsBuilt(
-        object_id=None, part=None, printer="", material="", scale_x=1.0, scale_y=1.0, skew_rad=0.0,
-        stroke_mm=1.0, covariance=covariance, touches=0,
-    )  # fmt: skip
+    return replace(DESIGNED, covariance=covariance)
+
+
+#: A part that is as its file: a simulated one.
+DESIGNED = AsBuilt(
+    object_id=None, part=None, printer="", material="", scale_x=1.0, scale_y=1.0, skew_rad=0.0,
+    stroke_mm=1.0, covariance=np.zeros((4, 4)), touches=0,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +79,13 @@ class PrintedFace:
     #: (4, 4), mm, but with the origin where a print keeps its place: places on a face are counted
     #: from the middle of its printed symbols, which backlash and layers move with the whole face
     T_part_face: Array
+
+    @property
+    def part(self) -> str:
+        """What the pose takes the part for, as `Recognition.part` says it."""
+        if self.as_built is DESIGNED:
+            return AS_DESIGNED
+        return AS_BUILT if self.as_built.touches else NOT_MEASURED
 
     def pose(
         self, T_face_probe: Array, covariance: Array, by_touch: TouchScale | None = None
@@ -107,7 +120,8 @@ class PrintedFace:
         along = np.eye(3)
         R = self.T_part_face[:3, :3]
         along[:2, :2] = (R.T @ print_matrix(print_) @ R)[:2, :2]
-        floor = np.diag([ASIDE_SD_MM**2, ASIDE_SD_MM**2, 0.0])
+        aside = 0.0 if self.as_built is DESIGNED else ASIDE_SD_MM**2
+        floor = np.diag([aside, aside, 0.0])
         return printed, along @ alone @ along.T + by_print @ spread @ by_print.T + floor
 
     def _with_scale(
@@ -120,9 +134,15 @@ class PrintedFace:
             return print_, spread
         excess = self._excess(print_)
         by = _slopes(self._excess, print_, excess)[0]
-        gain = spread @ by / (by @ spread @ by + 1.0 / precision)
         away = by_touch.excess / (variance * precision) - float(excess[0])
-        return print_ + gain * away, spread - np.outer(gain, by @ spread)
+        gain = spread @ by / (by @ spread @ by + 1.0 / precision)
+        found, usual = print_ + gain * away, float(by @ spread @ by)
+        if self.as_built.touches == 0 and usual > 0:
+            # No usual print: the spread under which the scale of this touch is likeliest. The pose
+            # stays where usual prints have it, the ellipse grows.
+            spread = spread * min(max((away**2 - 1.0 / precision) / usual, 1.0), UNUSUAL)
+            gain = spread @ by / (by @ spread @ by + 1.0 / precision)
+        return found, spread - np.outer(gain, by @ spread)
 
     def _excess(self, print_: Array) -> Array:
         """Return (1,) lattice over print, less 1, by a touch of the face."""

@@ -41,6 +41,7 @@ class ReaderOptions:
     contact_n: float = 0.05  #: where readings are newtons
     scale_sd: float = 0.01  #: standard deviation of a print's scale
     scale_most: float = 0.03  #: largest deviation of a print's scale that is read
+    as_designed: bool = False  #: parts are as their files (simulated): no print to allow for
     first: Effort = Effort()  #: of the first search
     #: of the second, of touches that the first does not answer or of which few cells agree: five
     #: times the work (`docs/recognizer.md`)

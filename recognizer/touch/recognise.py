@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from recognizer.touch.as_built import DESIGNED
 from recognizer.touch.chance import (
     expected_by_border,
     expected_matches,
@@ -33,6 +34,7 @@ from recognizer.touch.pose import face_covariance, face_pose, felt_scale, inside
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import (
     AMBIGUOUS,
+    AS_DESIGNED,
     EXCHANGED,
     NO_CONTACT,
     OUTSIDE,
@@ -280,10 +282,12 @@ def answer_at(
     inside = inside_mm(face, float(pose[0, 3]), float(pose[1, 3]))
     if inside < -options.rim_mm:
         return refusal(seq, OUTSIDE, margin=margin, runner_up=runner_up)
-    covariance = face_covariance(face, fit.covariance)
+    covariance, part = face_covariance(face, fit.covariance), AS_DESIGNED
     if face.printed is not None:
         felt = felt_scale(face, fit, options.scale_sd)
-        pose, covariance = face.printed.pose(pose, covariance, felt)
+        printed = replace(face.printed, as_built=DESIGNED) if options.as_designed else face.printed
+        pose, covariance = printed.pose(pose, covariance, felt)
+        part = printed.part
     return Recognition(
         seq=seq,
         object=face.object,
@@ -299,4 +303,5 @@ def answer_at(
         scale=fit.scale,
         stroke_mm=embossed.style.stroke_mm + fit.stroke_excess * STROKE_UNIT_MM,
         inside_mm=inside if face.round is None else None,
+        part=part,
     )

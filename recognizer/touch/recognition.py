@@ -41,6 +41,9 @@ UNCLEAR = "unclear"
 # Whether a touch placed by hand has shown how the sensor is mounted.
 UNCHECKED, CHECKED = "unchecked", "checked"
 
+# What the covariance allows for beyond the image: nothing, what `as-built` measured, a usual print.
+AS_DESIGNED, AS_BUILT, NOT_MEASURED = "as designed", "as built", "not measured"
+
 Numbers = Mapping[str, float]
 
 #: What a person does about a reason.
@@ -147,6 +150,11 @@ class Recognition:
     """`CHECKED` where `recognize-object check` has found how the sensor is mounted: a sensor that
     is turned by quarters gives poses that are turned, and no touch by itself shows it."""
 
+    part: str = ""
+    """What the pose and its covariance take the part for: `AS_DESIGNED` (a simulated one, and every
+    round face), `AS_BUILT` (its print or its printer was measured), `NOT_MEASURED` (a print within
+    the usual spread); empty where it does not answer."""
+
     def __bool__(self) -> bool:
         return self.object is not None
 
@@ -170,6 +178,7 @@ class Recognition:
             f"{self.object}/{self.face} at ({self.x_mm:.2f}, {self.y_mm:.2f}) mm{given}"
             f" turned {self.theta_deg:.1f} degrees; array {self.index or (0, 0)}; "
             + ("no other place comes near" if alone else f"margin {self.margin:.0f} nats")
+            + (f"; part {self.part}" if self.part else "")
         )
 
     @property
@@ -238,6 +247,7 @@ class Recognition:
             "stroke_mm": self.stroke_mm,
             "next": None if self.next is None else asdict(self.next),
             "mounting": self.mounting,
+            "part": self.part or None,
         }
 
 

@@ -171,6 +171,7 @@ def _true_face(reader: Reader, found: DrawnTouch) -> tuple[Prepared, int] | None
 
 def limit_of(plan: TouchPlan, number: int, reader: Reader) -> Row:
     """Return the row of a touch, as the trial of that number makes it."""
+    reader = plan.knowing(reader)
     found = draw_touch(plan, number, reader)
     signal = reader.signal(found.counts)
     row: Row = dict.fromkeys(COLUMNS, math.nan) | {"number": number, "likeliest": False}

@@ -59,7 +59,8 @@ def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]
             fix=f"give 0 ... {series.touches - 1}",
             place=str(folder),
         )
-    reader, plan = reader_now(work), work.plan(series, number)
+    plan = work.plan(series, number)
+    reader = plan.knowing(reader_now(work))
     found = draw_touch(plan, number, reader)
     answer = recognise(reader, reader.signal(found.counts), number)
     row = judge(plan, number, found, answer, reader).row()

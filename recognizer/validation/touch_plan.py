@@ -29,6 +29,7 @@ from probe.simulate.registered import (
 from probe.simulate.scene import Scene, TouchRanges
 from probe.simulate.world.levels import LEVELS, Level
 from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.reader import Reader
 from recognizer.validation.encoded_set import DECOYS, is_extra
 from recognizer.validation.errors import SetError
 
@@ -71,6 +72,15 @@ class TouchPlan:
         """Faults of the sensor; a printed surface brings the print's faults itself."""
         level = LEVELS[self.level]
         return replace(level, wider_mm=0.0, scale=0.0) if self.prints else level
+
+    def knowing(self, reader: Reader) -> Reader:
+        """Return a reader that knows where parts are as designed: files and faces without faults.
+
+        A print, also that of a level, is one that nobody has measured.
+        """
+        if self.prints or self.noise.scale or self.noise.wider_mm:
+            return reader
+        return replace(reader, options=replace(reader.options, as_designed=True))
 
     def ranges(self, sensor: SensorType) -> TouchRanges:
         """Return forces and tilts, those of the level if it has its own.

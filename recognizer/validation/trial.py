@@ -100,6 +100,7 @@ OF_ANSWER = ("verdict", "reason", "answer", "error_mm", "error_deg", "chi2", "ma
 
 def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
     """Return the outcome of one touch, or of those that followed it: first place, last answer."""
+    reader = plan.knowing(reader)
     if plan.policy == NEXT:
         made = list(touch_until_answered(plan, number, reader, MOST))
         spent = sum(one.seconds for one in made)

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from encoded_objects import encode, simulate
 from generator.database.as_built import AsBuilt
 from probe.contact.contract import Touch
 from probe.contact.press import press
@@ -25,8 +26,10 @@ from recognizer.errors import AsBuiltError
 from recognizer.touch.as_built import (
     APART_SD,
     ASIDE_SD_MM,
+    DESIGNED,
     SCALE_SD,
     SKEW_SD_RAD,
+    UNUSUAL,
     PrintedFace,
     TouchScale,
     print_matrix,
@@ -35,6 +38,7 @@ from recognizer.touch.as_built import (
     usual_print,
 )
 from recognizer.touch.lab import open_lab
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
 from recognizer.touch.source import TouchImage
 
@@ -244,6 +248,49 @@ def test_a_place_that_hangs_on_the_scale_moves_with_it():
     left = covariance - np.outer((1e-5, 0, 1e-7), (1e-5, 0, 1e-7)) / 1e-6
     floor = np.diag([ASIDE_SD_MM**2] * 2 + [0.0])
     np.testing.assert_allclose(told, left + floor, atol=1e-9)
+
+
+def test_of_a_part_as_designed_nothing_is_allowed_for():
+    """Its scale is known to be 1: what was felt of it moves the place, and leaves no spread."""
+    T_part_face = at_rest(-30.0, 5.0)
+    own = np.diag([4e-4, 1e-4, 1e-6])
+    found, covariance = PrintedFace(DESIGNED, T_part_face).pose(at_rest(20.0, 10.0), own, felt(0.0))
+    np.testing.assert_allclose(found, at_rest(20.0, 10.0), atol=1e-9)
+    np.testing.assert_allclose(covariance, own, atol=1e-12)
+
+
+def test_a_touch_that_shows_an_unusual_scale_widens_its_ellipse_and_stays():
+    usual = PrintedFace(usual_print(), np.eye(4))
+    own, at = np.diag([1e-4, 1e-4, 1e-6]), at_rest(30.0, 0.0)
+    print_ = PrintedFace(print_with(covariance=usual_print().covariance), np.eye(4))
+    for excess, wider in ((0.003, 1.0), (0.012, 3.0), (0.06, UNUSUAL)):
+        found, covariance = usual.pose(at, own, felt(excess, 4e-3))
+        measured, known = print_.pose(at, own, felt(excess, 4e-3))
+        np.testing.assert_allclose(found, measured, atol=1e-12)
+        grown = covariance[0, 0] / known[0, 0]
+        assert 1.0 <= grown <= wider
+        assert (grown > 1.0) == (wider > 1.0)
+
+
+def test_an_answer_says_what_it_takes_the_part_for():
+    faces = (DESIGNED, usual_print(), print_with())
+    said = [PrintedFace(one, np.eye(4)).part for one in faces]
+    assert said == ["as designed", "not measured", "as built"]
+
+
+def test_a_reader_that_knows_parts_as_designed_is_surer_of_the_same_place(tmp_path):
+    database = f"{tmp_path}/lab.db"
+    spec = {"name": "Cube", "shape": {"cube": "40 mm"}}
+    encode(spec, database=database, folder=tmp_path, formats=())
+    touch = simulate(f"{database}#Cube/F1", x=26, y=14, theta=23, force=80)
+    counts, lab = next(touch.frames()).counts, open_lab(database)
+    usual = Reader(lab).read(counts)
+    known = Reader(lab, options=ReaderOptions(as_designed=True)).read(counts)
+    assert (usual.part, known.part) == ("not measured", "as designed")
+    assert str(usual).endswith("; part not measured")
+    assert known.as_json()["part"] == "as designed"
+    assert usual.index == known.index
+    assert (np.diag(known.covariance) < np.diag(usual.covariance)).all()
 
 
 def test_on_a_wall_the_height_is_as_designed_and_the_scale_felt_is_half():

@@ -407,6 +407,8 @@ def test_only_what_is_refused_has_a_cause(reads, monkeypatch):
 
 def test_a_print_is_posed_by_the_scale_that_is_felt(reads, monkeypatch):
     class Print:
+        part = "as printed"
+
         @staticmethod
         def pose(pose, covariance, felt):
             assert felt == ("felt", READER.options.scale_sd)
@@ -421,6 +423,7 @@ def test_a_print_is_posed_by_the_scale_that_is_felt(reads, monkeypatch):
     answer, _, _ = reads.read([found])
     assert (answer.T_face_probe == 2 * plain.T_face_probe).all()
     assert (answer.covariance == 3 * plain.covariance).all()
+    assert (plain.part, answer.part) == ("as designed", "as printed")
 
 
 def test_only_flat_faces_say_how_far_inside_a_touch_lies(reads, monkeypatch):
@@ -487,7 +490,7 @@ def test_where_the_print_is_known_the_pose_is_that_on_the_print(reads):
         return moved, 2 * covariance
 
     plain, _, _ = reads.read([reads.one()])
-    reads.lab.known[0].printed = SimpleNamespace(pose=pose)
+    reads.lab.known[0].printed = SimpleNamespace(pose=pose, part="")
     answer, _, _ = reads.read([reads.one()])
     assert answer.x_mm == plain.x_mm + 1.5
     np.testing.assert_array_equal(answer.covariance, 2 * plain.covariance)
