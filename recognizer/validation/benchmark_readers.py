@@ -237,7 +237,7 @@ def network(world: ReaderWorld) -> Read:
     one_hot = np.eye(len(names) + 1)[label]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
-        which = MLPClassifier(early_stopping=len(known) >= 200, **options).fit(inputs, label)
+        which = MLPClassifier(**options).fit(inputs, label)
         where = MLPRegressor(**options).fit(
             np.c_[inputs, one_hot][some], np.c_[place, np.cos(turn), np.sin(turn)][some]
         )
