@@ -130,7 +130,8 @@ def import_(
     array: Annotated[
         Path,
         Argument(".npy, .npz, .mat or HDF5 with images (N, rows, columns), .csv with an image a "
-                 "line, a folder of grey pictures, or .mcap with sensor_msgs/Image.", "FILE"),
+                 "line, a folder of grey pictures or a Zarr store (FTP-1), or .mcap with "
+                 "sensor_msgs/Image.", "FILE"),
     ],
     output: Output,
     dataset: Annotated[str | None, Option("Which array, where there are several.", "NAME")] = None,

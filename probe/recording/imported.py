@@ -1,10 +1,10 @@
 """Others' images -> a recording of counts.
 
-Sources: .npy and .npz, MATLAB files (v4 to v7 by scipy, v7.3 is HDF5), HDF5, a table (.csv), a
-folder of grey pictures in the order of their names. Time may be the first axis of an array or, as
-MATLAB users have it, the last. A table holds an image a line (rows * columns numbers, row 0 first;
-a head line is skipped, and where it names `r0c0`, `r0c1`, ... as our own tables do, those columns
-are taken), or one image (rows lines of columns numbers).
+Sources: .npy and .npz, MATLAB files (v4 to v7 by scipy, v7.3 is HDF5), HDF5, a Zarr store as FTP-1
+has it, a table (.csv), a folder of grey pictures in the order of their names. Time may be the first
+axis of an array or, as MATLAB users have it, the last. A table holds an image a line (rows *
+columns numbers, row 0 first; a head line is skipped, and where it names `r0c0`, `r0c1`, ... as our
+own tables do, those columns are taken), or one image (rows lines of columns numbers).
 
 Whole numbers 0 ... 65535 are taken as they are. Other values of a sensor type that says what
 one count is (depth in mm, force in N) are counted in that unit, below 0 as 0. Anything else
@@ -40,6 +40,7 @@ from probe.recording.hdf5 import write_recording
 from probe.recording.layout import NOMINAL_HZ, FrameBlock, RecordingOrigin
 from probe.recording.read import Recording
 from probe.recording.table import table_header
+from probe.recording.zarr import is_store, store_arrays
 
 if TYPE_CHECKING:
     import h5py
@@ -66,9 +67,10 @@ def import_array(
     Parameters
     ----------
     path
-        A .npy, .npz, .mat or HDF5 file with an array (N, rows, columns), (rows, columns, N) or
-        (rows, columns), the first axis taken for time where both would do; a table (.csv) or a
-        folder of pictures.
+        A .npy, .npz, .mat or HDF5 file, or the folder of a Zarr store, with an array
+        (N, rows, columns), (rows, columns, N) or (rows, columns), the first axis taken for time
+        where both would do; a table (.csv) or a folder of pictures. Of an FTP-1 store `NAME/k` is
+        pad k of the group `NAME`.
     out, replace
         The recording to be made, also in place of an older one.
     dataset
@@ -145,6 +147,9 @@ class FileArray:
 @contextmanager
 def _arrays_at(path: Path, image: tuple[int, int]) -> Iterator[list[FileArray]]:
     """Open whatever holds images: a folder of pictures, a table, a file of arrays."""
+    if path.is_dir() and is_store(path):
+        yield [FileArray(name, array) for name, array in store_arrays(path)]
+        return
     if path.is_dir():
         yield [_folder_array(path, image)]
         return

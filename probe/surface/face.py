@@ -130,6 +130,12 @@ class LatticeSurface:
         columns, rows = cells.astype(np.int64).T
         return self.template.heights_mm(self.label_at(rows, columns), at[:, 0], at[:, 1])
 
+    def cells_at(self, points_mm: Array) -> tuple[Index, Index]:
+        """Return rows and columns (n,), counted from the anchor, of points (n, 2)."""
+        turn, shift = self._to_cells
+        columns, rows = np.floor(points_mm @ turn + shift).astype(np.int64).T
+        return rows, columns
+
     @cached_property
     def _to_cells(self) -> tuple[Array, Array]:
         """Return matrix (2, 2) and shift (2,) from face points to columns and rows."""

@@ -88,7 +88,8 @@ def weigh_cells(embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis) -> Ce
     own = fit.scores[np.arange(len(held)), held]
     worn = np.asarray((held < order) & (fit.scores[:, order] > own + TIE_NATS))
     seen = np.asarray(fit.seen >= IN_VIEW)
-    against = np.where(worn, 0.0, fit.scores[:, :order].max(axis=1) - own)
+    # a symbol that is worn shows none; one that shows another letter was never there
+    against = fit.scores[:, :order].max(axis=1) - np.where(worn, fit.scores[:, order], own)
     likely = own > _marginal(fit) - math.log(2.0)
     return CellEvidence(worn, seen, seen & (held < order) & likely, against)
 

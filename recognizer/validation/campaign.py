@@ -28,7 +28,7 @@ from probe.simulate.world.levels import LEVELS
 from recognizer.touch.options import DEFAULTS
 from recognizer.touch.reader import Reader
 from recognizer.validation.draw import FOREIGN
-from recognizer.validation.encoded_set import COPY, NEAR, SAME_PROFILE, SIDE, SMALL
+from recognizer.validation.encoded_set import COPY, DECOY, DECOYS, NEAR, SAME_PROFILE, SIDE, SMALL
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.touch_plan import ROW, TouchPlan
 from recognizer.validation.trial import ONE, POLICY_NAMES
@@ -56,7 +56,7 @@ KINDS: Shares = (
     (BLANK, 0.05),
     (STRANGE, 0.15),
 )
-KIND_NAMES = (*ON_FACES, BLANK, STRANGE, SAME_PROFILE)  #: all that `--kinds` names
+KIND_NAMES = (*ON_FACES, BLANK, STRANGE, SAME_PROFILE, DECOY)  #: all that `--kinds` names
 LEVEL_SHARES: Shares = (("low", 0.1), ("typical", 0.4), ("hard", 0.2), ("mismatch", 0.3))
 
 #: Readers of the picture of error against run time: candidates, steps, finalists, final steps.
@@ -296,8 +296,8 @@ class Work:
         rng = np.random.default_rng([campaign.seed, number, 1])
         kind, level = _draw(series.kinds, rng), _draw(series.levels, rng)
         surface = kind
-        if kind == STRANGE:
-            strange = [name for name in FOREIGN if name != BLANK]
+        if kind in (STRANGE, DECOY):
+            strange = [name for name in FOREIGN if name != BLANK] if kind == STRANGE else DECOYS
             surface = strange[int(rng.integers(len(strange)))]
         return TouchPlan(
             self.database,

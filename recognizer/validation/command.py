@@ -7,6 +7,7 @@
     validate-set worlds DIR...         runs of different worlds on one page
     validate-set repeat DIR NUMBER     one touch again, with pictures of each stage
     validate-set report DIR            the report anew from the touches that are there
+    validate-set benchmark             frozen touches with truth, and readers compared on them
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 ran but failed
 (`--fail-under`, or a worker was lost), 2 bad input, 4 database, 130 interrupted. Nothing
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from recognizer.validation.pipeline import ValidationResult
 
 NAME = "validate-set"
-TOOLS = ("compare", "worlds", "repeat", "report")
+TOOLS = ("compare", "worlds", "repeat", "report", "benchmark")
 HELP = """Touch a set of objects in simulation, read every touch, and report how far the answers \
 can be trusted.
 
@@ -49,6 +50,8 @@ More commands, each with --help:
 [bold]validate-set repeat[/] DIR NUMBER     one touch again, with pictures of each stage
 
 [bold]validate-set report[/] DIR            the report anew from the touches that are there
+
+[bold]validate-set benchmark[/]             frozen touches with truth, and readers compared on them
 """
 
 app = Application()
@@ -89,7 +92,7 @@ class SetOptions(Options):
         str,
         Option(
             "Kinds of touches and their shares: face, edge, corner, worn, blank, foreign, "
-            "copy, near, small, side, same_profile; as face=3,edge.",
+            "copy, near, small, side, same_profile, decoy; as face=3,edge.",
             "LIST",
         ),
     ] = ""
@@ -271,6 +274,45 @@ def report(
     from recognizer.validation.pipeline import report_again
 
     _report(report_again(folder), as_json=as_json)
+    return console.DONE
+
+
+@command(tools)
+def benchmark(
+    touches: Annotated[int, Option("Touches of each half.", least=1)] = 2000,
+    folder: Annotated[
+        Path, Option("Folder of touches, cards and tables.", "DIR", names=("-o", "--output"))
+    ] = Path("benchmark"),
+    seed: Annotated[int | None, Option("Of the hidden half; drawn if left out.", least=0)] = None,
+    worlds: Annotated[
+        str, Option("Worlds, as fsr-16,gel-24x32; all, MuJoCo's among them.", "LIST")
+    ] = "",
+    reader: Annotated[
+        str,
+        Option(
+            "Readers: ours, thesis, template, network, chance, or one of your own as "
+            "module:function (docs/benchmark.md); all five.",
+            "LIST",
+        ),
+    ] = "",
+    as_json: Json = False,
+) -> int:
+    """Make frozen touches with truth, public and hidden, and compare readers on them."""
+    from recognizer.validation.benchmark import run_benchmark, table_of
+    from recognizer.validation.run import TouchProgress
+
+    named = [[one.strip() for one in text.split(",") if one.strip()] for text in (worlds, reader)]
+    with progress_bar("making the set") as bar:
+        found = run_benchmark(folder, touches=touches, worlds=named[0], seed=seed,
+                              readers=named[1], progress=TouchProgress(bar))  # fmt: skip
+    if as_json:
+        output.write_json(found)
+    else:
+        other = ", ".join(name for name, alike in found["frozen"].items() if not alike)
+        output.write(table_of(found))
+        output.write(f"public half: {f'differs in {other}' if other else 'as frozen'}; "
+                     f"seed of the hidden half {found['seeds']['hidden']}\n"
+                     f"next: open {folder / 'results.md'}")  # fmt: skip
     return console.DONE
 
 

@@ -21,6 +21,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -32,16 +33,20 @@ from numpy.typing import NDArray
 from encoded_objects.base.files import whole_file
 from recognizer.touch.recognise import recognise
 from recognizer.validation.campaign import Work, series_of
-from recognizer.validation.draw import draw_touch
+from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.files import write_json, write_table
 from recognizer.validation.run import TouchProgress
-from recognizer.validation.trial import NEAR_DEG, NEAR_MM, judge
+from recognizer.validation.trial import NEAR_DEG, NEAR_MM, Trial, judge
 from recognizer.validation.workers import prepare_reader
 
 Array = NDArray[Any]
 #: What answers are judged by.
 JUDGED = ("label", "x_mm", "y_mm", "theta_rad", "answer", "answer_x_mm", "answer_y_mm",
           "answer_theta_rad")  # fmt: skip
+#: Arrays of a data set, as they are written.
+ORDER = ("counts", "number", "kind", "level", "test", "label", "x_mm", "y_mm", "theta_rad",
+         "force_n", "tilt_rad", "answer", "answer_x_mm", "answer_y_mm", "answer_theta_rad",
+         "margin")  # fmt: skip
 TEST_EVERY = 5  #: every fifth touch is kept apart for testing
 
 
@@ -69,29 +74,17 @@ def touch_dataset(work: Work, progress: TouchProgress) -> TouchDataset:
         answer = recognise(reader, reader.signal(found.counts), number)
         trial = judge(plan, number, found, answer, reader)
         T = np.full((4, 4), math.nan) if answer.T_face_probe is None else answer.T_face_probe
-        touched = trial.object != ""
-        rows.append(
-            {
-                "counts": found.counts,
-                "number": number,
-                "kind": trial.kind,
-                "level": trial.level,
-                "test": number % TEST_EVERY == TEST_EVERY - 1,
-                "label": label_of.get(f"{trial.object}/{trial.face}", -1),
-                "x_mm": trial.x_mm if touched else math.nan,
-                "y_mm": trial.y_mm if touched else math.nan,
-                "theta_rad": math.radians(trial.theta_deg) if touched else math.nan,
-                "force_n": trial.force_n,
-                "tilt_rad": math.radians(trial.tilt_deg),
-                "answer": label_of.get(trial.answer, -1),
-                "answer_x_mm": T[0, 3],
-                "answer_y_mm": T[1, 3],
-                "answer_theta_rad": math.atan2(T[1, 0], T[0, 0]),
-                "margin": trial.margin,
-            }
-        )
+        row = truth_row(found, trial, label_of) | {
+            "test": number % TEST_EVERY == TEST_EVERY - 1,
+            "answer": label_of.get(trial.answer, -1),
+            "answer_x_mm": T[0, 3],
+            "answer_y_mm": T[1, 3],
+            "answer_theta_rad": math.atan2(T[1, 0], T[0, 0]),
+            "margin": trial.margin,
+        }
+        rows.append({name: row[name] for name in ORDER})
         progress.step("touches")
-    arrays = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    arrays = {name: np.array([row[name] for row in rows]) for name in ORDER}
     description = {
         "seed": campaign.seed,
         "kinds": dict(campaign.kinds),
@@ -106,17 +99,47 @@ def touch_dataset(work: Work, progress: TouchProgress) -> TouchDataset:
     return TouchDataset(arrays, reader.sensor.pitch_mm, description)
 
 
+def truth_row(found: DrawnTouch, trial: Trial, label_of: dict[str, int]) -> dict[str, Any]:
+    """Return what the sensor read, and the truth."""
+    touched = trial.object != ""
+    return {
+        "counts": found.counts,
+        "number": trial.number,
+        "kind": trial.kind,
+        "level": trial.level,
+        "label": label_of.get(f"{trial.object}/{trial.face}", -1),
+        "x_mm": trial.x_mm if touched else math.nan,
+        "y_mm": trial.y_mm if touched else math.nan,
+        "theta_rad": math.radians(trial.theta_deg) if touched else math.nan,
+        "force_n": trial.force_n,
+        "tilt_rad": math.radians(trial.tilt_deg),
+    }
+
+
+def errors_of_answers(
+    arrays: Mapping[str, Array], truth: str = ""
+) -> tuple[NDArray[np.bool_], Array, Array]:
+    """Return which answers are right (N,), how far off, mm, and how much turned, rad, signed.
+
+    A right answer names the face, within `NEAR_MM` and `NEAR_DEG` of the truth, whose columns begin
+    with `truth`.
+    """
+    dx, dy = (arrays[f"answer_{k}_mm"] - arrays[f"{truth}{k}_mm"] for k in "xy")
+    turn = np.angle(np.exp(1j * (arrays["answer_theta_rad"] - arrays[f"{truth}theta_rad"])))
+    off = np.hypot(dx, dy)
+    near = (off < NEAR_MM) & (np.degrees(np.abs(turn)) < NEAR_DEG)
+    named = (arrays["answer"] >= 0) & (arrays["answer"] == arrays[f"{truth}label"])
+    return named & near, off, turn
+
+
 def baseline(arrays: dict[str, Array], chosen: Array) -> dict[str, Any]:
     """Return what our reader reaches on chosen touches: the number to beat.
 
-    A right answer names the face, within `NEAR_MM` and `NEAR_DEG` of the truth.
+    A right answer is one of `errors_of_answers`.
     """
     some = {name: arrays[name][chosen] for name in JUDGED}
-    off = np.hypot(some["answer_x_mm"] - some["x_mm"], some["answer_y_mm"] - some["y_mm"])
-    turn = np.abs(np.angle(np.exp(1j * (some["answer_theta_rad"] - some["theta_rad"]))))
+    right, off, turn = errors_of_answers(some)
     answered = some["answer"] >= 0
-    near = (off < NEAR_MM) & (np.degrees(turn) < NEAR_DEG)
-    right = answered & (some["answer"] == some["label"]) & near
     return {
         "touches": len(off),
         "of_the_set": int((some["label"] >= 0).sum()),
@@ -184,6 +207,7 @@ def write_lerobot(data: TouchDataset, folder: Path) -> None:
 
 def _columns(data: TouchDataset) -> dict[str, Array]:
     """Return a column for each feature; the touches kept for testing come last."""
+    order = np.argsort(data.arrays["test"], kind="stable")
     order = np.argsort(data.arrays["test"], kind="stable")
     arrays = {name: values[order] for name, values in data.arrays.items() if name != "names"}
     total = len(order)

@@ -28,16 +28,27 @@ from probe.simulate.world.surfaces import (
     draw_ridges,
     draw_rough,
     draw_text,
+    exchange_symbols,
     place_adjacent,
+    seat_panel,
+    seats_of,
     worn_scene,
 )
 from probe.surface.contract import HeightMap
 from probe.surface.face import endless_face
 from probe.surface.indenters import FlatPlate
 from probe.surface.symbols import Relief
-from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.lab import EmbossedArray, EncodedFace
 from recognizer.touch.reader import Reader
-from recognizer.validation.encoded_set import SAME_PROFILE, SIDE
+from recognizer.validation.encoded_set import (
+    DECOYS,
+    EXCHANGED,
+    OTHER_LABS,
+    SAME_PROFILE,
+    SAME_SIZES,
+    SIDE,
+    TURNED,
+)
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.touch_plan import ROW, TouchPlan, faces_of_kind, faces_of_lab
 
@@ -52,6 +63,8 @@ UNREST = (
     ("finds no rest", "no rest in the engine"),
     ("does not settle", "no rest in the engine"),
 )
+DRAWS = 64  #: of a touch that shows enough symbols to exchange some
+TURN_RAD = 0.01  #: a panel turned by less stands as registered
 FOREIGN_SYMBOLS = 64  #: rows and columns of foreign symbols, repeated without end
 
 
@@ -167,7 +180,7 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
         )
     encoding = arrays[int(rng.integers(len(arrays)))]
     while True:
-        contact, touch = _sample_scene(plan, encoding, ranges, rng)
+        contact, touch = _sample_scene(plan, encoding, reader.sensor, ranges, rng)
         sensor = of_run or sample_sensor(reader.sensor, rng)
         try:
             counts = _read(plan, contact.scene, touch, sensor, reader, rng)
@@ -208,22 +221,30 @@ def _read(
 
 
 def _sample_scene(
-    plan: TouchPlan, encoding: EmbossedArray, ranges: TouchRanges, rng: np.random.Generator
-) -> tuple[ContactScene, Touch]:
+    plan: TouchPlan, encoding: EmbossedArray, sensor: SensorType, ranges: TouchRanges,
+    rng: np.random.Generator,
+) -> tuple[ContactScene, Touch]:  # fmt: skip
     """Draw what is touched and where."""
     if plan.kind in FOREIGN:
         foreign = bare_scene(FOREIGN[plan.kind](encoding, rng), plan.kind)
         return ContactScene(foreign, registered=False), _draw_anywhere(rng, ranges)
-    if plan.kind == SAME_PROFILE:
-        lab = plan.labs[int(rng.integers(len(plan.labs)))]
+    if plan.kind in (SAME_PROFILE, SAME_SIZES):
+        labs = plan.labs[-1:] if plan.kind == SAME_SIZES else plan.labs[:OTHER_LABS]
+        lab = labs[int(rng.integers(len(labs)))]
         faces = faces_of_lab(lab)
         scene, most = plan.face(*faces[int(rng.integers(len(faces)))], lab=lab)
         return ContactScene(scene, registered=False), _draw_on_face(plan, scene, most, rng, ranges)
     known = faces_of_kind(encoding, plan.kind, plan.prints, plan.only)
     face = encoding.face(known[int(rng.integers(len(known)))])
+    if plan.kind in DECOYS:
+        plan = replace(plan, files=plan.files and plan.kind == SIDE)
     scene, most = plan.face(face.object, face.face)
     if plan.kind == SIDE:
         return _adjacent(plan, encoding, scene, ranges, rng)
+    if plan.kind in EXCHANGED:
+        return _exchanged(plan, encoding, face, sensor, ranges, rng)
+    if plan.kind in DECOYS:
+        return _reseated(plan, encoding, face, ranges, rng)
     touch = _draw_on_face(plan, scene, most, rng, ranges)
     if plan.kind == ROW:
         quarters = round((touch.theta_rad + face.rotation_rad) / (math.pi / 2))
@@ -281,6 +302,59 @@ def _adjacent(
     touch = replace(_draw_anywhere(rng, ranges), x_mm=float(at[0]), y_mm=float(at[1]))
     both = replace(scene, surface=AdjacentParts(scene.surface, second.surface, place))
     return ContactScene(both, adjacent=(second, place)), touch
+
+
+def _exchanged(
+    plan: TouchPlan, encoding: EmbossedArray, face: EncodedFace, sensor: SensorType,
+    ranges: TouchRanges, rng: np.random.Generator,
+) -> tuple[ContactScene, Touch]:  # fmt: skip
+    """Exchange some of the symbols that lie wholly under the sensor; every answer is wrong.
+
+    A touch that shows fewer is drawn again; on a face that never shows as many all are exchanged.
+    """
+    scene, most = plan.face(face.object, face.face)
+    inside = np.array(sensor.half_mm) - encoding.alphabet.reach * encoding.style.pitch_mm
+    number = EXCHANGED[plan.kind]
+    for _ in range(DRAWS):
+        touch = _draw_on_face(plan, scene, most, rng, ranges)
+        c, s = math.cos(touch.theta_rad), math.sin(touch.theta_rad)
+        own = (face.centres_mm - (touch.x_mm, touch.y_mm)) @ np.array([[c, -s], [s, c]])
+        whole = np.flatnonzero((np.abs(own) < inside).all(axis=1))
+        if len(whole) >= number:
+            break
+    chosen = rng.permutation(whole)[:number]
+    order = encoding.array.order
+    labels = (face.labels[chosen] + rng.integers(1, order, size=len(chosen))) % order
+    surface = exchange_symbols(scene.surface, face.centres_mm[chosen], labels)
+    return ContactScene(replace(scene, surface=surface), registered=not len(chosen)), touch
+
+
+def _reseated(
+    plan: TouchPlan, encoding: EmbossedArray, face: EncodedFace, ranges: TouchRanges,
+    rng: np.random.Generator,
+) -> tuple[ContactScene, Touch]:  # fmt: skip
+    """Glue a panel into its seat turned, or another one of the object into that seat.
+
+    What is touched is that panel, so the answer that names it, and the place on it, is right; any
+    other is wrong. That the panel is not where the database has it, one touch cannot tell.
+    """
+    scene, most = plan.face(face.object, face.face)
+    own = [n for n in faces_of_kind(encoding, plan.kind, plan.prints)
+           if encoding.face(n).object == face.object]  # fmt: skip
+    ways = []
+    for number in own:
+        other = encoding.face(number)
+        if (other.face == face.face) == (plan.kind == TURNED):
+            panel, _ = plan.face(other.object, other.face)
+            ways += [(panel, place) for place in seats_of(scene.region, panel.region)]
+    if plan.kind == TURNED:
+        ways = [way for way in ways if abs(way[1].turn_rad) > TURN_RAD]
+    touch = _draw_on_face(replace(plan, kind="anywhere"), scene, most, rng, ranges)
+    if not ways:  # no other way to glue it: as registered
+        return ContactScene(scene), touch
+    panel, place = ways[int(rng.integers(len(ways)))]
+    both = replace(scene, surface=seat_panel(scene.surface, panel.surface, place))
+    return ContactScene(both, registered=False, adjacent=(panel, place)), touch
 
 
 @lru_cache(maxsize=4)

@@ -22,12 +22,18 @@ import yaml
 from generator.array.lab_key import lab_key_of
 from generator.database import DatabaseError
 from generator.database.open import database_exists, open_database
-from generator.database.read import list_objects, read_parts
+from generator.database.read import list_objects, read_object, read_parts
 from generator.database.transaction import read_transaction
 from recognizer.validation.errors import SetError, ValidationError
 
 COPY, NEAR, SMALL, SIDE = "copy", "near", "small", "side"
 SAME_PROFILE = "same_profile"
+DECOY = "decoy"
+SAME_SIZES, TURNED, SWAPPED = "same sizes", "turned panel", "swapped panel"
+#: Faces of the set with so many of the symbols under the sensor exchanged for others.
+EXCHANGED = {"one symbol": 1, "two symbols": 2, "three symbols": 3}
+#: What `decoy` touches, each as often: parts made to be mistaken for registered ones (`draw`).
+DECOYS = (*EXCHANGED, SAME_SIZES, SIDE, TURNED, SWAPPED)
 #: Kinds that are touches of members of their own, and how the names of these begin.
 EXTRA = {COPY: "Extra copy", NEAR: "Extra near", SMALL: "Extra small"}
 BLOCK_MM = (45.0, 35.0, 28.0)  #: of copies and near ones
@@ -40,6 +46,7 @@ OTHER_LABS, LAB_OBJECTS = 2, 8  #: that made parts with the same profile; object
 LAB_MM = (35.0, 75.0)  #: their sizes
 
 PARTS, LAB, LABS = "parts", "lab.db", "labs"
+SAME_LAB = "lab-same-sizes"
 LAB_KEY = "VA11-DATE-0000-0002"  #: of the sets that are made here and say none
 
 
@@ -143,31 +150,39 @@ def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: in
         They cannot be made.
     """
     members = members_of(database)
-    if SIDE in kinds and len(members) < 2:
+    if {SIDE, DECOY} & set(kinds) and len(members) < 2:
         raise ValidationError(
             "two objects side by side need two, the set has one",
-            fix="name a set of two objects or more, or leave out side",
+            fix="name a set of two objects or more, or leave out side and decoy",
             place="--kinds",
         )
-    first = members[0]
+    with read_transaction(open_database(database, writable=False)) as connection:
+        spec = read_object(connection, members[0]["name"]).spec
+    first = members[0] | {"printer": spec.get("printer", "") if isinstance(spec, dict) else ""}
     for kind in EXTRA:  # one after the other: they may be on different arrays
         if kind in kinds:
             specs = list(_extra_specs(kind, first["pitch_mm"]))
             _make(specs, first, folder / f"extra-{kind}.yaml", folder / PARTS, database)
-    if SAME_PROFILE in kinds:
-        for number in range(OTHER_LABS):
-            lab = folder / LABS / f"lab-{number + 1}"
-            lab.mkdir(parents=True, exist_ok=True)
-            rng = np.random.default_rng([seed, number, 5])
-            specs = list(_random_specs(number, rng))
-            key = lab_key_of(np.random.default_rng([seed, number, 6]).bytes(16))
-            _make(specs, first, lab / "set.yaml", lab / PARTS, str(lab / LAB), {"lab_key": key})
+    for number, name in enumerate(_lab_names(kinds)):
+        lab = folder / LABS / name
+        lab.mkdir(parents=True, exist_ok=True)
+        specs = list(
+            _specs_of_same_sizes(database, members)
+            if name == SAME_LAB
+            else _random_specs(number, np.random.default_rng([seed, number, 5]))
+        )
+        key = lab_key_of(np.random.default_rng([seed, number, 6]).bytes(16))
+        _make(specs, first, lab / "set.yaml", lab / PARTS, str(lab / LAB), {"lab_key": key})
 
 
 def labs_of(folder: Path, kinds: Collection[str]) -> tuple[str, ...]:
-    """Return the databases of the other labs that a run touches."""
-    found = range(1, OTHER_LABS + 1) if SAME_PROFILE in kinds else ()
-    return tuple(str((folder / LABS / f"lab-{number}" / LAB).absolute()) for number in found)
+    """Return the databases of the other labs that a run touches; that of `SAME_SIZES` is last."""
+    return tuple(str((folder / LABS / name / LAB).absolute()) for name in _lab_names(kinds))
+
+
+def _lab_names(kinds: Collection[str]) -> list[str]:
+    others = range(1, OTHER_LABS + 1) if SAME_PROFILE in kinds else ()
+    return [f"lab-{number}" for number in others] + [SAME_LAB] * (DECOY in kinds)
 
 
 def refuse_without_specs(kinds: Collection[str]) -> None:
@@ -216,6 +231,15 @@ def _random_specs(lab: int, rng: np.random.Generator) -> Iterator[dict[str, Any]
         yield {"name": f"Other {lab + 1}-{k + 1}", "shape": shapes[k % 3]}
 
 
+def _specs_of_same_sizes(database: str, members: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Yield boxes as large as the first objects of a set."""
+    with read_transaction(open_database(database, writable=False)) as connection:
+        for member in members[:LAB_OBJECTS]:
+            corners = read_object(connection, member["name"]).polyhedron.vertices
+            size = (float(round(side, 3)) for side in np.ptp(corners, axis=0))
+            yield {"name": f"Same {member['name']}", "shape": {"box": _lengths(*size)}}
+
+
 def _make(
     specs: list[dict[str, Any]],
     like: dict[str, Any],
@@ -224,11 +248,13 @@ def _make(
     database: str,
     output: dict[str, str] | None = None,
 ) -> None:
-    """Make objects in the profile and at the pitch of a member of the set."""
-    style = {
+    """Make objects in the profile, at the pitch and for the printer of a member of the set."""
+    style: dict[str, Any] = {
         "profile": like["array"].rpartition(" ")[0],
         "symbols": {"pitch": f"{like['pitch_mm']:g} mm"},
     }
+    if like["printer"]:
+        style["print"] = {"printer": like["printer"]}
     whole: dict[str, Any] = {"version": 1, "objects": [style | spec for spec in specs]}
     text = json.dumps(whole | ({"output": output} if output else {}), indent=1)
     file.write_text(text + "\n", "utf-8")

@@ -30,7 +30,7 @@ from probe.simulate.scene import Scene, TouchRanges
 from probe.simulate.world.levels import LEVELS, Level
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
-from recognizer.validation.encoded_set import SIDE, is_extra
+from recognizer.validation.encoded_set import DECOYS, is_extra
 from recognizer.validation.errors import SetError
 
 FORCE_N = (20.0, 120.0)  #: as a hand or an arm presses
@@ -47,8 +47,8 @@ class TouchPlan:
     same, with rows of tactels along rows or columns of symbols), `edge` (nearer to the edges),
     `corner` (that near a corner), `worn` (a face with a share of its symbols gone), `copy`, `near`
     or `small` (inside faces of these members, `encoded_set`), `side` (near an edge next to another
-    object), `same_profile` (a part of another lab), `anywhere` (uniform over a face), or one of the
-    surfaces of `draw.FOREIGN`.
+    object), `same_profile` (a part of another lab), `anywhere` (uniform over a face), one of
+    `encoded_set.DECOYS`, or one of the surfaces of `draw.FOREIGN`.
     """
 
     database: str
@@ -118,7 +118,7 @@ def faces_of_kind(
     faces, names = encoding.faces.tolist(), encoding.names
     found = sorted(range(len(faces)), key=lambda n: (names[faces[n][0]], faces[n][1]))
     found = [n for n in found if is_extra(names[faces[n][0]], kind)]
-    if kind == SIDE:  # round faces roll away from each other
+    if kind in DECOYS:  # round faces roll away from each other, and are no panels
         found = [n for n in found if encoding.face(n).round is None]
     if only:
         whole = {n: encoding.face(n) for n in found if only.startswith(names[faces[n][0]])}

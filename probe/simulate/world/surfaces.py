@@ -35,6 +35,7 @@ Ints = NDArray[np.int64]
 GAP_MM = 2.0  #: between the edges of adjacent parts, at most
 STEP_MM = 0.4  #: of the second's face above or below the first's, at most
 REACH_MM = 9.0  #: the sensor's centre lies on the first part, at most this far from its edge
+SAME_MM = 0.01  #: corners that are nearer are the same: two panels fill one seat
 FLUSH = 1e-6  #: of the size: corners this far beyond an edge do not lie beyond it
 EDGE_POINTS = 9  #: heights along each edge of a worn cell
 
@@ -187,6 +188,58 @@ def _wear_face(face: FaceSurface, share: float, salt: int) -> FaceSurface:
         return np.where(drawn < share, -1, labels)
 
     return replace(face, lattice=replace(lattice, label_at=left))
+
+
+def exchange_symbols(face: HeightMap, at_mm: Array, labels: Ints) -> FaceSurface:
+    """Return a registered face with other symbols: `labels` (n,) at the places (n, 2)."""
+    assert isinstance(face, FaceSurface)
+    assert face.lattice is not None
+    label_at = face.lattice.label_at
+    rows, columns = face.lattice.cells_at(at_mm)
+
+    def other(down: Ints, along: Ints) -> Ints:
+        found = label_at(down, along)
+        for row, column, label in zip(rows, columns, labels, strict=True):
+            found[(down == row) & (along == column)] = label
+        return found
+
+    return replace(face, lattice=replace(face.lattice, label_at=other))
+
+
+def seat_panel(seat: HeightMap, panel: HeightMap, place: FramePlace) -> FaceSurface:
+    """Return the face of a seat with the symbols of another panel, or of its own, turned.
+
+    `place` is that of the panel's frame in the seat's; what is about the seat stays.
+    """
+    assert isinstance(seat, FaceSurface)
+    assert isinstance(panel, FaceSurface)
+    assert panel.lattice is not None
+    lattice = panel.lattice
+    turn = lattice.rotation_rad - place.turn_rad
+    c, s = math.cos(turn), math.sin(turn)
+    x, y = place.x_mm, place.y_mm
+    moved = replace(
+        lattice, rotation_rad=turn, x_mm=lattice.x_mm - c * x + s * y,
+        y_mm=lattice.y_mm - s * x - c * y,
+    )  # fmt: skip
+    return replace(seat, lattice=moved)
+
+
+def seats_of(seat: FaceRegion, panel: FaceRegion) -> list[FramePlace]:
+    """Return every way in which a panel fills a seat of the same outline."""
+    ends = (seat.starts, panel.starts)
+    if len(ends[0]) != len(ends[1]):
+        return []
+    found = []
+    middles = [one.mean(axis=0) for one in ends]
+    away, own = ((one - middle) @ (1, 1j) for one, middle in zip(ends, middles, strict=True))
+    for shift in range(len(own)):
+        turn = float(np.angle(np.sum(away * np.roll(own, shift).conj())))
+        if np.abs(away - np.roll(own, shift) * np.exp(1j * turn)).max() < SAME_MM:
+            c, s = math.cos(turn), math.sin(turn)
+            x, y = (middles[0] - np.array([[c, -s], [s, c]]) @ middles[1]).tolist()
+            found.append(FramePlace(x, y, 0.0, turn))
+    return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
+import os
+import zlib
 
 import h5py
 import numpy as np
@@ -13,6 +16,7 @@ from recorded import pose_at, same
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from scipy.io import savemat
+from zstandard import ZstdCompressor
 
 from probe.errors import RecordingError
 from probe.frame import frame_from
@@ -21,6 +25,7 @@ from probe.recording.mcap import export_mcap, import_mcap
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.recording.ros import DEFINITIONS, IMAGE, POSE, TOUCH_FRAME, covariance_message
+from recognizer.validation.ftp1 import write_ftp1
 
 COUNTS = np.random.default_rng(5).integers(0, 1024, (70, 16, 16)).astype(np.uint16)
 
@@ -253,3 +258,72 @@ def test_a_covariance_is_in_metres():
     assert read[0, 5] == pytest.approx(0.5e-3)
     assert fields["pose"]["pose"]["position"] == {"x": 0.01, "y": 0.02, "z": 0.03}
     assert fields["header"]["stamp"] == {"sec": 1, "nanosec": 500_000_000}
+
+
+def ftp1(path, **changed):
+    """Write a store of FTP-1 with 70 touches, `changed` in the `.zarray` of its data."""
+    some = {"label": np.zeros(70, int)} | dict.fromkeys(("x_mm", "y_mm", "theta_rad"), np.zeros(70))
+    write_ftp1({"counts": COUNTS} | some, "fsr-16", path, {})
+    described = path / "data/right_tactile_data_finger/.zarray"
+    described.write_text(json.dumps(json.loads(described.read_text()) | changed))
+    return path
+
+
+@pytest.mark.parametrize("packed", ["zlib", "zstd", "none", "gaps"])
+def test_a_store_of_ftp1_gives_the_same_frames(tmp_path, packed):
+    kind = {"none": None, "zstd": {"id": "zstd"}}.get(packed, {"id": "zlib"})
+    store = ftp1(tmp_path / "touches.zarr", compressor=kind)
+    chunk = store / "data/right_tactile_data_finger/0.0.0.0"
+    content = zlib.decompress(chunk.read_bytes())
+    expected = COUNTS
+    if packed == "gaps":  # what was never written is 0
+        chunk.unlink()
+        expected = np.zeros_like(COUNTS)
+    elif packed != "zlib":
+        chunk.write_bytes(content if packed == "none" else ZstdCompressor().compress(content))
+    made = import_array(store, tmp_path / "touch.h5")
+    assert np.array_equal([frame.counts for frame in made.frames()], expected)
+    assert made.origin.more["imported_array"] == "right_tactile_data_finger/0"
+
+
+def test_several_pads_in_chunks_of_their_own_are_asked_for_by_name(tmp_path):
+    store = ftp1(tmp_path / "two.zarr", shape=(70, 2, 16, 16), chunks=(40, 1, 16, 16))
+    folder = store / "data/right_tactile_data_finger"
+    for row in range(2):
+        for pad in range(2):
+            part = np.zeros((40, 16, 16), np.uint16)
+            own = COUNTS[40 * row : 40 * row + 40] // (pad + 1)
+            part[: len(own)] = own
+            (folder / f"{row}.{pad}.0.0").write_bytes(zlib.compress(part.tobytes()))
+    refused(store, "several arrays of images")
+    made = import_array(store, tmp_path / "b.h5", dataset="right_tactile_data_finger/1")
+    assert np.array_equal([frame.counts for frame in made.frames()], COUNTS // 2)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"shape": (10**9, 1, 16, 16), "chunks": (10**5, 1, 16, 16)}, "more than its files can"),
+        ({"chunks": (10**7, 1, 16, 16)}, "more than is read"),
+        ({"chunks": (1, 1, 16)}, "in chunks"),
+        ({"compressor": {"id": "lzma"}}, "packed by lzma"),
+        ({"compressor": None}, "a chunk is damaged"),
+        ({"filters": [{"id": "delta"}]}, "filters"),
+        ({"dimension_separator": "/../"}, "between the numbers"),
+        ({"dtype": "no type"}, "no array that is read"),
+    ],
+)
+def test_a_store_that_cannot_be_read_is_refused(tmp_path, changed, said):
+    refused(ftp1(tmp_path / "bad.zarr", **changed), said)
+
+
+def test_a_chunk_is_a_file_of_its_own_size_and_a_store_of_format_2(tmp_path):
+    store = ftp1(tmp_path / "bad.zarr")
+    chunk = store / "data/right_tactile_data_finger/0.0.0.0"
+    chunk.write_bytes(zlib.compress(bytes(10**6)))
+    refused(store, "a chunk is damaged")
+    chunk.unlink()
+    os.mkfifo(chunk)
+    refused(store, "named pipe")
+    (store / "zarr.json").write_text("{}")
+    refused(store, "format 3")

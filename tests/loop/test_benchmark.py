@@ -1,0 +1,104 @@
+"""The benchmark in small: touches as frozen, three forms, and a reader of one's own."""
+
+import json
+import re
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from encoded_objects.base.errors import EncodedObjectsError
+from generator.command import run as encode_object
+from probe.recording.imported import import_array
+from recognizer.validation import encoded_set
+from recognizer.validation.benchmark import FIRST, FROZEN, _figures_of, digest_of, run_benchmark
+from recognizer.validation.command import run
+
+PAGE = Path(__file__).parents[2] / "docs" / "benchmark.md"
+WORLD = "fsr-8x8"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("benchmark")
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    (folder / "my_reader.py").write_text(code)
+    here = SimpleNamespace(
+        run=lambda command, **_: SimpleNamespace(returncode=encode_object(command[3:]))
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(encoded_set, "subprocess", here)
+        patch.syspath_prepend(str(folder))
+        found = run_benchmark(folder, touches=8, worlds=[WORLD], seed=5,
+                              readers=["ours", "chance", "my_reader:reader"])  # fmt: skip
+    sys.modules.pop("my_reader", None)
+    return folder, found
+
+
+def test_the_public_half_is_as_frozen_and_the_hidden_one_is_other(made):
+    folder, found = made
+    assert found["frozen"] == {WORLD: True}
+    assert json.loads(FROZEN.read_text())[WORLD][str(FIRST)]
+    public, hidden = (
+        dict(np.load(folder / half / f"{WORLD}.npz")) for half in ("public", "hidden")
+    )
+    assert found["sha256"]["public"][WORLD] == digest_of(public, 8)
+    assert digest_of(public, FIRST) != digest_of(hidden, FIRST)
+    public["counts"][0, 0, 0] += 1
+    assert found["sha256"]["public"][WORLD] != digest_of(public, 8)
+
+
+def test_all_forms_hold_the_same_touches(made, tmp_path):
+    folder, _ = made
+    data = np.load(folder / "public" / f"{WORLD}.npz")
+    store = import_array(
+        folder / "public" / f"{WORLD}.zarr", tmp_path / "t.h5", sensor_type=WORLD,
+        dataset="right_tactile_data_finger/0",
+    )  # fmt: skip
+    assert np.array_equal([frame.counts for frame in store.frames()], data["counts"])
+    table = pq.read_table(folder / "public" / WORLD / "lerobot/data/chunk-000/file-000.parquet")
+    tactile = np.array(table.column("observation.tactile").to_pylist())
+    assert np.array_equal(tactile, data["counts"].reshape(8, -1))
+    card = json.loads((folder / "public" / "card.json").read_text())
+    assert card["worlds"][WORLD]["touches"] == 8
+
+
+def test_readers_are_judged_alike(made):
+    folder, found = made
+    ours, chance, own = (found["readers"][n] for n in ("ours", "chance", "my_reader:reader"))
+    assert ours["hidden"]["wrong"]["count"] == 0
+    assert ours["hidden"]["right"]["count"] > 0
+    assert ours["hidden"]["bound_mm"] > 0
+    assert chance["hidden"]["wrong"]["count"] == 8  # it never refuses
+    seen = (np.load(folder / "public" / f"{WORLD}.npz")["label"] >= 0).sum()
+    assert own["public"]["right"]["count"] == seen > 0
+    assert own["hidden"]["right"]["count"] == 0
+
+
+def test_a_rate_of_wrong_answers_sets_the_score():
+    count = 20_000
+    whole = {
+        "right": np.arange(count) >= 4, "answer": np.zeros(count, int),
+        "score": np.linspace(1, 0, count), "label": np.zeros(count, int),
+        "also_label": np.full(count, -1), "bound_mm": np.ones(count), "bound_deg": np.ones(count),
+        "off": np.full(count, 2.0), "turn": np.ones(count), "chi2": np.full(count, 3.0),
+        "ms": np.ones(count),
+    }  # fmt: skip
+    line = _figures_of(whole, np.ones(count, bool))
+    assert line["at_rate"]["wrong"]["count"] <= 2  # of 20,000
+    assert line["at_rate"]["count"] == 0  # the wrong ones are the surest
+    whole["score"] = whole["score"][::-1]
+    line = _figures_of(whole, np.ones(count, bool))
+    assert line["at_rate"]["count"] == count - 4
+    assert (line["ratio_mm"], line["normalised"]) == (2.0, 1.0)
+
+
+def test_what_is_not_known_is_refused(tmp_path, capsys):
+    assert run(["benchmark", "-o", str(tmp_path), "--worlds", "mars"]) == 2
+    assert run(["benchmark", "-o", str(tmp_path), "--reader", "no_such:reader"]) == 2
+    assert "module:function" in capsys.readouterr().err
+    with pytest.raises(EncodedObjectsError):
+        run_benchmark(tmp_path, readers=["json:none"])
