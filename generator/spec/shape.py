@@ -193,8 +193,8 @@ class Shape(Block):
     """Sides of a flat plate with symbols on one side: [40, 40] or 40 x 40 mm."""
     polyhedron: VerticesAndFaces | None = None
     file: PathText | None = None
-    """A model, relative to the spec: a .stl or .obj file, whose curved regions stay blank, or a
-    .step file, whose cylinder and cone faces are unrolled; other round faces stay blank."""
+    """A model, relative to the spec: a .step, .stl or .obj file. Its cylinder and cone faces are
+    unrolled, of a mesh the strips of facets that lie on one; other curved regions stay blank."""
     scale: Scale | None = None
     """How many times larger the model of `file` is made: 25.4 for a .stl in inches, 1000 for one
     in metres. A .step file says its unit, which is honoured without a scale."""

@@ -28,7 +28,11 @@ export class MakeDialog {
   private making: AbortController | null = null;
 
   constructor(private readonly sensor: Sensor, private readonly made: (object: string) => void) {
-    for (const id of ["make-open", "make-first"]) element(id).addEventListener("click", () => void this.open().catch(() => undefined));
+    for (const id of ["make-open", "make-first"]) {
+      const open = element<HTMLButtonElement>(id);
+      open.addEventListener("click", () => void this.open().catch(() => undefined));
+      open.disabled = false; // until now a click would have been lost
+    }
     this.go.addEventListener("click", () => (this.making ? this.making.abort() : void this.make()));
     this.lab.addEventListener("change", () => this.change());
     element("make-save").addEventListener("click", () => save(new Blob([element("make-spec").textContent ?? ""]), `${this.form?.name || "part"}.yaml`));
