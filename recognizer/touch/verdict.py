@@ -34,7 +34,7 @@ EXPLAINED_BY_MANY = 0.58  #: where agreeing symbols say `MANY_BITS`
 MANY_BITS = 22.0  #: of eleven letters of four
 CONTRADICTIONS = 1  #: cells that may contradict a place; none strongly
 CONTRADICTION = 8.0  #: nats by which a cell shows another symbol
-STRONG_CONTRADICTION = 16.0
+STRONG_CONTRADICTION = 10.0  #: noise alone: one cell in 20,000, one touch in 1,000
 MOST_POSITION_SD_MM = 0.6  #: standard deviation of the place of several touches
 WORN_WITH_BORDER = 1  #: symbols in view and not felt, with more of which borders do not count
 
