@@ -213,7 +213,7 @@ def one_cell(small, scores, seen=20.0, held=2, order=4):
         ([-9, -9, 0, -9, -9], 20, 2, (False, True, True, 0.0)),
         ([-9, -9, 0, -9, -9], 6.0, 2, (False, True, True, 0.0)),
         ([-9, -9, 0, -9, -9], 5.99, 2, (False, False, False, 0.0)),
-        # none is likelier than the symbol: it is worn, and shows another one if that is likelier still
+        # none is likelier than the symbol: it is worn, unless another one is likelier still
         ([-2, -9, -3, -9, 0], 20, 2, (True, True, False, -2.0)),
         ([-9, -9, 0, -9, 0], 20, 2, (False, True, False, 0.0)),
         ([-1000, -1000, 0, -1000, 0], 20, 2, (False, True, False, 0.0)),  # as likely as all else
