@@ -157,7 +157,9 @@ def test_the_database_gives_the_rates_that_were_reported(made, name, capsys):
         assert 0.5 < reported["F2"]["at_once"] < reported["F3"]["at_once"]
     run(["show", name, "--database", f"{folder}/{name}.db", "--json"])
     part = json.loads(capsys.readouterr().out)["surface"]
-    assert part == (made_object.promise and asdict(made_object.promise))
+    said = ("at_once", "within_three", "encoded")
+    promise = made_object.promise
+    assert part == (promise and {key: getattr(promise, key) for key in said})
 
 
 def test_another_sensor_has_the_rates_it_would_have_had_when_made(made, tmp_path, capsys):
