@@ -78,17 +78,20 @@ def watch(options: LiveOptions) -> int:
 def _on_terminal(state: LiveState, client: Client, interrupted: Event, until_s: float) -> int:
     console = Console(highlight=False)
     colours = console.color_system is not None and not console.no_color
+    said: list[str] = []  # what a key has done since the last picture: nothing may hide it
     with _keys() as pressed, Live(console=console, screen=True, auto_refresh=False) as view:
         while not (interrupted.is_set() or client.ended) and time.monotonic() < until_s:
             state.take(client.take(0.0))
             if notices := client.notices():
-                state.notice = "; ".join(notices[-3:])
+                state.notice = "; ".join([*said, *notices[-3:]])
             counts, ident = client.statistics(), client.ident
             height = console.size.height
             picture = render_frame(state, counts, ident, height=height, colours=colours)
             view.update(picture, refresh=True)
+            shown = state.notice
             if not _obey(state, client, pressed):
                 break
+            said = [state.notice] if state.notice != shown else []
     return 0
 
 
