@@ -58,8 +58,8 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
     gc.collect()  # the scene before, 30 MB, which a cycle of Drake's references keeps
     corners, triangles = mesh_under(surface, sensor, touch)
     top_mm, half_mm = float(corners[:, 2].max()), half_side_mm(sensor)
-    felt = _scene((corners, triangles), at, lengths, half_mm, touch)
-    level_n = float(felt(np.array([top_mm - DEEP_MM, 0.0, 0.0]))[0].sum())
+    forces_at = _scene((corners, triangles), at, lengths, half_mm, touch)
+    level_n = float(forces_at(np.array([top_mm - DEEP_MM, 0.0, 0.0]))[0].sum())
     if level_n == 0:
         raise ContactError(
             "there is too little under the sensor to bear the force",
@@ -69,7 +69,7 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
     modulus = max(soft, touch.force_n / level_n)
 
     def stiffer(plate: Array) -> tuple[Array, Array]:
-        forces, depths = felt(plate)
+        forces, depths = forces_at(plate)
         slopes = forces / np.maximum(depths, 0.02) * np.maximum(1 - depths / half_mm, LEAST_SLOPE)
         return modulus * forces, modulus * slopes
 
@@ -133,7 +133,7 @@ def _scene(
     results, turn = plant.get_contact_results_output_port(), RotationMatrix.MakeZRotation
     turned = turn(touch.theta_rad)
 
-    def felt(plate: Array) -> tuple[Array, Array]:
+    def forces_at(plate: Array) -> tuple[Array, Array]:
         z, tilt_x, tilt_y = plate.tolist()
         tilted = RotationMatrix.MakeXRotation(tilt_x) @ RotationMatrix.MakeYRotation(tilt_y)
         at_m: Any = 1e-3 * np.array([touch.x_mm, touch.y_mm, z])  # as Drake's stubs want it
@@ -149,7 +149,7 @@ def _scene(
             depths[k] = 1e3 * (cut.centroid() - T.translation()) @ axis + lengths[k]
         return forces, depths
 
-    return felt
+    return forces_at
 
 
 ENGINE = Engine(press, points=1, overlays=("tab",), triangles=triangles_under)

@@ -31,7 +31,7 @@ from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
 Mesh = tuple[Array, NDArray[np.int64]]  #: corners (n, 3) mm and triangles (m, 3)
-Felt = Callable[[Array], tuple[Array, Array]]
+ForcesAt = Callable[[Array], tuple[Array, Array]]
 """Plate (z mm, tilt x, tilt y) -> force on each point (n,), N, and how it grows (n,), N / mm."""
 
 STEP_MM = 0.3  # at most, of the advance and of the rim by a tilt
@@ -55,8 +55,8 @@ class Balance:
 
 
 def rest_on(
-    felt: Felt, top_mm: float, at: Array, touch: Touch, shape: tuple[int, int], engine: str, *,
-    deep_mm: float = DEEP_MM, halvings: int = 12, tolerance: float = 1e-4,
+    forces_at: ForcesAt, top_mm: float, at: Array, touch: Touch, shape: tuple[int, int],
+    engine: str, *, deep_mm: float = DEEP_MM, halvings: int = 12, tolerance: float = 1e-4,
 ) -> Contact:  # fmt: skip
     """Advance and tilt the plate until it balances: damped Newton on force and moments.
 
@@ -75,7 +75,7 @@ def rest_on(
     free = np.array([True, *~held])
 
     def balance(plate: Array) -> Balance:
-        forces, slopes = felt(np.array([plate[0], plate[1] / half, plate[2] / half]))
+        forces, slopes = forces_at(np.array([plate[0], plate[1] / half, plate[2] / half]))
         wrist = np.array([touch.force_n, *(stiffness * (plate[1:] - unloaded))])
         return Balance((rows @ forces - wrist)[free], forces, slopes)
 

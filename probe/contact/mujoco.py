@@ -53,12 +53,12 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
     modulus = STIFFER * sensor.overlay.young_mpa
     law = NeoHooke(modulus * share / sensor.overlay.height_mm, sensor.overlay.height_mm)
 
-    def felt(plate: Array) -> tuple[Array, Array]:
+    def forces_at(plate: Array) -> tuple[Array, Array]:
         deep = depths(plate)
         forces, slopes = law(deep)
         return forces, np.where(deep > 0, slopes, 0.0)
 
-    return rest_on(felt, top_mm, points.reshape(-1, 2), touch, sensor.shape, "mujoco")
+    return rest_on(forces_at, top_mm, points.reshape(-1, 2), touch, sensor.shape, "mujoco")
 
 
 Depths = Callable[[Array], Array]

@@ -8,7 +8,8 @@
     guard     HDF5 files of unknown origin, checked by hand before they are read
     files     names of the files, who writes them, errors
     layout    datasets, attributes, blocks of frames
-    imported  .npy, .npz, .mat, HDF5, CSV or a folder of images -> recording; zarr  stores of FTP-1
+    imported  .npy, .npz, .mat, HDF5, CSV or a folder of images -> recording
+    zarr      Zarr stores, as FTP-1 has them -> arrays of images
     table, mcap, ros            recording <-> CSV, MCAP, ROS 2 messages
 
 A file under its final name is whole; `touch.part.h5` is being written, or its writer was killed:

@@ -17,7 +17,7 @@ import math
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -127,15 +127,10 @@ def store_arrays(path: Path) -> Iterator[tuple[str, ZarrArray]]:
             continue
         if len(array.shape) == 4:
             for k in range(min(array.shape[1], _MOST_ARRAYS)):
-                yield f"{name}/{k}", _channel(array, k)
+                shape = (array.shape[0], *array.shape[2:])
+                yield f"{name}/{k}", replace(array, shape=shape, channel=k)
         else:
             yield name, array
-
-
-def _channel(array: ZarrArray, k: int) -> ZarrArray:
-    shape = (array.shape[0], *array.shape[2:])
-    return ZarrArray(array.folder, shape, array.chunks, array.dtype, array.order,
-                     array.compressor, array.separator, array.fill, k)  # fmt: skip
 
 
 def _described(folder: Path, values: Any) -> ZarrArray | None:

@@ -11,7 +11,8 @@ it is run, or given), each in three forms, and the table of all readers::
         card.md, card.json      what is inside: seeds, version, format, licence, sha256
     results.json, results.md    of the readers, by half, world, class and decoy
 
-The same seed gives the same bytes in arrays; `FROZEN` holds the sha256 of the public half.
+The same seed gives the same bytes in arrays; `FROZEN` holds the sha256 of the first touches of each
+world of the public half.
 
 A world is a sensor type and an engine of contact (`WORLDS`). An answer is right if it names the
 face, within 2 mm and 10 degrees of the truth; next to another part, either may be named. Of what no
@@ -52,7 +53,13 @@ from recognizer.validation.files import write_json, write_text
 from recognizer.validation.ftp1 import write_ftp1
 from recognizer.validation.limits import bound_of_touch, errors_of
 from recognizer.validation.run import TouchProgress, prepare_run
-from recognizer.validation.statistics import inside_of, rms, round_digits, share_of
+from recognizer.validation.statistics import (
+    inside_of,
+    normalised_errors,
+    rms,
+    round_digits,
+    share_of,
+)
 from recognizer.validation.trial import judge
 from recognizer.validation.workers import prepare_reader
 
@@ -361,15 +368,12 @@ def _read_all(
         progress.step("touches")
     said = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     whole = {name: arrays[name] for name in COLUMNS} | said
-    right, off, turn = errors_of_answers(whole)
-    other, other_off, other_turn = errors_of_answers(whole, "also_")
-    dx, dy = (whole[f"answer_{k}_mm"] - whole[f"{k}_mm"] for k in "xy")
-    away = np.stack([dx, dy, turn], axis=-1)
-    with np.errstate(invalid="ignore"):
-        chi2 = np.array([_chi2(a, c) for a, c in zip(away, whole["covariance"], strict=True)])
+    named, away = errors_of_answers(whole)
+    other, away_of_other = errors_of_answers(whole, "also_")
+    right, away = named | other, np.where(named[:, None], away, away_of_other)
+    chi2 = np.array([_chi2(a, c) for a, c in zip(away, whole["covariance"], strict=True)])
     return whole | {
-        "right": right | other, "off": np.where(right, off, other_off),
-        "turn": np.degrees(np.where(right, turn, other_turn)),
+        "right": right, "off": np.hypot(away[:, 0], away[:, 1]), "turn": np.degrees(away[:, 2]),
         "chi2": np.where(right, chi2, math.nan), "world": np.full(len(rows), world),
     }  # fmt: skip
 
@@ -424,7 +428,7 @@ def _figures_of(whole: Mapping[str, Array], some: NDArray[np.bool_]) -> dict[str
             "wrong": share_of(int((wrong & (part["score"] > least)).sum()), total),
         },
         "inside_95": inside_of(chi2),
-        "normalised": round_digits(float(np.mean(chi2)) / 3) if len(chi2) else None,
+        "normalised": normalised_errors(chi2)["mean"],
         "ms": round_digits(float(np.mean(part["ms"])), 3),
     }
     for unit, name in (("mm", "off"), ("deg", "turn")):

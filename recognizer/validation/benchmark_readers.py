@@ -1,7 +1,7 @@
 """Readers of the benchmark: ours, and what it is measured against. One more: `BenchmarkReader`.
 
 A reader gets a world (`ReaderWorld`) once and the counts of one touch at a time, and returns an
-`Answer`, or None where it refuses. `score` orders its answers, the surest first.
+`ReaderAnswer`, or None where it refuses. `score` orders its answers, the surest first.
 
 ::
 
@@ -38,10 +38,10 @@ Array = NDArray[np.float64]
 TEMPLATES = 60_000  #: rendered places of all faces, 60 MB; the best are moved
 BEST, STEPS = 5, ((0.6, 0.05), (0.2, 0.02), (0.06, 0.005))  #: of these, by so many mm and rad
 RASTER_MM = 0.25  #: of the heights that templates are rendered from
-HIDDEN, EPOCHS = (256, 128), 400  #: of the network
+LAYERS, EPOCHS = (256, 128), 400  #: of the network
 
 
-class Answer(NamedTuple):
+class ReaderAnswer(NamedTuple):
     """What a reader says of a touch."""
 
     name: str  #: "Object/face"
@@ -69,7 +69,7 @@ class ReaderWorld:
         return {f"{f.object}/{f.face}": f for f in sorted(found, key=lambda f: (f.object, f.face))}
 
 
-Read = Callable[[NDArray[np.uint16]], Answer | None]
+Read = Callable[[NDArray[np.uint16]], ReaderAnswer | None]
 BenchmarkReader = Callable[[ReaderWorld], Read]
 """World -> counts (rows, columns) -> answer, or None."""
 
@@ -96,7 +96,7 @@ def reader_named(name: str) -> BenchmarkReader:
     return found
 
 
-def _answer_of(found: Recognition) -> Answer | None:
+def _answer_of(found: Recognition) -> ReaderAnswer | None:
     T = found.T_face_probe
     if not found or T is None:
         return None
@@ -105,7 +105,7 @@ def _answer_of(found: Recognition) -> Answer | None:
     score = min(margin, 1e6) + (found.bits or 0.0)
     turn = math.atan2(T[1, 0], T[0, 0])
     name = f"{found.object}/{found.face}"
-    return Answer(name, float(T[0, 3]), float(T[1, 3]), turn, score, found.covariance)
+    return ReaderAnswer(name, float(T[0, 3]), float(T[1, 3]), turn, score, found.covariance)
 
 
 def ours(world: ReaderWorld) -> Read:
@@ -122,7 +122,7 @@ def thesis(world: ReaderWorld) -> Read:
 
     reader = Reader(open_lab(world.database), world.sensor)
 
-    def read(counts: NDArray[np.uint16]) -> Answer | None:
+    def read(counts: NDArray[np.uint16]) -> ReaderAnswer | None:
         signal = reader.signal(counts)
         image = touch_image(world.sensor, signal.forces, signal.trust)
         return _answer_of(read_classically(reader.lab, image).recognition)
@@ -135,11 +135,11 @@ def chance(world: ReaderWorld) -> Read:
     rng = np.random.default_rng(0)
     names = list(world.faces)
 
-    def read(_counts: NDArray[np.uint16]) -> Answer:
+    def read(_counts: NDArray[np.uint16]) -> ReaderAnswer:
         name = names[int(rng.integers(len(names)))]
         places = world.faces[name].centres_mm
         x, y = places[int(rng.integers(len(places)))].tolist()
-        return Answer(name, x, y, float(rng.uniform(-math.pi, math.pi)), float(rng.random()))
+        return ReaderAnswer(name, x, y, float(rng.uniform(-math.pi, math.pi)), float(rng.random()))
 
     return read
 
@@ -182,7 +182,7 @@ def template(world: ReaderWorld) -> Read:
         places[some] = np.c_[at, rng.uniform(-math.pi, math.pi, len(at))]
         bank[some] = render(number, places[some])
 
-    def read(counts: NDArray[np.uint16]) -> Answer | None:
+    def read(counts: NDArray[np.uint16]) -> ReaderAnswer | None:
         image = _unit(np.sqrt(counts.reshape(1, -1).astype(np.float64)))[0]
         if not image.any():
             return None
@@ -201,7 +201,7 @@ def template(world: ReaderWorld) -> Read:
             found.append((best, face, place))
         best, face, place = max(found, key=lambda one: one[0])
         x, y, turn = place.tolist()
-        return Answer(names[face], x, y, turn, best)
+        return ReaderAnswer(names[face], x, y, turn, best)
 
     return read
 
@@ -233,7 +233,7 @@ def network(world: ReaderWorld) -> Read:
     turn = np.concatenate([turn, turn + math.pi])
     place = np.c_[np.tile(public["x_mm"], 2), np.tile(public["y_mm"], 2)] / 20.0
     some, inputs = np.tile(known, 2), _features(images)
-    options = {"hidden_layer_sizes": HIDDEN, "max_iter": EPOCHS, "random_state": 0}
+    options = {"hidden_layer_sizes": LAYERS, "max_iter": EPOCHS, "random_state": 0}
     one_hot = np.eye(len(names) + 1)[label]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
@@ -242,14 +242,14 @@ def network(world: ReaderWorld) -> Read:
             np.c_[inputs, one_hot][some], np.c_[place, np.cos(turn), np.sin(turn)][some]
         )
 
-    def read(counts: NDArray[np.uint16]) -> Answer | None:
+    def read(counts: NDArray[np.uint16]) -> ReaderAnswer | None:
         image = _features(counts[None])
         shares = which.predict_proba(image)[0]
         label = int(which.classes_[shares.argmax()])
         if label < 0:
             return None
         x, y, c, s = where.predict(np.c_[image, one_hot[[label]]])[0].tolist()
-        return Answer(names[label], 20 * x, 20 * y, math.atan2(s, c), float(shares.max()))
+        return ReaderAnswer(names[label], 20 * x, 20 * y, math.atan2(s, c), float(shares.max()))
 
     return read
 

@@ -118,18 +118,17 @@ def truth_row(found: DrawnTouch, trial: Trial, label_of: dict[str, int]) -> dict
 
 def errors_of_answers(
     arrays: Mapping[str, Array], truth: str = ""
-) -> tuple[NDArray[np.bool_], Array, Array]:
-    """Return which answers are right (N,), how far off, mm, and how much turned, rad, signed.
+) -> tuple[NDArray[np.bool_], Array]:
+    """Return which answers are right (N,), and by how much they miss: (N, 3), x, y, mm, turn, rad.
 
     A right answer names the face, within `NEAR_MM` and `NEAR_DEG` of the truth, whose columns begin
     with `truth`.
     """
-    dx, dy = (arrays[f"answer_{k}_mm"] - arrays[f"{truth}{k}_mm"] for k in "xy")
+    x, y = (arrays[f"answer_{k}_mm"] - arrays[f"{truth}{k}_mm"] for k in "xy")
     turn = np.angle(np.exp(1j * (arrays["answer_theta_rad"] - arrays[f"{truth}theta_rad"])))
-    off = np.hypot(dx, dy)
-    near = (off < NEAR_MM) & (np.degrees(np.abs(turn)) < NEAR_DEG)
+    near = (np.hypot(x, y) < NEAR_MM) & (np.degrees(np.abs(turn)) < NEAR_DEG)
     named = (arrays["answer"] >= 0) & (arrays["answer"] == arrays[f"{truth}label"])
-    return named & near, off, turn
+    return named & near, np.stack([x, y, turn], axis=-1)
 
 
 def baseline(arrays: dict[str, Array], chosen: Array) -> dict[str, Any]:
@@ -138,7 +137,8 @@ def baseline(arrays: dict[str, Array], chosen: Array) -> dict[str, Any]:
     A right answer is one of `errors_of_answers`.
     """
     some = {name: arrays[name][chosen] for name in JUDGED}
-    right, off, turn = errors_of_answers(some)
+    right, away = errors_of_answers(some)
+    off, turn = np.hypot(away[:, 0], away[:, 1]), away[:, 2]
     answered = some["answer"] >= 0
     return {
         "touches": len(off),
@@ -207,7 +207,6 @@ def write_lerobot(data: TouchDataset, folder: Path) -> None:
 
 def _columns(data: TouchDataset) -> dict[str, Array]:
     """Return a column for each feature; the touches kept for testing come last."""
-    order = np.argsort(data.arrays["test"], kind="stable")
     order = np.argsort(data.arrays["test"], kind="stable")
     arrays = {name: values[order] for name, values in data.arrays.items() if name != "names"}
     total = len(order)

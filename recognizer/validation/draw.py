@@ -244,7 +244,7 @@ def _sample_scene(
     if plan.kind in EXCHANGED:
         return _exchanged(plan, encoding, face, sensor, ranges, rng)
     if plan.kind in DECOYS:
-        return _reseated(plan, encoding, face, ranges, rng)
+        return _reseated(plan, encoding, scene, ranges, rng)
     touch = _draw_on_face(plan, scene, most, rng, ranges)
     if plan.kind == ROW:
         quarters = round((touch.theta_rad + face.rotation_rad) / (math.pi / 2))
@@ -330,7 +330,7 @@ def _exchanged(
 
 
 def _reseated(
-    plan: TouchPlan, encoding: EmbossedArray, face: EncodedFace, ranges: TouchRanges,
+    plan: TouchPlan, encoding: EmbossedArray, scene: Scene, ranges: TouchRanges,
     rng: np.random.Generator,
 ) -> tuple[ContactScene, Touch]:  # fmt: skip
     """Glue a panel into its seat turned, or another one of the object into that seat.
@@ -338,18 +338,16 @@ def _reseated(
     What is touched is that panel, so the answer that names it, and the place on it, is right; any
     other is wrong. That the panel is not where the database has it, one touch cannot tell.
     """
-    scene, most = plan.face(face.object, face.face)
-    own = [n for n in faces_of_kind(encoding, plan.kind, plan.prints)
-           if encoding.face(n).object == face.object]  # fmt: skip
+    faces = [encoding.face(n) for n in faces_of_kind(encoding, plan.kind, plan.prints)]
     ways = []
-    for number in own:
-        other = encoding.face(number)
-        if (other.face == face.face) == (plan.kind == TURNED):
+    for other in faces:
+        same = other.face == scene.face
+        if other.object == scene.object_name and same == (plan.kind == TURNED):
             panel, _ = plan.face(other.object, other.face)
             ways += [(panel, place) for place in seats_of(scene.region, panel.region)]
     if plan.kind == TURNED:
         ways = [way for way in ways if abs(way[1].turn_rad) > TURN_RAD]
-    touch = _draw_on_face(replace(plan, kind="anywhere"), scene, most, rng, ranges)
+    touch = _draw_on_face(replace(plan, kind="anywhere"), scene, 0.0, rng, ranges)
     if not ways:  # no other way to glue it: as registered
         return ContactScene(scene), touch
     panel, place = ways[int(rng.integers(len(ways)))]

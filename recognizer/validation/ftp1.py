@@ -22,7 +22,6 @@ same bytes.
 
 from __future__ import annotations
 
-import json
 import shutil
 import zlib
 from pathlib import Path
@@ -30,6 +29,8 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from recognizer.validation.files import write_json
 
 AREA: Final = 0  #: thumb pad, or the first pad of a gripper
 ROWS: Final = 512  #: touches in a chunk
@@ -51,8 +52,8 @@ def write_ftp1(
     pose[:, 0], pose[:, 1] = arrays["x_mm"] / 1000, arrays["y_mm"] / 1000
     pose[:, 5] = arrays["theta_rad"]
     for folder in ("", "data", "meta"):
-        _json(draft / folder / ".zgroup", {"zarr_format": 2})
-    _json(draft / ".zattrs", attributes)
+        write_json(draft / folder / ".zgroup", {"zarr_format": 2})
+    write_json(draft / ".zattrs", attributes)
     finger = "data/right_tactile_{}_finger"
     for name, values in {
         "data/timestamps": each.astype(np.float64),
@@ -78,15 +79,10 @@ def _array(folder: Path, values: NDArray[Any]) -> None:
         "compressor": {"id": "zlib", "level": LEVEL}, "fill_value": None, "order": "C",
         "filters": None,
     }  # fmt: skip
-    _json(folder / ".zarray", described)
+    write_json(folder / ".zarray", described)
     for number, start in enumerate(range(0, len(values), ROWS)):
         chunk = np.zeros(chunks, values.dtype)
         some = values[start : start + ROWS]
         chunk[: len(some)] = some
         name = ".".join([str(number), *["0"] * (values.ndim - 1)])
         (folder / name).write_bytes(zlib.compress(chunk.tobytes(), LEVEL))
-
-
-def _json(path: Path, values: Any) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(values, indent=1) + "\n")

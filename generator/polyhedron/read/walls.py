@@ -84,9 +84,8 @@ def round_walls(solid: Polyhedron, normals: Floats) -> list[Wall]:
 
 def _strips(loops: Sequence[Loop], normals: Floats) -> Iterator[_Strip]:
     """Give all strips of triangles or quadrangles that meet smoothly, as long as they are."""
-    place: dict[
-        tuple[int, int], tuple[int, int]
-    ] = {}  # (start, end) of an edge -> its face, and where in the loop it starts
+    # (start, end) of an edge -> its face, and where in the loop it starts
+    place: dict[tuple[int, int], tuple[int, int]] = {}
     for face, loop in enumerate(loops):
         if len(loop) in (3, 4):
             place |= {(v, loop[k + 1 - len(loop)]): (face, k) for k, v in enumerate(loop)}
