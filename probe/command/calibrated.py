@@ -260,7 +260,7 @@ def _read_list(path: Path) -> list[LoadRecording]:
         text = foreign_bytes(path, CalibrationError, most=MOST_TEXT, fix=fix).decode("utf-8-sig")
         rows = list(csv.DictReader(io.StringIO(text, newline="")))
     except (UnicodeError, csv.Error) as error:
-        raise CalibrationError(f"cannot be read: {error}", fix=fix, place=str(path)) from error
+        raise CalibrationError(f"cannot be read: {error}", fix=fix, place=path) from error
     given = []
     for number, row in enumerate(rows, 2):
         place = f"{path}:{number}"
@@ -298,7 +298,7 @@ def _footprint(path: Path) -> NDArray[np.float64]:
     try:
         shares = np.loadtxt(io.BytesIO(content), delimiter=",", ndmin=2, encoding="utf-8")
     except ValueError as error:
-        raise CalibrationError(f"cannot be read: {error}", fix=fix, place=str(path)) from error
+        raise CalibrationError(f"cannot be read: {error}", fix=fix, place=path) from error
     return shares
 
 

@@ -299,7 +299,7 @@ def calibration_for(path: Path, recording: Recording) -> Calibration:
         raise CalibrationError(
             f"the recording was made with calibration {named[:12]}..., not with this one",
             fix="give the file whose hash `probe-sensor info` shows as that",
-            place=str(path),
+            place=path,
         )
     return known
 
