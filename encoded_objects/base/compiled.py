@@ -50,7 +50,7 @@ def load_library(folder: Path, signatures: Signatures, file: Path | None = None)
         raise KernelsError(
             f"the compiled loops are {'missing' if library is None else 'older than their source'}",
             fix="install the project again: pip install -e . (or pip install encoded-objects)",
-            place=str(file),
+            place=file,
         )
     for name, (result, arguments) in signatures.items():
         function = getattr(library, name)

@@ -27,7 +27,7 @@ class EncodedObjectsError(Exception):
     fix
         The way out, as an instruction ("set pitch to 5.7 mm or less").
     place
-        Where: a file, `file:line:column`, the name of a face, a port's URL.
+        Where: a file, `file:line:column`, the name of a face, a port's URL; kept as text.
 
     Examples
     --------
@@ -43,11 +43,11 @@ class EncodedObjectsError(Exception):
 
     exit_code = 2
 
-    def __init__(self, cause: str, *, fix: str = "", place: str = "") -> None:
+    def __init__(self, cause: str, *, fix: str = "", place: object = "") -> None:
         super().__init__(cause)
         self.cause = cause
         self.fix = fix
-        self.place = place
+        self.place = str(place)
 
     def __str__(self) -> str:
         head = f"{self.place}: {self.cause}" if self.place else self.cause

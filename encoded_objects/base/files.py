@@ -57,7 +57,7 @@ def refuse_taken(out: Path, suffix: str, *, replace: bool) -> None:
 def file_exists_error(out: Path) -> EncodedObjectsError:
     """Return the refusal of a file that is there already."""
     fix = "choose another name, or replace it with --replace"
-    return EncodedObjectsError("the file is there already", fix=fix, place=str(out))
+    return EncodedObjectsError("the file is there already", fix=fix, place=out)
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from itertools import combinations, pairwise
 from math import gcd
 
@@ -77,6 +78,7 @@ def same_shape(one: Glyph, other: Glyph) -> bool:
     return _shape(one) == _shape(other)
 
 
+@lru_cache(maxsize=16)
 def check_distinguishable(alphabet: str, glyphs: tuple[Glyph, ...]) -> None:
     """Refuse glyphs in several pieces, and those that look like one of them after a turn.
 

@@ -136,7 +136,7 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike[str]) ->
             file.write(content.encode())
     except OSError as error:
         raise CalibrationError(
-            f"cannot be written: {error.strerror}", fix="choose another folder", place=str(name)
+            f"cannot be written: {error.strerror}", fix="choose another folder", place=name
         ) from error
     return digest
 

@@ -1,14 +1,11 @@
 """`probe-sensor`: list, info, types, calibrate, record, replay, export, simulate, live.
 
     app, options   the commands; their options
-    listed         list, types
-    described      info
-    recorded       record, replay
-    exported       export, import
-    calibrated     calibrate bias | loads
-    guided         calibrate port
+    described      list, types, info
+    recorded       record, replay, export, import
+    calibrated     calibrate bias | loads | port
     simulated      simulate
-    live           live;  live_state: what the keys change
+    live           live
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 ran but failed,
 2 bad input, 3 device, 4 database, 130 interrupted. Nothing heavy is imported before it is

@@ -39,7 +39,7 @@ calibrate = Application(
 @command(app, "list")
 def list_ports(as_json: Json = False) -> int:
     """Print the ports that are there, which of them may be a probe, and URLs that always work."""
-    from probe.command.listed import list_ports
+    from probe.command.described import list_ports
 
     return list_ports(as_json=as_json)
 
@@ -67,7 +67,7 @@ def types(
     as_json: Json = False,
 ) -> int:
     """List the sensor types, show one as YAML to start from, or check a file."""
-    from probe.command.listed import list_types
+    from probe.command.described import list_types
 
     return list_types(name, schema=schema, as_json=as_json)
 
@@ -120,7 +120,7 @@ def replay(
 @command(app)
 def export(options: ExportOptions) -> int:
     """Write a recording as a table, an array, ROS 2 messages, or an image of it as a picture."""
-    from probe.command.exported import export_files
+    from probe.command.recorded import export_files
 
     return export_files(options)
 
@@ -153,7 +153,7 @@ def import_(
     else:
         made = import_array(array, output, dataset=dataset, rate_hz=rate, sensor=sensor,
                             sensor_type=sensor_type, replace=replace)  # fmt: skip
-    from probe.command.exported import report_import
+    from probe.command.recorded import report_import
 
     return report_import(made, array, as_json=as_json)
 
@@ -210,7 +210,7 @@ def loads(options: LoadsOptions) -> int:
 @command(calibrate)
 def port(options: GuideOptions) -> int:
     """Calibrate a probe step by step: says what to put on, reads it, and fits."""
-    from probe.command.guided import guide_loads
+    from probe.command.calibrated import guide_loads
 
     return guide_loads(options)
 

@@ -192,8 +192,7 @@ class SimulateOptions(Options):
         ),
     ] = None
     tilt_x: Annotated[
-        float | None,
-        Option("Tilt about the sensor's x, degrees; 0, or up to 2 with --touches."),
+        float | None, Option("Tilt about the sensor's x, degrees; 0, or up to 2 with --touches.")
     ] = None
     tilt_y: Annotated[float | None, Option("The same about y.")] = None
     sensor_type: Typed = ""

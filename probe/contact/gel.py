@@ -18,13 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType, usual_force_n
-from probe.contact.contract import (
-    STEEPEST_RAD,
-    Contact,
-    Touch,
-    heights_under,
-    no_contact,
-)
+from probe.contact.contract import STEEPEST_RAD, Contact, Touch, heights_under, no_contact
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import check_load, rest
 from probe.errors import ContactError

@@ -31,13 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from probe.contact.contract import (
-    Contact,
-    Touch,
-    heights_under,
-    no_contact,
-    refuse_steep,
-)
+from probe.contact.contract import Contact, Touch, heights_under, no_contact, refuse_steep
 from probe.contact.neo_hooke import Linear, NeoHooke
 from probe.contact.plate import Columns, PlatePose, PlateRest, check_load, rest
 from probe.contact.tips import Tips, tip_points

@@ -264,5 +264,5 @@ def check_part(name: str, solid: Any, step: Path, stl: Path) -> None:
         raise SolidError(
             f"part '{name}' of {volume:.3f} mm3 has {', '.join(wrong)}",
             fix="do not print it; report the sensor type together with this message",
-            place=str(step),
+            place=step,
         )

@@ -30,7 +30,7 @@ EXAMPLES = "serial:///dev/ttyACM0?baud=1000000, sim: or file:recording.h5"
 SCHEMES = {
     "serial": ("probe.port.serial_line:open_serial", "device"),
     "flexitac": ("probe.port.flexitac:open_flexitac", "device"),
-    "sim": ("probe.port.simulated:open_simulation", ""),
+    "sim": ("probe.port.software:open_simulation", ""),
     "file": ("probe.port.software:open_recording", "recording"),
 }
 

@@ -54,7 +54,7 @@ def explain_errors(path: Path, action: str) -> Iterator[None]:
             raise damaged_error(path, action) from error
         reason = error.strerror
         fix = _FIXES.get(error.errno, "check the disk and the folder")
-        raise RecordingError(f"cannot {action} it: {reason}", fix=fix, place=str(path)) from error
+        raise RecordingError(f"cannot {action} it: {reason}", fix=fix, place=path) from error
     except DAMAGE as error:
         raise damaged_error(path, action) from error
 
@@ -64,7 +64,7 @@ def damaged_error(path: Path, action: str = "read") -> RecordingError:
     return RecordingError(
         f"it is damaged: cannot {action} it",
         fix="copy it again, or save what can be read with `repair`",
-        place=str(path),
+        place=path,
     )
 
 
@@ -74,12 +74,12 @@ def not_closed_error(path: Path) -> RecordingError:
         return RecordingError(
             "it is still being written",
             fix="wait until it is closed, or read what there is with `live`",
-            place=str(path),
+            place=path,
         )
     return RecordingError(
         "its writer ended without closing it",
         fix=f"run `repair` on {path.name}: it keeps every frame that reached the disk",
-        place=str(path),
+        place=path,
     )
 
 
@@ -88,7 +88,7 @@ def blank_error(part: Path) -> RecordingError:
     return RecordingError(
         "nothing in it has reached the disk yet",
         fix="wait for its first frames" if is_locked(part) else "delete it: it holds no frame",
-        place=str(part),
+        place=part,
     )
 
 
@@ -152,9 +152,7 @@ def check_name(path: Path, *, replace: bool) -> None:
     """
     if path.suffix not in (".h5", ".hdf5") or is_part(path):
         raise RecordingError(
-            f"'{path.name}' is no name for a recording",
-            fix="take a name like touch.h5",
-            place=str(path),
+            f"'{path.name}' is no name for a recording", fix="take a name like touch.h5", place=path
         )
     taken = [path] if path.exists() else [old for _, old in series_of(path)]
     if taken and not replace:
@@ -177,7 +175,7 @@ def final_name(
         raise RecordingError(
             "another file took the name of the recording",
             fix=f"move it away, then run `repair` on {part.name}",
-            place=str(final),
+            place=final,
         )
     os.replace(part, final)
     if replace:
@@ -204,7 +202,7 @@ def _missing_error(path: Path) -> RecordingError:
     fix = "check the name of the file"
     if is_part(path) and final_of(path).exists():
         fix = f"it was closed meanwhile: read {final_of(path).name}"
-    return RecordingError("there is no such recording", fix=fix, place=str(path))
+    return RecordingError("there is no such recording", fix=fix, place=path)
 
 
 def _lock_request(kind: int) -> bytes:

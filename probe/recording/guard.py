@@ -77,7 +77,7 @@ def open_hdf5(
         raise RecordingError(
             f"it is truncated: {head.size} of {head.end} bytes",
             fix="copy it again, or save what can be read with `repair`",
-            place=str(path),
+            place=path,
         )
     if head.writing and not live and not damaged:
         raise not_closed_error(path)
@@ -190,7 +190,7 @@ def check_file(file: h5py.File, path: Path) -> list[h5py.h5d.DatasetID]:
             raise RecordingError(
                 f"it holds more than {_MOST_LINKS:,} objects, or groups {_MOST_DEPTH} deep",
                 fix="copy the images into a file of their own",
-                place=str(path),
+                place=path,
             )
         for name, kind in found:
             place = f"{folder}/{name.decode(errors='replace')}"
@@ -222,7 +222,7 @@ def check_file(file: h5py.File, path: Path) -> list[h5py.h5d.DatasetID]:
             raise RecordingError(
                 f"{place[:80]} is a link that leads nowhere",
                 fix="delete the link, or copy the images into a file of their own",
-                place=str(path),
+                place=path,
             )
     return held
 
@@ -260,7 +260,7 @@ def _checked_cache(
         raise RecordingError(
             f"{place[:80]} is packed twice, and may unpack to any size",
             fix="save it with one compression",
-            place=str(path),
+            place=path,
         )
     shape, size = dataset.shape, dataset.get_type().get_size()
     chunked = layout == h5py.h5d.CHUNKED
@@ -271,14 +271,14 @@ def _checked_cache(
         raise RecordingError(
             f"{place[:80]} is stored in chunks of {piece:,} bytes, {MOST_CHUNK:,} can be read",
             fix="save it in smaller chunks, of 64 images each",
-            place=str(path),
+            place=path,
         )
     if pieces * (max(piece, _PIECE) if chunked else piece) > most:
         raise RecordingError(
             f"{place[:80]} claims {' x '.join(map(str, shape))} values, more than a file of "
             f"{path.stat().st_size:,} bytes can hold",
             fix="save only what was measured, without a place for more",
-            place=str(path),
+            place=path,
         )
     if not chunked or piece <= _LARGE_CHUNK:
         return None
@@ -292,7 +292,7 @@ def _leads_out(path: Path, place: str) -> RecordingError:
     return RecordingError(
         f"{place[:80]} leads to another file: a recording holds all its values itself",
         fix="copy the values into one file, without links, external or virtual datasets",
-        place=str(path),
+        place=path,
     )
 
 
@@ -342,9 +342,9 @@ def _number(data: bytes, at: int) -> int:
 
 def _no_hdf5_error(path: Path) -> RecordingError:
     if path.stat().st_size == 0:
-        return RecordingError("it is empty", fix="delete it", place=str(path))
+        return RecordingError("it is empty", fix="delete it", place=path)
     return RecordingError(
         "it is no HDF5 file",
         fix="give a recording (.h5), or import an array from .npy or .mat",
-        place=str(path),
+        place=path,
     )

@@ -189,19 +189,17 @@ def _checked(file: h5py.File, path: Path, *, closed: bool) -> FrameFile:
             f"its format is {attributes.get('format_version')}, this programme knows "
             f"{FORMAT_VERSION}",
             fix="install a newer version of encoded-objects",
-            place=str(path),
+            place=path,
         )
     if "frames" not in names:
-        raise RecordingError(
-            f"it has no dataset /frames, but {others}", fix=_IMPORT, place=str(path)
-        )
+        raise RecordingError(f"it has no dataset /frames, but {others}", fix=_IMPORT, place=path)
     shapes = {name: _shape_of(file, path, name) for name in names}
     rows, columns = shapes["frames"][1:]
     if rows * columns > MOST_TACTELS:
         raise RecordingError(
             f"its images are of {rows} x {columns}, at most {MOST_TACTELS:,} values are read",
             fix="import a part of each image",
-            place=str(path),
+            place=path,
         )
     lengths = {shape[0] for shape in shapes.values()}
     ours = {name: attributes.pop(name, None) for name in _OURS} if own else {}
@@ -235,7 +233,7 @@ def _check_attributes(attributes: dict[str, Any], path: Path) -> None:
                 f"its attribute {name} is no {'number' if kind is int else 'text'}: "
                 f"{str(value)[:40]!r}",
                 fix=f"delete the attribute {name}, or write it as it was",
-                place=str(path),
+                place=path,
             )
 
 
@@ -256,7 +254,7 @@ def _read_block(file: h5py.File, path: Path, start: int, stop: int) -> FrameBloc
             raise RecordingError(
                 f"/{name} holds other things than {kind} in frames {start} ... {stop - 1}",
                 fix=fix,
-                place=str(path),
+                place=path,
             )
         values[name] = array.astype(dtype.newbyteorder("="))
     return FrameBlock(
@@ -282,7 +280,7 @@ def _shape_of(file: h5py.File, path: Path, name: str) -> tuple[int, ...]:
     lengths = iter(("rows", "columns"))
     wanted = ", ".join(["N", *(str(n) if n >= 0 else next(lengths) for n in shape)])
     raise RecordingError(
-        f"/{name} must hold numbers ({wanted}), it is {has}", fix=_IMPORT, place=str(path)
+        f"/{name} must hold numbers ({wanted}), it is {has}", fix=_IMPORT, place=path
     )
 
 

@@ -184,7 +184,7 @@ def _choose_array(
         cause, fix = f"several arrays of images in it: {here}", "say which by --dataset NAME"
     else:
         cause, fix = f"no array of images '{name}' in it, but {here}", "take one of these"
-    raise RecordingError(cause, fix=fix, place=str(path))
+    raise RecordingError(cause, fix=fix, place=path)
 
 
 def _types_of(arrays: list[FileArray]) -> str:
@@ -216,7 +216,7 @@ def _scale(path: Path, found: FileArray, kind: SensorType) -> tuple[float, float
                 f"{found.name} holds values that are no numbers, "
                 f"the first in image {first + int(np.argwhere(bad)[0, 0])}",
                 fix="replace them, or leave those images out",
-                place=str(path),
+                place=path,
             )
         least, most = min(least, float(images.min())), max(most, float(images.max()))
         whole = whole and (images.dtype.kind != "f" or bool((images == np.floor(images)).all()))
@@ -229,7 +229,7 @@ def _scale(path: Path, found: FileArray, kind: SensorType) -> tuple[float, float
         raise RecordingError(
             f"{found.name} holds nothing above {most:g}",
             fix="multiply the values by a power of ten",
-            place=str(path),
+            place=path,
         )
     return least, scale
 
@@ -262,7 +262,7 @@ def _numpy_arrays(path: Path, *, archive: bool) -> list[FileArray]:
         raise RecordingError(
             "it holds objects, or it is damaged",
             fix="save a plain array of numbers (N, rows, columns)",
-            place=str(path),
+            place=path,
         ) from error
 
 
@@ -289,7 +289,7 @@ def _check_claim(path: Path, claimed: int) -> None:
         raise RecordingError(
             f"it claims arrays of {claimed:,} bytes, {_MOST_BYTES:,} are read",
             fix="save a part of it, or as .npy or HDF5, which are read piece by piece",
-            place=str(path),
+            place=path,
         )
 
 
@@ -305,7 +305,7 @@ def _matlab_arrays(path: Path) -> list[FileArray]:
             variables = loadmat(file, appendmat=False)
     except MatReadError as error:
         raise RecordingError(
-            "it is no MATLAB file, or it is damaged", fix="save it again", place=str(path)
+            "it is no MATLAB file, or it is damaged", fix="save it again", place=path
         ) from error
     return [
         FileArray(name, array)
@@ -333,7 +333,7 @@ def _folder_array(folder: Path, image: tuple[int, int]) -> FileArray:
         paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
     if not paths:
         raise RecordingError(
-            "no picture in the folder", fix=f"put {', '.join(SUFFIXES)} there", place=str(folder)
+            "no picture in the folder", fix=f"put {', '.join(SUFFIXES)} there", place=folder
         )
     return FileArray(folder.name, np.stack([_picture(path, image) for path in paths]))
 
@@ -348,7 +348,7 @@ def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
             lines = [line for line in csv.reader(text) if any(cell.strip() for cell in line)]
         except (UnicodeError, csv.Error) as bad:
             raise RecordingError(
-                f"it is no table: {bad}", fix="save it as CSV, UTF-8", place=str(path)
+                f"it is no table: {bad}", fix="save it as CSV, UTF-8", place=path
             ) from bad
     head = [] if not lines or _are_numbers(lines[0]) else [name.strip() for name in lines.pop(0)]
     wanted = [name for name in table_header(image) if name.startswith("r")]
@@ -365,7 +365,7 @@ def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
         raise RecordingError(
             f"lines of {values.shape[-1]} numbers are no images of {rows} x {columns_}",
             fix=f"write {rows * columns_} numbers a line, or give the --sensor-type",
-            place=str(path),
+            place=path,
         )
     return FileArray(path.stem, values)
 
@@ -380,7 +380,7 @@ def _picture(path: Path, image: tuple[int, int]) -> NDArray[np.float64]:
                 values = np.asarray(opened) if shape == image else None  # a bomb stays packed
         except (UnidentifiedImageError, Image.DecompressionBombError, SyntaxError) as bad:
             raise RecordingError(
-                "it is no picture, or it is damaged", fix="save it again", place=str(path)
+                "it is no picture, or it is damaged", fix="save it again", place=path
             ) from bad
     if values is None or values.shape != image or values.dtype.kind not in "uif":
         shape = shape if values is None else values.shape
@@ -388,7 +388,7 @@ def _picture(path: Path, image: tuple[int, int]) -> NDArray[np.float64]:
             f"a picture of {' x '.join(map(str, shape))}, not of "
             f"{image[0]} x {image[1]} grey values",
             fix="save it in grey, a pixel a tactel; or give the --sensor-type",
-            place=str(path),
+            place=path,
         )
     return values.astype(np.float64)
 
@@ -403,7 +403,7 @@ def _numbers(path: Path, lines: list[list[str]], headed: bool) -> NDArray[np.flo
                 place=f"{path}:{number}",
             )
     if not lines:
-        raise RecordingError("it holds no numbers", fix="write an image a line", place=str(path))
+        raise RecordingError("it holds no numbers", fix="write an image a line", place=path)
     return np.array(lines, np.float64)
 
 

@@ -191,7 +191,7 @@ def _make_file(path: Path) -> int:
         else:
             cause = "a recording that was interrupted stands there"
             fix = f"run `repair` on {path.name}, or delete it"
-        raise RecordingError(cause, fix=fix, place=str(path)) from error
+        raise RecordingError(cause, fix=fix, place=path) from error
     take_lock(descriptor)
     return descriptor
 

@@ -161,7 +161,7 @@ def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
             there = ", ".join(sorted(set(kinds.values()))) or "nothing"
             raise RecordingError(
                 f"no {IMAGE} in it, but {there[:200]}", fix="record the tactile image too",
-                place=str(path)
+                place=path
             )  # fmt: skip
         said = {one.name: one.metadata for one in reader.iter_metadata()}.get(METADATA, {})
         more = parse_json(said.get("more", "{}"), RecordingError, fix=_MEND, place=str(path))
@@ -169,7 +169,7 @@ def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
         if odd:
             raise RecordingError(
                 f"attribute {odd[0][:60]!r} of the recording is no text, number or array of them",
-                fix="write it as one of these", place=str(path)
+                fix="write it as one of these", place=path
             )  # fmt: skip
         origin = RecordingOrigin(
             said.get("sensor", ""), said.get("calibration", ""), said.get("units", "counts"),
@@ -206,12 +206,12 @@ def _open_mcap(path: Path) -> Iterator[McapReader]:
         except InvalidMagic as error:
             raise RecordingError(
                 "this is no MCAP file, or it is cut off",
-                fix=f"give a file of ROS 2 messages, or {_MEND}", place=str(path)
+                fix=f"give a file of ROS 2 messages, or {_MEND}", place=path
             ) from error  # fmt: skip
         except (*DAMAGE, OSError, McapError, ZstdError) as error:
             said = f": {str(error)[:120]}" if str(error) else ""
             raise RecordingError(
-                f"it is damaged ({type(error).__name__}{said})", fix=_MEND, place=str(path)
+                f"it is damaged ({type(error).__name__}{said})", fix=_MEND, place=path
             ) from error
 
 
@@ -256,7 +256,7 @@ def _check_chunks(path: Path, stream: BinaryIO, summary: Summary | None) -> None
         if size > MOST_CHUNK or room < 0:
             raise RecordingError(
                 f"a chunk of {size:,} bytes when unpacked, more than the file can hold",
-                fix="write it again in chunks of some MB", place=str(path)
+                fix="write it again in chunks of some MB", place=path
             )  # fmt: skip
 
 
@@ -266,7 +266,7 @@ def _blocks(frames: Iterator[Frame], path: Path) -> Iterator[FrameBlock]:
         if odd:
             raise RecordingError(
                 f"images of {some[0].counts.shape} and of {odd[0].counts.shape} readings",
-                fix="keep the images of one sensor in a file", place=str(path)
+                fix="keep the images of one sensor in a file", place=path
             )  # fmt: skip
         yield block_of(some)
 
@@ -325,9 +325,7 @@ def _frame(
     try:
         return frame_from(_counts(image, number, path), t_ns=t_ns, seq=seq, wrist=wrist, pose=T)
     except FrameError as error:
-        raise RecordingError(
-            f"image {number}: {error.cause}", fix=error.fix, place=str(path)
-        ) from error
+        raise RecordingError(f"image {number}: {error.cause}", fix=error.fix, place=path) from error
 
 
 def _stamp(message: Message) -> int:
@@ -340,7 +338,7 @@ def _counts(image: Message, number: int, path: Path) -> NDArray[Any]:
     if kind is None:
         raise RecordingError(
             f"image {number} is encoded as {image['encoding'][:40]}",
-            fix=f"take {', '.join(_ENCODINGS)}", place=str(path)
+            fix=f"take {', '.join(_ENCODINGS)}", place=path
         )  # fmt: skip
     order = ">" if image["is_bigendian"] else "<"
     rows = np.frombuffer(image["data"], np.uint8)
@@ -348,7 +346,7 @@ def _counts(image: Message, number: int, path: Path) -> NDArray[Any]:
     if rows.size != height * step or step < width * int(kind[1]):
         raise RecordingError(
             f"image {number} has {rows.size} bytes, not {height} rows of {step}",
-            fix="write its step and height as they are", place=str(path)
+            fix="write its step and height as they are", place=path
         )  # fmt: skip
     plain = rows.reshape(height, step)[:, : width * int(kind[1])]
     return np.ascontiguousarray(plain).view(order + kind)
@@ -364,7 +362,7 @@ def _pose(pose: Message, path: Path) -> NDArray[np.float64]:
     except ValueError as error:
         raise RecordingError(
             f"the pose at {_stamp(pose)} ns has no orientation: {turn}",
-            fix="write a unit quaternion", place=str(path)
+            fix="write a unit quaternion", place=path
         ) from error  # fmt: skip
     T[:3, 3] = 1e3 * np.array(at)
     return T

@@ -83,9 +83,7 @@ class Recording:
             with open_frames(name, live=self.live) as file:
                 if file.own and not file.even and not self.live:
                     raise RecordingError(
-                        "its datasets have different lengths",
-                        fix="run `repair` on it",
-                        place=str(name),
+                        "its datasets have different lengths", fix="run `repair` on it", place=name
                     )
             first = first or file
             if file.shape != first.shape:
@@ -93,7 +91,7 @@ class Recording:
                     f"its images are of {file.shape}, those of {files[0].path.name} of "
                     f"{first.shape}",
                     fix="read the two by themselves",
-                    place=str(name),
+                    place=name,
                 )
             files.append(File(name, file.frames, file.poses))
         assert first is not None

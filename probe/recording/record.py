@@ -113,7 +113,7 @@ class Recorder:
                 f"a frame of {rows} x {columns} readings in a recording of {self._shape[0]} x "
                 f"{self._shape[1]}",
                 fix="give the --sensor-type of the sensor, one recording for each",
-                place=str(self.path),
+                place=self.path,
             )
         if self._piece_began_ns is None:
             self._piece_began_ns = frame.t_ns
@@ -151,7 +151,7 @@ class Recorder:
     def _open_journal(self) -> JournalWriter:
         if self._journal is None:
             raise RecordingError(
-                "the recording is closed", fix="begin another one", place=str(self.path)
+                "the recording is closed", fix="begin another one", place=self.path
             )
         return self._journal
 
@@ -174,7 +174,7 @@ class Recorder:
                 os.replace(draft, part)
         except RecordingError as error:
             fix = f"{error.fix}, then run `repair` on {part.name}"
-            raise RecordingError(error.cause, fix=fix, place=str(part)) from error
+            raise RecordingError(error.cause, fix=fix, place=part) from error
         finally:
             journal.close()
         self.files[-1] = final_name(part, self.path, number, last=last, replace=self._replace)

@@ -54,7 +54,7 @@ def repair(path: Path | str) -> RepairResult:
         path = part_of(path)
     if is_locked(path):
         raise RecordingError(
-            "it is still being written", fix="stop the recording first", place=str(path)
+            "it is still being written", fix="stop the recording first", place=path
         )
     with open_frames(path, damaged=True) as file:
         target = _free_name(path, file.piece) if is_part(path) else path
@@ -66,7 +66,7 @@ def repair(path: Path | str) -> RepairResult:
                     os.rename(path, target)
             return RepairResult(target, frames, 0, changed=path != target)
         if lost and not frames:
-            raise RecordingError("no frame in it can be read", fix="copy it again", place=str(path))
+            raise RecordingError("no frame in it can be read", fix="copy it again", place=path)
         if lost:
             more = MappingProxyType({**origin.more, "frames_lost": lost})
             origin = dataclasses.replace(origin, more=more)
@@ -100,7 +100,7 @@ def _free_name(part: Path, piece: int) -> Path:
         raise RecordingError(
             f"{named.name} exists, and this is piece {piece} too",
             fix=f"move {named.name} away",
-            place=str(part),
+            place=part,
         )
     return named
 

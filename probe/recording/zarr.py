@@ -96,7 +96,7 @@ class ZarrArray:
             read = np.frombuffer(content, self.dtype)
         except DAMAGE as error:
             cause = f"a chunk is damaged: {str(error)[:120]}"
-            raise RecordingError(cause, fix=_FIX, place=str(path)) from error
+            raise RecordingError(cause, fix=_FIX, place=path) from error
         return read.reshape(self.chunks, order="F" if self.order == "F" else "C")
 
 
@@ -110,11 +110,11 @@ def store_arrays(path: Path) -> Iterator[tuple[str, ZarrArray]]:
     """
     if (path / "zarr.json").exists():
         fix = "write it as Zarr format 2, which FTP-1 has"
-        raise RecordingError("it is a Zarr store of format 3", fix=fix, place=str(path))
+        raise RecordingError("it is a Zarr store of format 3", fix=fix, place=path)
     said = sorted(itertools.islice(path.rglob(".zarray"), _MOST_ARRAYS + 1))
     if len(said) > _MOST_ARRAYS:
         cause = f"more than {_MOST_ARRAYS} arrays in it"
-        raise RecordingError(cause, fix="name the folder of one array", place=str(path))
+        raise RecordingError(cause, fix="name the folder of one array", place=path)
     for file in said:
         values = foreign_json(file, RecordingError, fix=_FIX, most=_MOST_SAID)
         name = file.parent.relative_to(path).as_posix().removeprefix("data/")
@@ -122,7 +122,7 @@ def store_arrays(path: Path) -> Iterator[tuple[str, ZarrArray]]:
             array = _described(file.parent, values)
         except DAMAGE as error:
             cause = f"it is no array that is read: {str(error)[:120]}"
-            raise RecordingError(cause, fix=_FIX, place=str(file)) from error
+            raise RecordingError(cause, fix=_FIX, place=file) from error
         if array is None:
             continue
         if len(array.shape) == 4:

@@ -163,7 +163,7 @@ def _registered_part(database: str, path: Path) -> tuple[RegisteredObject, Regis
     raise SurfaceError(
         f"{path.name} is not registered in {database}",
         fix=f"its STL parts: {shown or 'none'}",
-        place=str(path),
+        place=path,
     )
 
 

@@ -19,10 +19,15 @@ from encoded_objects.base.sensor_type import SensorType
 from probe.arm import Arm
 from probe.contact.contract import Contact, Touch
 from probe.errors import SurfaceError
-from probe.scan.approach import ApproachLimits, guarded_approach
-from probe.scan.kinesthetic import JointErrors, follow_poses
-from probe.scan.places import surface_to_sensor, touch_at
-from probe.scan.raster import raster
+from probe.scan import (
+    ApproachLimits,
+    JointErrors,
+    follow_poses,
+    guarded_approach,
+    raster,
+    surface_to_sensor,
+    touch_at,
+)
 from probe.simulate.scene import Scene, pose_of
 from probe.wrist import Wrist, counts_of, distances_at, stiffness, travel_under_load
 

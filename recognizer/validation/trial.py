@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from probe.errors import ContactError
-from probe.scan.places import surface_to_sensor
+from probe.scan import surface_to_sensor
 from recognizer.scan.session import Scan
 from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab
 from recognizer.touch.reader import Reader

@@ -31,8 +31,7 @@ from scipy.spatial.transform import Rotation
 from encoded_objects import Reader, Scan, encode, open_lab
 from probe.arm import Arm, SensorPose, inverse
 from probe.errors import ContactError, PoseError
-from probe.scan.kinesthetic import JointErrors
-from probe.scan.places import touch_at
+from probe.scan import JointErrors, touch_at
 from probe.simulate.scene import Scene
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.sensor import LevelSensor, sample_sensor

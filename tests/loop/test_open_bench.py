@@ -18,7 +18,7 @@ from probe.recording.read import Recording
 @pytest.fixture(scope="module")
 def bench(served):
     """Address of a bench with a simulated probe."""
-    with served("--port", "touch:?hold=1.5") as address:
+    with served("--port", "touch:?hold=1.5&rate=40") as address:
         yield address
 
 

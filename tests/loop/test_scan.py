@@ -14,8 +14,7 @@ from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import frame_from
 from probe.recording.record import Recorder
-from probe.scan.places import surface_to_sensor
-from probe.scan.raster import raster
+from probe.scan import raster, surface_to_sensor
 from probe.simulate.registered import registered_surface
 from probe.simulate.scene import pose_of
 from probe.surface.face import FaceSurface

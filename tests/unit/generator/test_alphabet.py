@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from generator.alphabet import (
+    ALPHABETS,
     Counts,
     Glyph,
     SymbolStyle,
@@ -22,7 +23,7 @@ from generator.alphabet.figures import FIGURES, figures_of, in_figures
 from generator.alphabet.known import line
 from generator.alphabet.outline import engrave
 from generator.alphabet.printable import gap_between_mm, gap_inside_mm
-from generator.alphabet.strokes import same_shape
+from generator.alphabet.strokes import check_distinguishable, same_shape
 from generator.errors import AlphabetError
 from generator.plane.polygon import edges_cross, points_inside, signed_area
 from generator.printers import PRINTERS
@@ -49,11 +50,16 @@ def test_ends_and_vertices_are_the_thesis_ones(name, wanted):
     assert all(c.pieces == 1 and c.loops == 0 for c in found)
 
 
+@pytest.mark.parametrize("alphabet", ALPHABETS.values(), ids=ALPHABETS)
+def test_letters_that_ship_tell_their_turn(alphabet):
+    check_distinguishable(alphabet.name, alphabet.glyphs)
+
+
 @pytest.mark.parametrize("order", [4, 8, 16])
 def test_letters_made_for_tactels_print_and_have_about_the_same_ink(order, tmp_path):
     alphabet = alphabet_named(f"tactel-{order}")
     assert alphabet.order == order
-    assert alphabet_from(alphabet.definition()) == alphabet  # each tells its turn
+    assert alphabet_from(alphabet.definition()) == alphabet
     for pitch, printer in ((4.5, "fdm-0.4"), (5, "fdm-0.4"), (6, "fdm-0.6"), (8, "fdm-0.6")):
         (tmp_path / "cube.yaml").write_text(
             "name: Cube\nshape: {cube: 60 mm}\nprint: {printer: " + printer + "}\n"

@@ -11,8 +11,7 @@ from probe.calibration import calibration_from, even_load, expected_counts
 from probe.calibration.load import BIAS_FRAMES
 from probe.circuit import Electronics, fsr_of
 from probe.client import ClientStatistics
-from probe.command.live import KEYS, render_frame
-from probe.command.live_state import LiveState
+from probe.command.live import KEYS, LiveState, render_frame
 from probe.frame import frame_from
 from probe.protocol import IdentPacket
 

@@ -11,10 +11,17 @@ from encoded_objects.base.sensor_type import SensorType
 from probe.arm import Arm, forward, inverse
 from probe.contact.contract import Touch
 from probe.errors import ContactError, PoseError, SurfaceError
-from probe.scan.approach import ApproachLimits, guarded_approach
-from probe.scan.kinesthetic import JointErrors, follow_poses, joint_path, joints_with_play
-from probe.scan.places import surface_to_sensor, touch_at
-from probe.scan.raster import raster
+from probe.scan import (
+    ApproachLimits,
+    JointErrors,
+    follow_poses,
+    guarded_approach,
+    joint_path,
+    joints_with_play,
+    raster,
+    surface_to_sensor,
+    touch_at,
+)
 
 DEG = math.pi / 180
 SQUARE = [(0, 0), (60, 0), (60, 60), (0, 60)]

@@ -9,9 +9,7 @@ from encoded_objects.base.sensor_type import SensorType
 from probe.arm import Arm
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
-from probe.scan.kinesthetic import JointErrors, follow_poses
-from probe.scan.places import surface_to_sensor, touch_at
-from probe.scan.raster import raster
+from probe.scan import JointErrors, follow_poses, raster, surface_to_sensor, touch_at
 from probe.simulate.registered import registered_surface
 from recognizer.scan.mosaic.planar import relative_pose, transform_points
 from recognizer.thesis.merge import merge_touches, relative_poses

@@ -11,7 +11,7 @@ import pytest
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
-from probe.scan.places import surface_to_sensor
+from probe.scan import surface_to_sensor
 from probe.surface.face import endless_face
 from recognizer.errors import MosaicError
 from recognizer.scan.mosaic.canvas import (

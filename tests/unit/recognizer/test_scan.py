@@ -8,7 +8,7 @@ import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
-from probe.scan.places import surface_to_sensor
+from probe.scan import surface_to_sensor
 from probe.simulate.registered import registered_surface
 from probe.simulate.scene import Scene
 from probe.simulate.world.levels import TYPICAL
