@@ -10,6 +10,8 @@
     results      rows -> shares and errors (statistics);  studies, extremes  add theirs
     report       results, where they come from, page (pictures, flat_faces)
     compare      two runs, or the worlds of several;  repeat  one touch again
-    dataset      touches with their truth, for training;  printing  printed surfaces
+    dataset      touches with their truth, for training;  dataset_formats  their files
+    printing     printed surfaces
+    benchmark    frozen touches, and readers compared on them (benchmark_readers)
     pipeline     all of it in order: `validate`;  command  validate-set
 """

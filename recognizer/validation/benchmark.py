@@ -6,8 +6,8 @@ it is run, or given), each in three forms, and the table of all readers::
     labs/TYPE/                  parts of a sensor type and their database: what a reader may know
     public/, hidden/
         WORLD.npz               touches: counts, truth and the least error of each (`COLUMNS`)
-        WORLD.zarr              the same as FTP-1 (`ftp1`)
-        WORLD/lerobot           the same as LeRobot v3.0 (`dataset`)
+        WORLD.zarr              the same as FTP-1 (`dataset_formats`)
+        WORLD/lerobot           the same as LeRobot v3.0
         card.md, card.json      what is inside: seeds, version, format, licence, sha256
     results.json, results.md    of the readers, by half, world, class and decoy
 
@@ -27,7 +27,7 @@ import json
 import math
 import secrets
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -39,18 +39,24 @@ from numpy.typing import NDArray
 from encoded_objects.base.files import whole_file
 from encoded_objects.base.sensor_type_file import sensor_type_named
 from recognizer.touch.recognition import NO_CONTACT, refusal
-from recognizer.validation.benchmark_readers import READERS, Read, ReaderWorld, reader_named
+from recognizer.validation.benchmark_readers import (
+    READERS,
+    Read,
+    ReaderAnswer,
+    ReaderWorld,
+    reader_named,
+)
 from recognizer.validation.campaign import Campaign, Work, series_of, shares_of
 from recognizer.validation.dataset import (
     TouchDataset,
     errors_of_answers,
+    faces_by_name,
     truth_row,
-    write_lerobot,
 )
+from recognizer.validation.dataset_formats import write_ftp1, write_lerobot
 from recognizer.validation.draw import draw_touch
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import write_json, write_text
-from recognizer.validation.ftp1 import write_ftp1
 from recognizer.validation.limits import bound_of_touch, errors_of
 from recognizer.validation.run import TouchProgress, prepare_run
 from recognizer.validation.statistics import (
@@ -74,6 +80,7 @@ FIRST = 4  #: touches of each world whose sha256 stands there, too
 LICENCE = "CC0-1.0"
 DECIMALS = 6  #: of floats: mm, rad, N
 SMALL_PITCH_MM = 4.0  #: below it, parts are for a resin printer
+NOTHING = ReaderAnswer("", math.nan, math.nan, math.nan, -math.inf)  #: where a reader refuses
 
 _FACES = "face=8,edge=3,corner=2"
 _ALL = f"{_FACES},worn=1,blank=.5,foreign=2,decoy=3"
@@ -220,9 +227,7 @@ def touches_of(work: Work, seed: int, count: int, progress: TouchProgress) -> di
     reader = prepare_reader(work)
     work = replace(work, campaign=replace(work.campaign, seed=seed, touches=count))
     series = series_of(work.campaign)[0]
-    faces = [one.face(number) for one in reader.lab.arrays for number in range(len(one.faces))]
-    names = sorted(f"{face.object}/{face.face}" for face in faces)
-    label_of = {name: label for label, name in enumerate(names)}
+    label_of = {name: label for label, name in enumerate(faces_by_name(reader.lab))}
     rows = []
     for number in range(count):
         plan = work.plan(series, number)
@@ -250,7 +255,7 @@ def touches_of(work: Work, seed: int, count: int, progress: TouchProgress) -> di
     for name, values in arrays.items():
         if values.dtype.kind == "f":
             arrays[name] = np.round(values, DECIMALS) + 0.0
-    return arrays | {"names": np.array(names)}
+    return arrays | {"names": np.array(list(label_of))}
 
 
 def digest_of(arrays: Mapping[str, Array], count: int) -> str:
@@ -284,12 +289,11 @@ def _make(
 
 def _write_card(folder: Path, seed: int, half: Mapping[str, Mapping[str, Array]]) -> dict[str, str]:
     """Write what a half is; returns the sha256 of each world."""
-    digests = {name: digest_of(arrays, len(arrays["counts"])) for name, arrays in half.items()}
     worlds: dict[str, dict[str, Any]] = {
         name: {
             "touches": len(arrays["counts"]), "shape": list(arrays["counts"].shape[1:]),
             "sensor_type": WORLDS[name].sensor_type, "engine": WORLDS[name].engine,
-            "sha256": digests[name],
+            "sha256": digest_of(arrays, len(arrays["counts"])),
         }
         for name, arrays in half.items()
     }  # fmt: skip
@@ -304,14 +308,22 @@ def _write_card(folder: Path, seed: int, half: Mapping[str, Mapping[str, Array]]
         f"Simulated touches of version {card['version']}, seed {seed}, {LICENCE}. `WORLD.npz`, "
         "`WORLD.zarr` (FTP-1) and `WORLD/lerobot` (v3.0) hold the same touches."
     )
-    lines = [f"# {card['name']}", "", about, ""]
-    lines += ["| world | touches | counts | engine | sha256 |", "| --- | --- | --- | --- | --- |"]
-    lines += [f"| {name} | {w['touches']} | {w['shape'][0]} x {w['shape'][1]} | {w['engine']} | "
-              f"{w['sha256'][:16]} |" for name, w in worlds.items()]  # fmt: skip
-    lines += ["", "| array | |", "| --- | --- |"]
-    lines += [f"| `{name}` | {text} |" for name, text in COLUMNS.items()]
-    write_text(folder / "card.md", "\n".join(lines) + "\n")
-    return digests
+    held = [
+        (name, w["touches"], "{} x {}".format(*w["shape"]), w["engine"], w["sha256"][:16])
+        for name, w in worlds.items()
+    ]
+    tables = (
+        _table(("world", "touches", "counts", "engine", "sha256"), held),
+        _table(("array", ""), [(f"`{name}`", text) for name, text in COLUMNS.items()]),
+    )
+    write_text(folder / "card.md", "\n\n".join([f"# {card['name']}", about, *tables]) + "\n")
+    return {name: world["sha256"] for name, world in worlds.items()}
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table as Markdown."""
+    lines = [f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|"]
+    return "\n".join([*lines, *(f"| {' | '.join(map(str, row))} |" for row in rows)])
 
 
 def _as_frozen(half: Mapping[str, Mapping[str, Array]]) -> dict[str, bool]:
@@ -344,37 +356,38 @@ def _read_all(
     read: Read, world: str, arrays: Mapping[str, Array], progress: TouchProgress, reader: str
 ) -> dict[str, Array]:
     """Return what a reader says of a world's touches, beside the truth."""
-    label_of = {name: label for label, name in enumerate(arrays["names"].tolist())}
+    names: list[str] = arrays["names"].tolist()
     progress.begin(f"{reader}: {world}", len(arrays["counts"]), 0)
-    rows = []
+    answers, ms = [], []
     for counts in arrays["counts"]:
         start = time.process_time()
-        answer = read(counts)
-        row = {"ms": 1e3 * (time.process_time() - start), "answer": -1, "score": -math.inf,
-               "covariance": np.full((3, 3), math.nan)}  # fmt: skip
-        row |= dict.fromkeys(("answer_x_mm", "answer_y_mm", "answer_theta_rad"), math.nan)
-        if answer is not None:
-            if answer.name not in label_of:
-                raise ValidationError(
-                    f"a reader names '{answer.name}'", fix=f"name one of {', '.join(label_of)}",
-                    place=reader,
-                )  # fmt: skip
-            row |= {"answer": label_of[answer.name], "score": answer.score}
-            row |= {"answer_x_mm": answer.x_mm, "answer_y_mm": answer.y_mm}
-            row["answer_theta_rad"] = answer.theta_rad
-            if answer.covariance is not None:
-                row["covariance"] = answer.covariance
-        rows.append(row)
+        answer = read(counts) or NOTHING
+        ms.append(1e3 * (time.process_time() - start))
+        if answer is not NOTHING and answer.name not in names:
+            raise ValidationError(
+                f"a reader names '{answer.name}'", fix=f"name one of {', '.join(names)}",
+                place=reader,
+            )  # fmt: skip
+        answers.append(answer)
         progress.step("touches")
-    said = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    whole = {name: arrays[name] for name in COLUMNS} | said
+    unknown = np.full((3, 3), math.nan)
+    label_of = {name: label for label, name in enumerate(names)} | {NOTHING.name: -1}
+    whole = {name: arrays[name] for name in COLUMNS} | {
+        "answer": np.array([label_of[one.name] for one in answers]),
+        "answer_x_mm": np.array([one.x_mm for one in answers]),
+        "answer_y_mm": np.array([one.y_mm for one in answers]),
+        "answer_theta_rad": np.array([one.theta_rad for one in answers]),
+        "score": np.array([one.score for one in answers]),
+        "ms": np.array(ms),
+    }
+    spreads = [unknown if one.covariance is None else one.covariance for one in answers]
     named, away = errors_of_answers(whole)
     other, away_of_other = errors_of_answers(whole, "also_")
     right, away = named | other, np.where(named[:, None], away, away_of_other)
-    chi2 = np.array([_chi2(a, c) for a, c in zip(away, whole["covariance"], strict=True)])
+    chi2 = np.array([_chi2(a, c) for a, c in zip(away, spreads, strict=True)])
     return whole | {
         "right": right, "off": np.hypot(away[:, 0], away[:, 1]), "turn": np.degrees(away[:, 2]),
-        "chi2": np.where(right, chi2, math.nan), "world": np.full(len(rows), world),
+        "chi2": np.where(right, chi2, math.nan), "world": np.full(len(answers), world),
     }  # fmt: skip
 
 
@@ -386,9 +399,7 @@ def _chi2(away: Array, covariance: Array) -> float:
 
 def _figures(lines: Sequence[Mapping[str, Array]]) -> dict[str, Any]:
     """Return the figures of a reader: of all worlds, of each, by class, and by decoy."""
-    names = ("kind", "surface", "level", "label", "also_label", "answer", "score", "right", "off",
-             "turn", "chi2", "bound_mm", "bound_deg", "ms", "world")  # fmt: skip
-    whole = {name: np.concatenate([line[name] for line in lines]) for name in names}
+    whole = {name: np.concatenate([line[name] for line in lines]) for name in lines[0]}
     light = (whole["level"] == "light") & (whole["kind"] == "face")
     classes = np.where(light, "light", whole["kind"])
     return {
@@ -442,16 +453,18 @@ def table_of(found: Mapping[str, Any]) -> str:
     """Return the table of all readers as Markdown."""
     heads = ("reader", "half", "right", f"right at {RATE:g}", "wrong", "refused", "rms mm",
              "over bound", "rms degrees", "over bound", "inside", "normalised", "ms")  # fmt: skip
-    lines = [f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|"]
-    for name, halves in found["readers"].items():
-        for half, line in halves.items():
-            cells = [name, half, _percent(line["right"]), _percent(line["at_rate"])]
-            cells += [f"{line['wrong']['count']} ({100 * line['wrong']['high']:.2g} % at most)"]
-            cells += [_percent(line["refused"])]
-            cells += [_number(line[key]) for key in ("rms_mm", "ratio_mm", "rms_deg", "ratio_deg")]
-            cells += [_percent(line["inside_95"]), _number(line["normalised"]), _number(line["ms"])]
-            lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+    rows = [
+        (
+            name, half, _percent(line["right"]), _percent(line["at_rate"]),
+            f"{line['wrong']['count']} ({100 * line['wrong']['high']:.2g} % at most)",
+            _percent(line["refused"]),
+            *(_number(line[key]) for key in ("rms_mm", "ratio_mm", "rms_deg", "ratio_deg")),
+            _percent(line["inside_95"]), _number(line["normalised"]), _number(line["ms"]),
+        )
+        for name, halves in found["readers"].items()
+        for half, line in halves.items()
+    ]  # fmt: skip
+    return _table(heads, rows)
 
 
 def _percent(share: Mapping[str, Any]) -> str:

@@ -30,6 +30,7 @@ from recognizer.touch.lab import EncodedFace, open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
+from recognizer.validation.dataset import faces_by_name
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.touch_plan import written_surface
 
@@ -64,9 +65,7 @@ class ReaderWorld:
     @cached_property
     def faces(self) -> dict[str, EncodedFace]:
         """The registered faces, by "Object/face", in order."""
-        arrays = open_lab(self.database).arrays
-        found = [one.face(n) for one in arrays for n in range(len(one.faces))]
-        return {f"{f.object}/{f.face}": f for f in sorted(found, key=lambda f: (f.object, f.face))}
+        return faces_by_name(open_lab(self.database))
 
 
 Read = Callable[[NDArray[np.uint16]], ReaderAnswer | None]

@@ -8,7 +8,9 @@ the shard is, it is done. Other tools read them as they are.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +48,16 @@ def write_table(table: pa.Table, path: Path, compression: str = "zstd") -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as file:
         pq.write_table(table, file, compression=compression, row_group_size=GROUP)
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Yield a folder to write to; it becomes `path`, in place of the one there, at the end."""
+    draft = path.with_name(f".{path.name}.writing")
+    shutil.rmtree(draft, ignore_errors=True)
+    yield draft
+    shutil.rmtree(path, ignore_errors=True)
+    draft.rename(path)
 
 
 def shard_file(folder: Path, series: str, shard: int, what: str = SHARDS) -> Path:

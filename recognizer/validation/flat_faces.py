@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.lab import Lab
+from recognizer.validation.dataset import faces_by_name
 from recognizer.validation.pictures import COLOURS, DOTS, WORDS
 from recognizer.validation.trial import REJECTED, RIGHT, WRONG
 
@@ -56,12 +57,11 @@ def flat_objects(
 
     `rows` are columns of `trial.COLUMNS`; `faces` the lines `objects.faces` of `results.json`.
     """
-    every = (one.face(number) for one in lab.arrays for number in range(len(one.faces)))
-    shapes = {(face.object, face.face): face for face in every}
+    shapes = faces_by_name(lab)
     touched = {name: rows["object"] == name for name in {line["object"] for line in faces}}
     held: dict[str, list[FlatFace]] = {}
     for line in faces:
-        shape = shapes[line["object"], line["face"]]
+        shape = shapes[f"{line['object']}/{line['face']}"]
         here = np.flatnonzero(touched[line["object"]])
         here = here[rows["face"][here] == line["face"]]
         at = np.column_stack([rows["x_mm"][here], rows["y_mm"][here]])

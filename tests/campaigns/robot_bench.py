@@ -101,9 +101,7 @@ def work_on(
     bench: Any, sector: float, more: int, shift: tuple[str, float] | None
 ) -> dict[str, Any]:
     """Find the object of a sector, touch it again, move it, touch it once more."""
-    bench.presses = 0
-    where = {n: world.pose(bench.data.body(world.ON + n))[:2, 3] for n in world.OBJECTS}
-    name = min(where, key=lambda n: abs(math.atan2(where[n][1], where[n][0]) - sector))
+    name = bench.object_in(sector)
     found, sensor, read = bench.find(sector)
     line = {"name": name, "read": read, "presses": bench.presses, "touches": []}
     if not found or sensor is None:
@@ -142,13 +140,6 @@ def told(touch: dict[str, Any]) -> ObjectPose:
     placed = object_pose(recognition, sensor)
     assert placed is not None
     return placed
-
-
-def off_by(placed: ObjectPose, truth: Any) -> Array:
-    """Return (6,) truth less answer, mm and rad, base axes."""
-    T, true = placed.T_robot_object, np.array(truth)
-    turn = Rotation.from_matrix(true[:3, :3] @ T[:3, :3].T).as_rotvec()
-    return np.array([*(true[:3, 3] - T[:3, 3]), *turn])
 
 
 def inside(off: Array, covariance: Array, which: list[int]) -> bool:
@@ -198,7 +189,8 @@ def tabulate_errors(lines: list[dict[str, Any]]) -> None:
             touches = read_by_face(line)[:n]
             if len(touches) == n:
                 fused = fuse_poses([told(touch) for touch in touches]).pose
-                offs.append(off_by(fused, touches[-1]["truth"]))
+                truth = np.array(touches[-1]["truth"])
+                offs.append(world.error_of(fused.T_robot_object, truth))
                 spreads.append(fused.covariance)
         if not offs:
             continue

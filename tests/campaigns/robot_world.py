@@ -77,9 +77,6 @@ class Result:
     position_mm: float = math.nan
     turn_deg: float = math.nan
     chi2: float = math.nan  # of six freedoms
-    planar: float = math.nan  # of x, y and the turn about z
-    off: tuple[float, ...] = ()  # truth less answer: mm and rad, base axes
-    covariance: tuple[tuple[float, ...], ...] = ()
 
 
 def pose(body: Any) -> Array:
@@ -262,6 +259,12 @@ class Bench:
             best = min(best, (off, name, face))
         return best[1:]
 
+    def object_in(self, sector: float) -> str:
+        """Return what lies in a sector, where presses are counted from now on."""
+        self.presses = 0
+        where = {n: pose(self.data.body(ON + n))[:2, 3] for n in OBJECTS}
+        return min(where, key=lambda n: abs(math.atan2(where[n][1], where[n][0]) - sector))
+
     def level_sensor(self) -> Array:
         """Return where the sensor would be if the wrist were level."""
         return pose(self.data.body("link5")) @ self.T_gripper_sensor
@@ -333,14 +336,9 @@ def compare(
     placed = object_pose(found, sensor)
     assert placed is not None
     off = error_of(placed.T_robot_object, pose(bench.data.body(ON + found.object)))
-    turn = off[3:]
     result.position_mm = np.linalg.norm(off[:3])
-    result.turn_deg = math.degrees(np.linalg.norm(turn))
+    result.turn_deg = math.degrees(np.linalg.norm(off[3:]))
     result.chi2 = float(off @ np.linalg.solve(placed.covariance, off))
-    result.off, result.covariance = off.tolist(), placed.covariance.tolist()
-    flat = [0, 1, 5]
-    part = placed.covariance[np.ix_(flat, flat)]
-    result.planar = float(off[flat] @ np.linalg.solve(part, off[flat]))
     return result
 
 
@@ -402,9 +400,7 @@ def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Resul
         bench = Bench(model, lab, np.random.default_rng([seed, trial]))
         bench.lay_out()
         for sector in SECTORS:
-            bench.presses = 0
-            where = {n: pose(bench.data.body(ON + n))[:2, 3] for n in OBJECTS}
-            name = min(where, key=lambda n: abs(math.atan2(where[n][1], where[n][0]) - sector))
+            name = bench.object_in(sector)
             results.append(compare(trial, name, bench, *bench.find(sector, shown=shown)))
             print(json.dumps(results[-1].__dict__), flush=True)
     return results

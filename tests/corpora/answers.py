@@ -33,6 +33,7 @@ class Reading:
     every: int = 1  #: of so many touches one is read
     learns: bool = False  #: the sensor, from its touches, before they are read
     scan: bool = False  #: touches of one label "scan" are one recording, and one answer
+    posed: bool = True  #: a scan by an arm; False: moved by hand, its poses are left out
 
 
 FORTY, SMALL = Reading("forty"), Reading("small")
@@ -58,6 +59,8 @@ READINGS = {
         "thesis", (*SCAN, "--method", "thesis"), of=("scan-thesis",), every=2, scan=True
     ),
     "scan-product": Reading("product", SCAN, scan=True),
+    "scan-thesis-by-hand": Reading("thesis", SCAN, of=("scan-thesis",), scan=True, posed=False),
+    "scan-product-by-hand": Reading("product", SCAN, of=("scan-product",), scan=True, posed=False),
     "scan-small": replace(SMALL, options=SCAN, scan=True),
     "scan-forty": replace(FORTY, options=SCAN, scan=True),
     "scan-one-touch": Reading("one-touch", SCAN, scan=True),
@@ -120,7 +123,7 @@ def _read(
     """Yield the answers to touches, each under the number and the label of its touch."""
     with h5py.File(commands.folder / "touches.h5", "w") as file:
         file["frames"] = touches.counts
-        if touches.pose is not None:
+        if touches.pose is not None and how.posed:
             file["pose"] = touches.pose
     learn = ("--learn", "state.json") if how.learns else ()
     words = ("recognize-object", "touches.h5", "--every", "--json", *how.options, *learn)

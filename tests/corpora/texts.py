@@ -266,6 +266,7 @@ validate-set cube.yaml --touches 4 --noise loud -o new [twice]
 validate-set cube.yaml --touches 4 --surfaces clouds -o new
 validate-set cube.yaml --touches 4 --engine bullet -o new
 validate-set cube.yaml --touches 4 --policy best -o new
+validate-set cube.yaml --touches 4 --export csv -o new
 validate-set --database gone.db --touches 4 -o new [twice]
 validate-set --version [twice]
 validate-set

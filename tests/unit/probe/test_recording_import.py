@@ -25,7 +25,7 @@ from probe.recording.mcap import export_mcap, import_mcap
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.recording.ros import DEFINITIONS, IMAGE, POSE, TOUCH_FRAME, covariance_message
-from recognizer.validation.ftp1 import write_ftp1
+from recognizer.validation.dataset_formats import write_ftp1
 
 COUNTS = np.random.default_rng(5).integers(0, 1024, (70, 16, 16)).astype(np.uint16)
 
