@@ -69,10 +69,13 @@ def read_transaction(engine: Engine) -> Iterator[Connection]:
 
 @contextmanager
 def explain_failures(engine: Engine) -> Iterator[None]:
-    """Raise what an engine's driver reports as a DatabaseError; what others report passes."""
+    """Raise what an engine's driver reports as a DatabaseError; what others report passes.
+
+    SQLite's messages name tables, which in a damaged file are no text: these are reported too.
+    """
     try:
         yield
-    except SQLAlchemyError as error:
+    except (SQLAlchemyError, UnicodeDecodeError) as error:
         _explain(error, engine)
 
 

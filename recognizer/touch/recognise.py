@@ -37,6 +37,7 @@ from recognizer.touch.recognition import (
     AS_DESIGNED,
     EXCHANGED,
     NO_CONTACT,
+    NOT_ENCODED,
     OUTSIDE,
     TOO_FEW,
     TOO_FINE,
@@ -45,7 +46,7 @@ from recognizer.touch.recognition import (
     RunnerUp,
     refusal,
 )
-from recognizer.touch.search_gate import is_nearly_chance, may_find_more
+from recognizer.touch.search_gate import BARE, is_nearly_chance, may_find_more, shows_strokes
 from recognizer.touch.signal import Signal, mean_of_strongest, swap_halves
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import STROKE_UNIT_MM
@@ -112,6 +113,8 @@ def _search_twice(touch: TouchImages, seq: int) -> tuple[Recognition, list[Verif
     """Return the answer of a first search, or of a wide one where that may change it."""
     if not touch.signal.contact:
         return refusal(seq, NO_CONTACT), []
+    if not shows_strokes(touch.reader, touch.signal, BARE):
+        return refusal(seq, NOT_ENCODED), []
     options = touch.reader.options
     first = verify_hypotheses(touch, options.first)
     answer = _best_answer(first, options, seq)

@@ -30,7 +30,7 @@ from encoded_objects import encode
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import WristStiffness
 from probe.contact.engines import engine_named
-from probe.contact.mujoco import STIFFER
+from probe.contact.mujoco import DEEPEST_MM, STIFFER
 from probe.contact.tips import Tips
 from probe.simulate.target import part_surface
 from probe.surface.body import body_of
@@ -110,7 +110,8 @@ def lines_of(engine, surface, touches, repeat):
     """Yield (points, (error, distance from our own, ms)) for one indenter."""
     press, own = engine_named(engine).press, engine_named("own").press
     sensor = SensorType()
-    stiff = replace(sensor.overlay, young_mpa=STIFFER * sensor.overlay.young_mpa)
+    young = STIFFER * sensor.overlay.young_mpa * DEEPEST_MM / sensor.overlay.height_mm
+    stiff = replace(sensor.overlay, young_mpa=young, height_mm=DEEPEST_MM)
     ours = replace(sensor, overlay=stiff)
     wanted = [press(surface, sensor, touch, Tips(REFERENCE)).forces_n for touch in touches]
     others = [own(surface, ours, touch, Tips(REFERENCE)).forces_n for touch in touches]

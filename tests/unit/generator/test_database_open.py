@@ -180,6 +180,8 @@ DAMAGED = {
     "a spec that is no JSON": "UPDATE provenance SET spec = ''",
     "a text where a number was": "UPDATE cells SET x_mm = 'x'",
     "bytes that are no text": "UPDATE objects SET name = CAST(x'ff' AS TEXT)",
+    "a schema that is no text": "UPDATE sqlite_master SET sql = CAST(x'ff' AS TEXT), "
+    "name = CAST(x'ff' AS TEXT) WHERE name = 'faces'",
     "a table that is gone": "DROP TABLE faces",
     "a view": "CREATE VIEW v AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT 1 FROM c) "
     "SELECT * FROM c",
@@ -193,6 +195,7 @@ def test_a_damaged_database_says_so_at_every_command(damage, cube_lab, tmp_path,
     shutil.copy(cube_lab, path)
     with closing(sqlite3.connect(path)) as plain, plain:
         plain.execute("PRAGMA foreign_keys = OFF")
+        plain.execute("PRAGMA writable_schema = ON")
         plain.execute(DAMAGED[damage])
     (tmp_path / "box.yaml").write_text("name: Box\nshape: {cube: 30 mm}\n")
     box = [str(tmp_path / "box.yaml"), "--dry-run", "-o", str(tmp_path / "out")]

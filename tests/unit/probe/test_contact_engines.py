@@ -19,7 +19,7 @@ from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Contact, Touch, WristStiffness
 from probe.contact.engines import ENGINES, Engine, EngineEntry, engine_named
 from probe.contact.meshes import AROUND_MM, DEEP_MM, mesh_under
-from probe.contact.mujoco import STIFFER
+from probe.contact.mujoco import DEEPEST_MM, STIFFER
 from probe.contact.tips import Tips
 from probe.errors import ProbeError
 from probe.simulate.scene import bare_scene
@@ -46,13 +46,13 @@ def plate_with_bars(wide=0.0):
 def compression_mm(force_n, overlay=SENSOR.overlay):
     """Return how far one tab is pressed by a force: neo-Hookean, of MuJoCo's stiffer elastomer."""
     area = math.pi * overlay.tab_diameter_mm**2 / 4
-    modulus = STIFFER * overlay.young_mpa
+    modulus = STIFFER * overlay.young_mpa * DEEPEST_MM / overlay.height_mm
 
     def miss(c):
-        stretch = 1 - c / overlay.height_mm
+        stretch = 1 - c / DEEPEST_MM
         return modulus * area / 3 * (stretch**-2 - stretch) - force_n
 
-    return brentq(miss, 0, 0.9 * overlay.height_mm)
+    return brentq(miss, 0, 0.9 * DEEPEST_MM)
 
 
 DRAKE = pytest.param(
