@@ -108,7 +108,7 @@ def decode(
     if held:
         known |= {"object": found.object, "face": found.face}
     if plot is not None:
-        from decoder.plot import draw
+        from decoder.view import draw
 
         draw(chosen, window, found, plot)
         known["plot"] = str(plot)

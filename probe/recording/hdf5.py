@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -203,13 +202,8 @@ def _checked(file: h5py.File, path: Path, *, closed: bool) -> FrameFile:
         )
     lengths = {shape[0] for shape in shapes.values()}
     ours = {name: attributes.pop(name, None) for name in _OURS} if own else {}
-    origin = RecordingOrigin(
-        str(attributes.pop("sensor", "")),
-        str(attributes.pop("calibration", "")),
-        str(attributes.pop("units", "counts")),
-        str(attributes.pop("sensor_type", "")),
-        MappingProxyType(attributes),
-    )
+    said = {name: attributes.pop(name) for name in RecordingOrigin().texts() if name in attributes}
+    origin = RecordingOrigin.of_texts(said, attributes)
     return FrameFile(
         origin,
         own,

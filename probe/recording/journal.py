@@ -24,7 +24,6 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, BinaryIO, Final
 
 import numpy as np
@@ -56,7 +55,6 @@ _SUMS: Final = struct.Struct("<II")
 _MOST_HEAD: Final = 1 << 24  #: bytes; attributes are texts and numbers
 _RESERVED: Final = 1 << 20  #: bytes that are reserved at a time
 _AT_ONCE: Final = 1024  #: records that are searched for poses at a time
-_ORIGIN: Final = ("sensor", "calibration", "units", "sensor_type")
 
 
 class JournalWriter:
@@ -132,9 +130,7 @@ def open_journal(path: Path, *, live: bool = False) -> Iterator[FrameFile]:
         with explain_errors(path, "read"):
             file = stack.enter_context(open_regular(path))
             head, start = _read_head(file)
-            sensor, calibration, units, kind = (str(head[name]) for name in _ORIGIN)
-            more = MappingProxyType(dict(head["more"]))
-            origin = RecordingOrigin(sensor, calibration, units, kind, more)
+            origin = RecordingOrigin.of_texts(head, head["more"])
             (rows, columns), piece = map(int, head["shape"]), int(head["piece"])
             if head["version"] != FORMAT_VERSION or not 0 < rows * columns <= MOST_TACTELS:
                 raise ValueError("a head of another version, or of images too large")
@@ -241,7 +237,7 @@ def _head(origin: RecordingOrigin, piece: int, shape: tuple[int, int]) -> bytes:
         "tool_version": version("encoded-objects"),
         "piece": piece,
         "shape": shape,
-        **{name: getattr(origin, name) for name in _ORIGIN},
+        **origin.texts(),
         "more": dict(origin.more),
     }
     text = json.dumps(said, default=json_value).encode()

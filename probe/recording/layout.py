@@ -57,6 +57,19 @@ class RecordingOrigin:
     sensor_type: str = ""  #: as YAML, `sensor_type_text`; empty: not known
     more: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
+    def texts(self) -> dict[str, str]:
+        """Return the fields that are texts, by their names, as `of_texts` takes them."""
+        return {name: getattr(self, name) for name in _TEXTS}
+
+    @classmethod
+    def of_texts(cls, said: Mapping[str, Any], more: Mapping[str, Any]) -> RecordingOrigin:
+        """Return the origin that a file tells; what it leaves out is as by default."""
+        texts = {name: str(said[name]) for name in _TEXTS if name in said}
+        return cls(**texts, more=MappingProxyType(dict(more)))
+
+
+_TEXTS: Final = ("sensor", "calibration", "units", "sensor_type")
+
 
 def json_value(value: Any) -> Any:
     """Return an attribute that JSON does not know as one that it does (`default` of `json`)."""

@@ -23,7 +23,6 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from types import MappingProxyType
 from typing import IO, TYPE_CHECKING, Any, BinaryIO, Final, Self
 
 import numpy as np
@@ -83,14 +82,8 @@ class McapWriter:
 
         self._writer = Writer(stream)
         self._schemas: dict[str, Any] = {}
-        said = {
-            "sensor": origin.sensor,
-            "calibration": origin.calibration,
-            "units": origin.units,
-            "sensor_type": origin.sensor_type,
-            "more": json.dumps(dict(origin.more), default=json_value),
-        }
-        self._writer.add_metadata(METADATA, said)
+        more = json.dumps(dict(origin.more), default=json_value)
+        self._writer.add_metadata(METADATA, {**origin.texts(), "more": more})
 
     def __enter__(self) -> Self:
         return self
@@ -171,10 +164,7 @@ def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
                 f"attribute {odd[0][:60]!r} of the recording is no text, number or array of them",
                 fix="write it as one of these", place=path
             )  # fmt: skip
-        origin = RecordingOrigin(
-            said.get("sensor", ""), said.get("calibration", ""), said.get("units", "counts"),
-            said.get("sensor_type", ""), MappingProxyType(dict(more))
-        )  # fmt: skip
+        origin = RecordingOrigin.of_texts(said, dict(more))
     return origin, _frames(path)
 
 

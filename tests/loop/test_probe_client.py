@@ -161,14 +161,6 @@ def test_the_wrong_baud_rate_is_told(probe):
         until(client, lambda f: True)
 
 
-def test_a_device_that_is_no_probe_is_told(line):
-    master, url = line
-    with Client(url, answer_s=0.3) as client:
-        os.write(master, b"$GPGGA\0$GPGSA\0$GPRMC\0")
-        with pytest.raises(PortError, match="what comes from the device are no packets"):
-            until(client, lambda f: True)
-
-
 def test_a_firmware_of_another_version_is_told(line):
     master, url = line
     payload = b"I\x03" + bytes(26)

@@ -76,17 +76,6 @@ def test_creep_is_a_share_per_decade_of_time_and_starts_anew_with_a_new_load():
     np.testing.assert_allclose(again, first, rtol=1e-12)
 
 
-def test_dead_stuck_and_preloaded_tactels():
-    dead, stuck, preload = np.zeros((16, 16), bool), np.zeros((16, 16)), np.zeros((16, 16))
-    dead[0, 0], stuck[0, 1], preload[0, 2] = True, 3e-5, 0.5
-    fsr = replace(fsr_of(), dead=dead, stuck_s=stuck, preload_n=preload)
-    rest, loaded = (conductances(fsr, np.full((16, 16), f))[0] for f in (0.0, 1.0))
-    assert rest[0, 0] == loaded[0, 0] == fsr.leak_s
-    assert rest[0, 1] == loaded[0, 1] == 3e-5
-    assert rest[0, 2] > 100 * rest[5, 5]
-    assert loaded[0, 2] > loaded[5, 5]
-
-
 def exact_resistances(g, digits=50):
     """Return the resistances by a 31x31 inverse in many digits."""
     rows, columns = g.shape
@@ -240,15 +229,6 @@ def test_the_contact_s_noise_does_not_average_out_at_once():
     assert kept == pytest.approx(np.exp(-board.frame_s / 0.05), abs=0.02)
 
 
-@pytest.mark.parametrize("readout", ["floating", "grounded", "virtual"])
-def test_touches_side_by_side_are_read_as_alone(readout):
-    board = Electronics(readout=readout, row_ohm=20.0, column_ohm=50.0, noise=QUIET)
-    forces = np.stack([pressed(i) for i in range(4)])
-    alone = [read(board, force) for force in forces]
-    np.testing.assert_array_equal(read(board, forces), alone)
-    assert read(board, forces).dtype == np.uint16
-
-
 READOUTS = ["floating", "grounded", "virtual"]
 
 
@@ -275,16 +255,6 @@ def offered(g, e):
 def digitised(g, e, seed):
     noise = e.noise.idle_lsb * e.lsb * np.random.default_rng(seed).standard_normal(g.shape)
     return np.clip(np.rint(offered(g, e) + noise), 0, e.full)
-
-
-@pytest.mark.parametrize("decades", [0, 2, 4, 6])
-def test_floating_rows_over_six_decades(decades):
-    for g in scenes(decades).values():
-        for scale in (1.0, 1e-9):
-            found = solve_floating(effective_resistances(scale * g))
-            assert np.abs(found.conductance_s / (scale * g) - 1).max() <= 1e-8
-            assert found.steps <= 12
-            assert found.own.sum() == pytest.approx(31, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -360,17 +330,6 @@ def test_a_column_that_carries_more_than_the_supply_can_give_is_refused():
     assert np.isnan(found.conductance_s[:, 3]).all()
     assert found.lost[:, 3].all()
     assert np.isfinite(np.delete(found.conductance_s, 3, axis=1)).all()
-
-
-@pytest.mark.parametrize("readout", READOUTS)
-def test_frames_side_by_side_are_inverted_as_alone(readout):
-    e = board_of(readout, row_ohm=5.0)
-    counts = np.stack([digitised(1e-4 * few(20, seed), e, seed) for seed in range(3)])
-    together = invert_readings(counts, e)
-    for i in range(3):
-        alone = invert_readings(counts[i], e)
-        np.testing.assert_allclose(together.conductance_s[i], alone.conductance_s, rtol=1e-9)
-        np.testing.assert_array_equal(together.lost[i], alone.lost)
 
 
 FORCES, BLOCKS, GAPPED = np.zeros((16, 16)), np.kron(np.eye(2), np.ones((8, 8))), np.ones((16, 16))

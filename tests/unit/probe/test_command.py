@@ -87,44 +87,6 @@ def error_of(result):
     return code, err
 
 
-def test_a_file_that_is_there_is_kept(asked, bench, tmp_path):
-    kept = {}
-    for name in ("a.h5", "a.csv", "a.npy", "a.png", "a.json"):
-        (tmp_path / name).write_text("mine")
-        kept[name] = tmp_path / name
-    for words in (
-        ["record", "sim:", "-o", kept["a.h5"], "--frames", 1],
-        ["import", bench / "noise.npy", "-o", kept["a.h5"]],
-        ["simulate", "washer", "-o", kept["a.h5"]],
-        ["simulate", "washer", "--png", kept["a.png"]],
-        ["export", bench / "noise.h5", "--csv", kept["a.csv"]],
-        ["export", bench / "noise.h5", "--npy", kept["a.npy"]],
-        ["calibrate", "loads", bench / "load0.h5=0", "-o", kept["a.json"]],
-    ):
-        code, err = error_of(asked(*words))
-        assert code == 2
-        assert "--replace" in err
-    assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
-
-
-def test_info_of_a_probe(asked):
-    code, out, _ = asked("info", "sim:?rate=200", "--seconds", "0.3", "--sensor", "3", "--json")
-    probe = json.loads(out)
-    assert (code, probe["sensor"], probe["client"]["lost"]) == (0, "sim/3", 0)
-    assert min(probe["client"]["frames"], probe["device"]["frames"]) >= 30
-    assert probe["ident"]["bits"] == 10
-
-
-def test_record_ends_by_frames_and_by_seconds(asked, tmp_path):
-    out = tmp_path / "a.h5"
-    code, text, _ = asked("record", "sim:?rate=500", "-o", out, "--frames", "40", "--json")
-    assert (code, json.loads(text)["ended"]) == (0, "frames")
-    assert len(Recording(out)) == 40
-    code, text, _ = asked("record", "sim:?rate=500", "-o", out, "--seconds", "0.2", "--replace")
-    assert code == 0
-    assert "100 frames in 0.20 s (500.0 a second), lost 0" in text
-
-
 def test_a_played_recording_keeps_its_sensor_and_its_calibration(asked, bench, tmp_path):
     out, calibration = tmp_path / "a.h5", bench / "bench.json"
     url = f"file:{bench / 'load40.h5'}?speed=0"

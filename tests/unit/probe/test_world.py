@@ -16,7 +16,7 @@ from probe.contact.tips import Tips
 from probe.errors import CircuitError, SurfaceError
 from probe.simulate.scene import bare_scene
 from probe.simulate.world.levels import LEVELS, SOUND, TYPICAL
-from probe.simulate.world.sensor import COUNTS_PER_N, MOUNTINGS, LevelSensor, mount, sample_sensor
+from probe.simulate.world.sensor import MOUNTINGS, LevelSensor, mount
 from probe.simulate.world.surfaces import (
     GAP_MM,
     REACH_MM,
@@ -119,50 +119,6 @@ def test_flat_plate_is_read_as_the_divider_of_a_loaded_column(load_ohm):
     assert np.abs(counts - expected).max() <= 0.5 + 1e-6
 
 
-@pytest.mark.parametrize(("name", "dead"), [("dead-10", 26), ("dead-40", 102)])
-def test_dead_tactels_are_those_that_a_press_does_not_move(name, dead):
-    level = replace(LEVELS[name], noise_n=0.0, bleed=0.0)
-    assert (counts_of(level) <= 9).sum() == dead
-
-
-def test_spread_of_gains_is_that_of_the_level():
-    level = replace(SOUND, gain=0.12)
-    counts = np.concatenate([counts_of(level, seed=seed).ravel() for seed in range(8)])
-    assert np.log(counts - 8.0).std() == pytest.approx(0.12, rel=0.1)
-
-
-def test_exponent_is_that_of_the_level():
-    level, twice = replace(SOUND, exponent=0.88), replace(HERE, force_n=120.0)
-    ratio = (counts_of(level, touch=twice).mean() - 8) / (counts_of(level).mean() - 8)
-    over = ((120 / 256 - BREAK_N) / (60 / 256 - BREAK_N)) ** 0.88
-    assert ratio == pytest.approx(over, rel=0.03)  # the divider takes 1 %
-
-
-def test_noise_is_that_of_the_level():
-    level = replace(SOUND, noise_n=0.02)
-    noise = counts_of(level).astype(float) - counts_of(SOUND)
-    assert noise.std() == pytest.approx(0.02 * COUNTS_PER_N, rel=0.15)
-
-
-def test_rows_bleed_into_the_rows_beside_them():
-    sound, bled = (counts_of(replace(SOUND, bleed=b), STRIP).astype(float) - 8 for b in (0.0, 0.02))
-    for row in range(16):
-        beside = sum(sound[r] for r in (row - 1, row + 1) if 0 <= r < 16)
-        np.testing.assert_allclose(bled[row], 0.96 * sound[row] + 0.02 * beside, atol=1.1)
-
-
-@pytest.mark.parametrize(("name", "rows"), [("floating-10", 2), ("floating", 16)])
-def test_floating_rows_carry_the_ghosts_of_the_network(name, rows):
-    level = replace(SOUND, floating=LEVELS[name].floating, load_ohm=220.0)
-    sensor = SensorType(rows=16, columns=6)
-    reading = LevelSensor(sensor, level).read(bare_scene(STRIP), HERE, np.random.default_rng(3))
-    counts, contact = reading.counts, reading.contact
-    floating = sample_sensor(sensor, np.random.default_rng(3)).floating_rows(level)
-    assert floating.sum() == rows
-    share = brute_force(film_s(contact.forces_n), floating, 220.0)
-    assert_read(counts, share, 220.0)
-
-
 def test_film_on_its_way_back_reads_higher_where_it_was_pressed_more():
     touch = replace(HERE, tilt_x_rad=0.02)
     rocked = replace(touch, force_n=1.4 * 60, tilt_x_rad=-0.02)
@@ -174,22 +130,6 @@ def test_film_on_its_way_back_reads_higher_where_it_was_pressed_more():
     ratio = felt[pressed] / now[pressed]
     assert ratio.min() < 1.1
     assert ratio.max() == pytest.approx(1.4)  # not one factor for all
-
-
-def test_slide_is_the_mean_of_the_forces_on_its_way():
-    level = replace(SOUND, slide_mm=LEVELS["slide-2"].slide_mm)
-    counts = counts_of(level, STRIP)
-    rng = np.random.default_rng(3)
-    sample_sensor(SENSOR, rng)
-    towards = rng.uniform(-np.pi, np.pi)
-    ways = np.linspace(-level.slide_mm / 2, level.slide_mm / 2, 5)
-    forces = np.mean(
-        [tabs(STRIP, SENSOR, replace(HERE, x_mm=HERE.x_mm + way * np.cos(towards),
-                                     y_mm=HERE.y_mm + way * np.sin(towards))).forces_n
-         for way in ways], axis=0,
-    )  # fmt: skip
-    g = film_s(forces)
-    assert_read(counts, g / (g.sum(0) + 1 / 22))
 
 
 def test_mountings_put_each_tactel_where_they_say():
@@ -222,19 +162,6 @@ def test_print_is_scaled_from_its_datum():
     edge = -30 + 1.01 * (30 + 1.0)  # of the strip of 2 mm about 0, 31 mm from the datum
     within, beyond = print_.heights_mm(np.array([[edge - 1e-3, 0.0], [edge + 1e-3, 0.0]]))
     assert within > beyond
-
-
-def test_instance_of_a_sensor_is_the_same_at_every_touch():
-    instance = sample_sensor(SENSOR, np.random.default_rng(5))
-    level = replace(TYPICAL, noise_n=0.0)
-    first, second = (
-        LevelSensor(SENSOR, level, instance=instance)
-        .read(bare_scene(FlatPlate()), HERE, np.random.default_rng(seed))
-        .counts
-        for seed in (1, 2)
-    )
-    np.testing.assert_array_equal(first, second)
-    assert (counts_of(level, seed=1) != counts_of(level, seed=2)).any()
 
 
 OBLONG = polygon([np.array([(0, 0), (40, 0), (40, 30), (0, 30)])])
@@ -349,29 +276,3 @@ def test_files_are_read_exactly(tmp_path, kind):
         file.write_text("\n".join([*rows, "endsolid x"]))
     assert np.array_equal(written_triangles(file), triangles.astype(float))
     assert part_mesh(file).top_mm == triangles[..., 2].max()
-
-
-@pytest.mark.parametrize(
-    ("content", "match"),
-    [
-        (binary([np.eye(3)])[:-1], "announces 1 triangles, but ends at byte 133 after 0"),
-        (binary([]), "no triangle"),
-        (binary([np.eye(3) * np.nan]), "triangle 1 at byte 84 has a corner that is not a number"),
-        (b"solid x\nendsolid", "no triangle"),
-        (b"\x89PNG", "neither ASCII nor binary STL"),
-        (b"", "empty"),
-    ],
-)
-def test_what_is_no_stl_is_refused(tmp_path, content, match):
-    file = tmp_path / "bad.stl"
-    file.write_bytes(content)
-    with pytest.raises(SurfaceError, match=match) as caught:
-        written_triangles(file)
-    assert caught.value.place.startswith(str(file))
-    assert caught.value.fix
-
-
-def test_missing_files_and_folders_are_refused(tmp_path):
-    for path, match in ((tmp_path / "none.stl", "No such file"), (tmp_path, "Is a directory")):
-        with pytest.raises(SurfaceError, match=match):
-            written_triangles(path)
