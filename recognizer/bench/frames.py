@@ -320,7 +320,6 @@ class FrameHandler:
 
 
 def _age(made: str) -> str:
-    """Return how old a calibration is, in words."""
     try:
         then = datetime.datetime.fromisoformat(made)
     except ValueError:

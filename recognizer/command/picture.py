@@ -196,7 +196,6 @@ def _outlines(
 
 
 def _draw_window(axes: Axes, sensor: SensorType, won: WinningLattice) -> None:
-    """Draw the cells around the sensor with their symbols."""
     encoding, place = won.encoding, won.place
     array, pitch = encoding.array, encoding.style.pitch_mm
     middle_row = place.row - math.floor(won.y_mm / pitch)

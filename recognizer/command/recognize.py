@@ -108,7 +108,6 @@ def _print_answers(
     interrupted: Event,
     origin: RecordingOrigin,
 ) -> int:
-    """Answer and print all touches; returns the exit code."""
     out = sys.stdout  # a bar would take it for its terminal
     values: list[dict[str, Any]] = []
     kept: list[Answer] = []
@@ -287,7 +286,6 @@ def _wiring(flip: str, learning: SensorLearning) -> Wiring | None:
 def _rewired(
     wiring: Wiring | None, source: TouchSource, frames: Iterator[Frame]
 ) -> Iterator[Frame]:
-    """Return frames as the sensor has them, by the changes on their way."""
     if wiring is None:
         return frames
     return (wiring.frame(frame, source.sensor.full) for frame in frames)

@@ -266,6 +266,5 @@ def _log_agreement(
 
 
 def _probabilities(scores: Array) -> Array:
-    """Return probabilities (m, q + 1) of the symbols of cells by their log-likelihoods."""
     each = np.exp(scores - scores.max(axis=1, keepdims=True))
     return np.asarray(each / each.sum(axis=1, keepdims=True))

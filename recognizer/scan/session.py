@@ -239,8 +239,6 @@ def _spread(pose: SensorPose | ArrayLike, T_base_plane: Array) -> ArrayLike:
 
 @dataclass(slots=True)
 class _Face:
-    """A face with its belief."""
-
     belief: ScanBelief
     places: TouchPlaces
 

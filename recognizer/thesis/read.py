@@ -192,5 +192,4 @@ def _probe_on_lattice(fit: Fit, T_image_probe: Array) -> tuple[float, float]:
 
 
 def _step_back(places: NDArray[np.uint64], steps: int, cycle: int) -> NDArray[np.uint64]:
-    """Return places - steps on a cycle."""
     return np.asarray((places + np.uint64(-steps % cycle)) % np.uint64(cycle))

@@ -101,7 +101,6 @@ class ThesisScan:
         return self._read() if self._unread >= EVERY else refusal(seq, TOO_FEW)
 
     def _read(self) -> Recognition:
-        """Merge and read all touches."""
         touches, self._unread = self._mosaic.touches, 0
         arm = [each.believed.pose for each in touches if each.believed is not None]
         by_arm = len(arm) == len(touches)

@@ -199,7 +199,6 @@ def _remove_branch(graph: Graph, number: int) -> Graph:
 
 
 def _join_branches(a: Branch, b: Branch, node: int) -> Branch:
-    """Return two branches as one, through the node that they share."""
     if a.end != node:
         a = Branch(a.end, a.start, a.path[::-1])
     if b.start != node:

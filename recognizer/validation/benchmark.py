@@ -274,7 +274,6 @@ def digest_of(arrays: Mapping[str, Array], count: int) -> str:
 def _make(
     folder: Path, name: str, work: Work, seed: int, count: int, progress: TouchProgress
 ) -> dict[str, Array]:
-    """Make the touches of a world, and write them in every form."""
     progress.begin(f"{folder.name}: {name}", count, 0)
     arrays = touches_of(work, 100 * seed + list(WORLDS).index(name), count, progress)
     folder.mkdir(parents=True, exist_ok=True)
@@ -321,7 +320,6 @@ def _write_card(folder: Path, seed: int, half: Mapping[str, Mapping[str, Array]]
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table as Markdown."""
     lines = [f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|"]
     return "\n".join([*lines, *(f"| {' | '.join(map(str, row))} |" for row in rows)])
 
@@ -416,7 +414,6 @@ def _each(whole: Mapping[str, Array], groups: Array) -> Iterator[tuple[str, dict
 
 
 def _figures_of(whole: Mapping[str, Array], some: NDArray[np.bool_]) -> dict[str, Any]:
-    """Return the figures of some touches."""
     part = {name: values[some] for name, values in whole.items()}
     total, right = len(part["right"]), part["right"]
     known = (part["label"] >= 0) | (part["also_label"] >= 0)

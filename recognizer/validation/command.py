@@ -1,17 +1,7 @@
 """`validate-set`: touch a set in simulation, read it, and say how far the answers can be trusted.
 
-::
-
-    validate-set SPEC.yaml...          make the set, touch it, report
-    validate-set compare A B           two runs side by side
-    validate-set worlds DIR...         runs of different worlds on one page
-    validate-set repeat DIR NUMBER     one touch again, with pictures of each stage
-    validate-set report DIR            the report anew from the touches that are there
-    validate-set benchmark             frozen touches with truth, and readers compared on them
-
-Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 ran but failed
-(`--fail-under`, or a worker was lost), 2 bad input, 4 database, 130 interrupted. Nothing
-heavy is imported before it is needed.
+`EPILOG` lists its commands and exit codes. Results go to stdout, progress and messages to stderr.
+Nothing heavy is imported before it is needed.
 """
 
 from __future__ import annotations
@@ -317,7 +307,6 @@ def benchmark(
 
 
 def _report(result: ValidationResult, *, as_json: bool) -> None:
-    """Say how a run ended."""
     if as_json:
         output.write_json(result.as_json())
     else:

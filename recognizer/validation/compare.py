@@ -128,7 +128,6 @@ def compare_sizes(
 
 
 def _differing_settings(a: dict[str, Any], b: dict[str, Any]) -> list[dict[str, str]]:
-    """Return the settings in which two runs differ, by their provenance."""
     both = [
         (name, a[part].get(name), b[part].get(name))
         for part in ("campaign", "versions")

@@ -224,7 +224,6 @@ def _sample_scene(
     plan: TouchPlan, encoding: EmbossedArray, sensor: SensorType, ranges: TouchRanges,
     rng: np.random.Generator,
 ) -> tuple[ContactScene, Touch]:  # fmt: skip
-    """Draw what is touched and where."""
     if plan.kind in FOREIGN:
         foreign = bare_scene(FOREIGN[plan.kind](encoding, rng), plan.kind)
         return ContactScene(foreign, registered=False), _draw_anywhere(rng, ranges)
@@ -357,5 +356,4 @@ def _reseated(
 
 @lru_cache(maxsize=4)
 def _sensor_of_run(seed: int, sensor: SensorType) -> SensorInstance:
-    """Return the one sensor of a run."""
     return sample_sensor(sensor, np.random.default_rng([seed, 0, 4]))

@@ -220,7 +220,6 @@ def _extra_specs(kind: str, pitch_mm: float) -> Iterator[dict[str, Any]]:
 
 
 def _random_specs(lab: int, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
-    """Yield the objects of another lab, of any size."""
     for k in range(LAB_OBJECTS):
         x, y, z = (float(round(size, 1)) for size in rng.uniform(*LAB_MM, 3))
         shapes: tuple[dict[str, Any], ...] = (

@@ -202,7 +202,6 @@ def _shares(axis: Axes, at: Any, lines: list[dict[str, Any]], marker: str = ".")
 
 
 def _rms_mm(lines: list[dict[str, Any]]) -> list[float]:
-    """Return the errors of the place, NaN for None."""
     return [np.nan if line["rms_mm"] is None else line["rms_mm"] for line in lines]
 
 

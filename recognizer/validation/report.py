@@ -117,7 +117,6 @@ def _percent(value: float | None, digits: int = 1) -> str:
 
 
 def _share(share: dict[str, Any]) -> str:
-    """Return a share with its interval."""
     if share["share"] is None:
         return NONE
     return f"{_percent(share['share'], 2)} ({100 * share['low']:.2f} … {100 * share['high']:.2f})"
@@ -169,7 +168,6 @@ def write_results(work: Work, folder: Path) -> dict[str, Any]:
 
 
 def _cpu_ms(seconds: Any) -> dict[str, float]:
-    """Return median, 95 %, 99 % and mean of CPU times, ms."""
     at = {"median": 0.5, "p95": 0.95, "p99": 0.99}
     found = {name: float(np.quantile(seconds, q)) for name, q in at.items()}
     found["mean"] = float(np.mean(seconds))

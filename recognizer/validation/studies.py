@@ -254,7 +254,6 @@ def engine_lines() -> list[dict[str, Any]]:
 
 
 def _cpu_ms(work: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Return the median CPU time of something, ms."""
     times = []
     for _ in range(repeats):
         start = time.process_time()

@@ -155,11 +155,10 @@ def test_the_slicer_repairs_nothing_and_prints_the_symbols(made, tmp_path):
 
 
 #: Large enough that one touch shows symbols enough; smaller ones need a scan.
-TOUCHED = """
-objects:
-  - {name: Tube, shape: {cylinder: {diameter: 90 mm, height: 40 mm}}}
-  - {name: Cone, shape: {cone: {diameter: 100 mm, top_diameter: 70 mm, height: 40 mm}}}
-"""
+TOUCHED = {
+    "Tube": "{cylinder: {diameter: 90 mm, height: 40 mm}}",
+    "Cone": "{cone: {diameter: 100 mm, top_diameter: 70 mm, height: 40 mm}}",
+}
 INSIDE_MM = 12.0
 
 
@@ -167,11 +166,11 @@ INSIDE_MM = 12.0
 def touched(tmp_path_factory):
     """A database, and the round face of each of its objects as it was written."""
     folder = tmp_path_factory.mktemp("touched")
-    spec, database = folder / "two.yaml", str(folder / "lab.db")
-    spec.write_text(TOUCHED)
-    encode(read_specs([spec]), folder=folder, database=database, formats=("stl",))
+    spec, database = folder / "one.yaml", str(folder / "lab.db")
     parts = {}
-    for name in ("Tube", "Cone"):
+    for name, shape in TOUCHED.items():
+        spec.write_text(f"name: {name}\nshape: {shape}\n")
+        encode(read_specs([spec]), folder=folder, database=database, formats=("stl",))
         held = registered_object(database, name)
         (face,) = [face for face in held.faces if face.round is not None]
         (part,) = [part for part in held.parts if part.format == "stl"]
