@@ -31,10 +31,10 @@ require("mujoco", extra="engines", purpose="engine mujoco")
 
 Array = NDArray[np.float64]
 
-#: Elastomer against the overlay's, and the depth, mm, at which it is crushed: a distance field knows
-#: no depth beyond the half width of a stroke, .5 to .7 mm. 120 N press .5 mm deep, not 1 mm. Crushed
-#: at the overlay's height, faces of 12 to 35 mm with `tactel-8` are answered in 99 of 150 touches
-#: instead of 116 (seeds 5151, 5252; octree of six levels).
+#: Elastomer against the overlay's, and the depth, mm, at which it is crushed: a distance field has
+#: no depth beyond the half width of a stroke, .5 to .7 mm. 120 N press .5 mm deep, not 1 mm. If it
+#: is crushed at the overlay's height, faces of 12 to 35 mm with `tactel-8` are answered in 99 of
+#: 150 touches instead of 116 (seeds 5151, 5252; octree of six levels).
 STIFFER = 8.0
 DEEPEST_MM = 0.7
 #: Cells of .28 mm under the sensor: MuJoCo's own 6 is too coarse for strokes of 1 mm. Images are a
