@@ -15,7 +15,7 @@
     broker             the newest of every topic, for any number of pages
     answers, lab_json  answers and registered things as JSON;  message  frames, mosaics as bytes
     files              recordings, calibrations and printed parts: what may be read and written
-    encode_object      an example object and expected recognition rates by `encode-object`
+    encode_object      parts, an example and expected recognition rates by `encode-object`
 
 The page is TypeScript in `web/`; `npm ci && npm run build` there writes `static/`, which is
 shipped. Thesis 4.2 (the display programme), 4.3, 6.3.

@@ -15,52 +15,35 @@ GET   /api/touches[/N], /api/touches.csv, /api/touches.h5   POST, DELETE /api/to
 
 from __future__ import annotations
 
-import asyncio
-import os
 import tempfile
-import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
-from urllib.parse import quote
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Request, Response
-from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import FileResponse, StreamingResponse
+from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from encoded_objects.base.sensor_type import usual_force_n
-from generator.database.open import normal_url, open_database
+from generator.database.open import open_database
 from generator.database.read import object_entry, read_object, read_parts
 from generator.database.transaction import read_transaction
 from probe.port.listing import list_ports
 from probe.recording.record import Recorder
 from recognizer.bench import controllers
-from recognizer.bench.encode_object import (
-    EXAMPLE,
-    LOOK_S,
-    face_promises,
-    load_ahead,
-    make_part,
-    part_settings,
-    try_part,
-)
+from recognizer.bench.encode_object import EXAMPLE, add_making_routes, face_promises, make_part
 from recognizer.bench.errors import BusyError, UnknownError
 from recognizer.bench.files import Uploads, find_file, part_folder, part_to_send
 from recognizer.bench.lab_json import arrays_json, map_json, object_json, object_svg, objects_json
 from recognizer.bench.message import FILTERS
 from recognizer.bench.options import LAB
 from recognizer.bench.session import Session
-from recognizer.bench.simulated import TOUCH
 from recognizer.bench.touch_log import NAME_LENGTH
 from recognizer.touch.options import DEFAULTS
 
 Ports = tuple[tuple[str, str], ...]
-_Made = TypeVar("_Made")
 
 KEPT = {"cache-control": "private, max-age=86400"}  #: its address holds the time of registration
-PIECE = 1 << 16  #: bytes of a zip that are sent at once
 DATABASE_S = 2.0  #: wait for other users of the database; then the page shows who holds it
 
 
@@ -137,12 +120,6 @@ class _Print(_Body):
     material: str = Field(default="", max_length=80)
 
 
-class _Part(_Body):
-    name: Name
-    spec: str = Field(max_length=32_000)  #: YAML
-    keep: bool  #: in the lab that is open, or a new one; otherwise in one of its own
-
-
 class _TouchName(_Body):
     name: str = Field(max_length=NAME_LENGTH)
 
@@ -160,7 +137,7 @@ def api_routes(session: Session, ports: Ports, parts: Path | None) -> APIRouter:
     _add_recording_routes(routes, session)
     _add_touch_routes(routes, session)
     _add_lab_routes(routes, session, parts)
-    _add_making_routes(routes, session)
+    add_making_routes(routes, session)
     return routes
 
 
@@ -396,7 +373,7 @@ def _add_lab_routes(routes: APIRouter, session: Session, parts: Path | None) -> 
             raise BusyError("objects are registered already", fix="touch one of these")
         _, name, packed = make_part(EXAMPLE, "Example", session.database or LAB, lambda: False)
         packed.close()
-        _read_again(session)
+        session.read_again()
         return {"object": name}
 
     @routes.get("/objects/{name}")
@@ -436,7 +413,7 @@ def _add_lab_routes(routes: APIRouter, session: Session, parts: Path | None) -> 
 
     @routes.post("/lab")
     def reload() -> dict[str, Any]:
-        _read_again(session)
+        session.read_again()
         return {"reloading": True}
 
     @routes.get("/map/{number}")
@@ -447,62 +424,6 @@ def _add_lab_routes(routes: APIRouter, session: Session, parts: Path | None) -> 
             raise UnknownError(f"there is no array {number}", fix=f"there are {len(known)}")
         with read_transaction(engine()) as connection:
             return map_json(connection, known[number])
-
-
-def _add_making_routes(routes: APIRouter, session: Session) -> None:
-    def lab_of(body: _Part) -> str:
-        return (session.database or LAB) if body.keep else ""
-
-    @routes.get("/make")
-    def settings() -> dict[str, Any]:
-        schema = part_settings()
-        load_ahead()
-        lab = normal_url(session.database or LAB).render_as_string()  # without its password
-        return {
-            "schema": schema, "sensor_type": session.sensor.name,
-            "lab": lab.removeprefix("sqlite:///"), "new": not session.database,
-        }  # fmt: skip
-
-    @routes.post("/make/try")
-    async def attempt(body: _Part, request: Request) -> dict[str, Any]:
-        return await _while_there(
-            request, lambda gone: try_part(body.spec, body.name, lab_of(body), gone)
-        )
-
-    @routes.post("/make")
-    async def make(body: _Part, request: Request) -> StreamingResponse:
-        name, made, packed = await _while_there(
-            request, lambda gone: make_part(body.spec, body.name, lab_of(body), gone)
-        )
-        if body.keep:
-            await run_in_threadpool(_read_again, session)
-        headers = {
-            "content-disposition": f'attachment; filename="{name}.zip"',
-            "content-length": str(os.fstat(packed.fileno()).st_size),
-            "x-object": quote(made),
-        }
-        chunks = iter(lambda: packed.read(PIECE), b"")
-        return StreamingResponse(chunks, media_type="application/zip", headers=headers)
-
-
-def _read_again(session: Session) -> None:
-    """Read the database again: something was registered, the first object of a new one maybe."""
-    if not session.database:
-        session.use_database(LAB)
-        session.open(TOUCH)
-    session.recognition.reload()
-    if session.simulation is not None:
-        session.simulation.forget()
-
-
-async def _while_there(request: Request, work: Callable[[Callable[[], bool]], _Made]) -> _Made:
-    """Do work in a thread, and tell it when the page that waits for it has left."""
-    gone = threading.Event()
-    doing = asyncio.ensure_future(run_in_threadpool(work, gone.is_set))
-    while not (await asyncio.wait({doing}, timeout=LOOK_S))[0]:
-        if await request.is_disconnected():
-            gone.set()
-    return doing.result()
 
 
 def _download(content: bytes, name: str, media_type: str) -> Response:

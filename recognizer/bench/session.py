@@ -28,8 +28,9 @@ from recognizer.bench.errors import BusyError
 from recognizer.bench.feed import Feed, ProbeFeed, ReplayFeed
 from recognizer.bench.files import find_file, list_files
 from recognizer.bench.frames import CalibrationState, FrameHandler
+from recognizer.bench.options import LAB
 from recognizer.bench.reading import RecognitionThread
-from recognizer.bench.simulated import TouchProbe, is_simulation
+from recognizer.bench.simulated import TOUCH, TouchProbe, is_simulation
 from recognizer.sensor.learn import LEAST_TOUCHES
 
 Array = NDArray[np.float64]
@@ -112,6 +113,15 @@ class Session:
                 address_of(url)
                 self.feed = ProbeFeed(url, sensor)
             self._url = url
+
+    def read_again(self) -> None:
+        """Read the database again: something was registered, perhaps its first object."""
+        if not self.database:
+            self.use_database(LAB)
+            self.open(TOUCH)
+        self.recognition.reload()
+        if self.simulation is not None:
+            self.simulation.forget()
 
     def _read_recording(self, url: str) -> ReplayFeed:
         """Read a recording as a whole, one at a time; others work meanwhile."""

@@ -12,28 +12,20 @@ import recognizer.touch.chance
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.simulate.registered import registered_surface
-from recognizer.touch import chance
 from recognizer.touch.chance import (
     LEAST_SHARE,
-    _lines,
     chance_of_match,
     expected_by_border,
     expected_matches,
-    fitting_share,
-    joint_share,
     place_bits,
-    points_on_lattice,
     share_of_borders,
-    surely_pressed,
     tip_share,
 )
 from recognizer.touch.hypothesis import Hypothesis, bounded_scores
 from recognizer.touch.lab import open_lab
-from recognizer.touch.options import ReaderOptions
 from recognizer.touch.pose import face_pose
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import read_touch
-from recognizer.touch.symbols.template import psi
 
 SEEN = [(i, j) for j in range(3) for i in range(3)]
 
@@ -180,22 +172,6 @@ def test_a_place_that_itself_falls_behind_may_be_matched_over_a_bare_cell(small,
     assert found == pytest.approx(places * 2 / 4 / 4)
 
 
-def test_scores_are_rounded_by_the_grain_that_is_set(small, monkeypatch):
-    lab = square(small, 8)
-    scores = small.sure_of(lab.shows(4, 4, 0, SEEN))
-    other = (lab.shows(4, 4, 0, SEEN)[0] + 1) % 4
-    scores[0, other] = -0.3
-    fit, place = small.fit_of(SEEN, scores), Hypothesis(0, 4, 4, 0, 0.0)
-    for grain, symbols in ((0.25, 1), (0.5, 2)):
-        monkeypatch.setattr(recognizer.touch.chance, "GRAIN", grain)
-        found = expected_matches([lab.embossed], lab.embossed, fit, place)
-        assert found == pytest.approx(64 * symbols / 4**9)
-
-
-def test_the_limit_and_the_grain():
-    assert (ReaderOptions().doubt, recognizer.touch.chance.GRAIN) == (1e-4, 0.25)
-
-
 def places_that_match(lab, cells, scores, held, anchor, behind):
     """Every combination of symbols of every place that holds the cell seen best, one by one."""
     own, total = sum(row[k] for row, k in zip(scores, held, strict=True)), 0.0
@@ -262,15 +238,6 @@ def test_corners_count_in_a_corner_and_edges_at_an_edge(small, by_border):
     assert by_border(lab, *sure_touch(small, lab, 0, 7)) == pytest.approx(1 / 4)
 
 
-def test_what_the_plate_does_not_press_is_no_border(small, by_border):
-    lab = square(small, 8)
-    fit, place = sure_touch(small, lab, 4, 7)
-    # all places that bear the three symbols: 8 x 6 of 8 x 8
-    assert by_border(lab, fit, place, pressed=0.0) == pytest.approx(48 / 4**3)
-    assert by_border(lab, fit, place, pressed=0.02) == pytest.approx(48 / 4**3)
-    assert by_border(lab, fit, place, pressed=0.2) == pytest.approx(6 / 4**3)
-
-
 def test_borders_count_in_arrays_that_are_embossed_alike_and_small_enough(
     small, by_border, monkeypatch
 ):
@@ -288,9 +255,7 @@ def test_borders_count_in_arrays_that_are_embossed_alike_and_small_enough(
         assert by_border(lab, fit, place, both) == pytest.approx(told)
 
 
-TIP_MM, PITCH_MM = 1.2666, 5.0
-INSIDE = np.linspace(-3.0, 3.0, 13)
-SQUARE = np.array([(0, 0), (30, 0), (30, 30), (0, 30)], float)
+TIP_MM = 1.2666
 
 
 @pytest.mark.parametrize(
@@ -298,79 +263,6 @@ SQUARE = np.array([(0, 0), (30, 0), (30, 30), (0, 30)], float)
 )
 def test_share_of_a_round_tip_over_a_line(inside, share):
     assert tip_share(np.array([float(inside)]))[0] == pytest.approx(share, abs=1e-4)
-
-
-def readings_at(shift_mm, bare=0.4, factor=1.0):
-    """psi of what tactels read if the face ends so many mm farther out than it should."""
-    return psi(factor * bare * tip_share((INSIDE + shift_mm) / (TIP_MM / 2)))
-
-
-def fitting(readings, bare=0.4, unit=0.12):
-    expected = np.full(len(INSIDE), bare)
-    return fitting_share(INSIDE, readings, expected, TIP_MM, PITCH_MM, unit)
-
-
-def test_a_border_in_its_place_leaves_few_others():
-    assert fitting(readings_at(0.0)) <= 0.16
-    assert fitting(readings_at(0.3)) < fitting(readings_at(0.8)) < fitting(readings_at(1.5))
-    assert fitting(readings_at(-0.3)) < fitting(readings_at(-0.8)) < fitting(readings_at(-1.5))
-    assert fitting(readings_at(1.5)) > 0.6
-
-
-def test_the_force_on_the_bare_face_need_not_be_known():
-    for factor in (0.6, 1.5):
-        assert fitting(readings_at(0.0, factor=factor)) <= 0.2
-
-
-def test_where_nothing_is_pressed_every_border_fits():
-    assert fitting(readings_at(0.0, bare=0.0), bare=0.0) == 1.0
-    # and where the face should be pressed and is not, this border is the worst of all
-    assert fitting(np.zeros(len(INSIDE))) > 0.4
-
-
-def test_how_much_less_likely_a_border_may_be_that_counts(monkeypatch):
-    shares = []
-    for slack in (0.25, 1.0, 1e3):
-        monkeypatch.setattr(chance, "SLACK", slack)
-        shares.append(fitting(readings_at(0.0)))
-    monkeypatch.setattr(chance, "SLACK", 0.25)
-    assert shares[0] < shares[1] < shares[2] == 1.0
-    assert fitting(readings_at(0.0), unit=0.5) > fitting(readings_at(0.0))
-
-
-def test_lines_that_run_alike_count_once():
-    assert joint_share([]) == 1.0
-    assert joint_share([(0.0, 0.5), (math.pi / 2, 0.3)]) == pytest.approx(0.15)
-    assert joint_share([(0.1, 0.5), (math.pi, 0.3)]) == pytest.approx(0.3)
-    assert joint_share([(0.21, 0.5), (math.pi, 0.3)]) == pytest.approx(0.15)
-
-
-def test_each_line_has_the_tactels_about_its_middle():
-    face = SimpleNamespace(polygon_mm=(SQUARE,))
-    points = np.array(
-        [(15, 1), (15, -1), (15, 3.3), (15, -3.3), (1, 1), (0.5, 4), (29, 15), (1, -1)]
-    )
-    found = list(_lines(face, points.astype(float)))
-    assert [own.tolist() for _, own, _ in found] == [
-        [True, True, False, False, False, False, False, False],
-        [False, False, False, False, False, False, True, False],
-        [False] * 8,
-        [False, False, False, False, False, True, False, False],
-    ]
-    inside = found[0][0]
-    assert inside == pytest.approx([1, -1, 3.3, -3.3, 1, 4, 15, -1])
-    assert [direction for _, _, direction in found] == pytest.approx(
-        [0, math.pi / 2, math.pi, -math.pi / 2]
-    )
-
-
-def test_a_hole_lies_inside_on_its_outer_side():
-    hole = np.array([(10, 10), (10, 20), (20, 20), (20, 10)], float)
-    face = SimpleNamespace(polygon_mm=(SQUARE, hole))
-    found = list(_lines(face, np.array([(9.0, 15.0), (11.0, 15.0)])))
-    inside, own, _ = found[4]
-    assert inside == pytest.approx([1, -1])
-    assert own.all()
 
 
 @pytest.fixture(scope="module")
@@ -405,32 +297,6 @@ def test_amid_a_face_and_without_tips_no_border_is_told(reader):
     best = touched(reader, 30.0, 26.0)
     assert share_of_borders(best, TIP_MM) == 1.0
     assert share_of_borders(touched(reader, 30.0, 5.0), 0.0) == 1.0
-
-
-def test_a_plate_that_presses_lightly_tells_no_border(reader):
-    best = touched(reader, 30.0, 7.0, force_n=25.0)
-    light = best.fit.gain * [1.0, 0.5, 0.0, 0.0]
-    held = replace(best, fit=replace(best.fit, gain=light))
-    assert share_of_borders(held, TIP_MM) == 1.0
-
-
-def test_tactels_that_would_plainly_read_a_symbol(reader):
-    best = touched(reader, 30.0, 5.0)
-    image, gain = best.image, np.array([best.fit.gain[0], 0.4, 0.0, 1.2])
-    pressed = surely_pressed(image, gain, 0.15).reshape(image.shape)
-    assert pressed[0].all()  # the plane falls down the image
-    assert not pressed[-1].any()
-    dead = replace(image, trust=np.zeros_like(image.trust))
-    assert not surely_pressed(dead, gain, 0.15).any()
-    loud = replace(image, noise=20.0 * float(image.forces.max()))
-    assert not surely_pressed(loud, gain, 0.15).any()
-
-
-def test_tactels_on_the_lattice(small):
-    image = SimpleNamespace(points_mm=np.array([(1.0, 0.0), (0.0, 2.0)]))
-    fit = small.fit_of([(0, 0)], [[0.0] * 5], x_mm=3.0, y_mm=4.0, theta_rad=math.pi / 2,
-                       nuisance=np.array([0, 0, 0, 0.1]))  # fmt: skip
-    assert points_on_lattice(image, fit) == pytest.approx(np.array([(3.0, 5.1), (0.8, 4.0)]))
 
 
 def test_round_faces_have_no_border():

@@ -17,7 +17,6 @@ from recognizer.touch.hypothesis import (
     labels_at,
     labels_of,
     log_likelihood,
-    under_centre,
 )
 
 ALL = 10**6
@@ -57,31 +56,6 @@ def soft(lab, place, cells, small, seed, spread=2.0, least=-9.0):
     scores = small.sure_of(labels, least=least) + spread * rng.normal(size=(len(cells), 5))
     scores -= scores.max(axis=1, keepdims=True)
     return small.fit_of(cells, scores, rng.uniform(1.0, 30.0, len(cells)), value=-123.0)
-
-
-@pytest.mark.parametrize(
-    ("scores", "seen", "label", "nats"),
-    [
-        ([0, -3, -9, -9, -5], 20, 0, 0.0),
-        ([0, -3, -9, -9, -5], 20, 1, -3.0),
-        ([0, -3, -9, -9, -5], 20, 4, -5.0),
-        ([-20, -20, -20, -20, 0], 20, 2, -4.0),  # registered, and worn away
-        ([-1, -20, -20, -20, 0], 20, 0, -1.0),
-        ([0, -20, -20, -20, -2], 20, 3, -6.0),  # as if worn: 4 less than none
-        ([0, -20, -20, -20, -20], 20, 3, -8.0),  # no cell costs more
-        ([0, -20, -20, -20, -20], 20, 4, -8.0),
-        ([0, -20, -20, -20, -20], 8, 4, -8.0),
-        ([0, -20, -20, -20, -20], 6, 4, -6.0),  # a corner tells less
-        ([0, -20, -20, -20, -20], 1, 3, -1.0),
-        ([-20, -20, -20, -20, 0], 2, 2, -2.0),
-    ],
-)
-def test_what_a_cell_costs(small, scores, seen, label, nats):
-    held = {(5, 5): (0, label)} if label < 4 else {(0, 0): (0, 1)}
-    lab = small.Lab(held)
-    fit = small.fit_of([(0, 0)], [scores], seen, value=-50.0)
-    assert log_likelihood(lab.embossed, fit, at(5, 5)) == pytest.approx(nats - 50.0)
-    assert cost(np.array(scores, float), seen, label) == nats
 
 
 @pytest.mark.parametrize("dense", [False, True])
@@ -172,75 +146,6 @@ def test_where_no_window_is_whole_three_cells_are_tried_in_turn_as_registered_on
         assert one.score == pytest.approx(by_hand(lab, fit, (one.row, one.column, one.face)))
 
 
-def test_a_cell_that_shows_rather_no_symbol_is_no_anchor(small):
-    lab = small.two_faces()
-    scores = [[-1, -1, -1, -1, 0.0]] * 4 + [[-0.1, -5, -5, -5, -0.2]]
-    fit = small.fit_of(APART, scores)
-    places = where(find_hypotheses(lab.embossed, (fit,), ALL))
-    assert places == {
-        ((r + 1) % 11, (c - 4) % 13, face) for (r, c), (face, label) in lab.held.items()
-    }
-    none = small.fit_of(APART, [[-1, -1, -1, -1, 0.0]] * 4 + [[0.0, 0, 0, 0, 0.0]])
-    assert find_hypotheses(lab.embossed, (none,), ALL) == []
-
-
-def test_a_symbol_that_costs_as_much_as_any_cell_can_is_not_tried(small):
-    lab = small.two_faces()
-    for least, labels in ((-7.9, {0, 1}), (-8.1, {0})):
-        fit = small.fit_of([(0, 0)], [[0.0, least, -30.0, -30.0, -30.0]])
-        found = find_hypotheses(lab.embossed, (fit,), ALL)
-        assert {lab.held[one.row, one.column][1] for one in found} == labels
-
-
-def test_eight_places_of_each_fit_are_kept_and_know_which_fit_they_are_of(small):
-    lab = small.two_faces()
-    fits = tuple(soft(lab, (4, 3, 0), APART, small, seed, 3.0, -3.0) for seed in range(3))
-    found = find_hypotheses(lab.embossed, fits)
-    assert [sum(one.fit == number for one in found) for number in range(3)] == [8, 8, 8]
-    assert [one.score for one in found] == sorted((one.score for one in found), reverse=True)
-    for number, fit in enumerate(fits):
-        every = sorted(one.score for one in find_hypotheses(lab.embossed, (fit,), ALL))[-8:]
-        assert sorted(one.score for one in found if one.fit == number) == pytest.approx(every)
-
-
-def strip(small, length=12):
-    """Two rows of registered cells, no 2 x 2 labels twice and none of them alike."""
-    labels = np.array([[0, 1, 2, 0, 2, 1, 0, 1, 1, 2, 0, 0], [1, 2, 0, 0, 1, 0, 2, 2, 1, 0, 2, 1]])
-    held = {(4 + r, c): (0, int(labels[r, c])) for r in range(2) for c in range(length)}
-    return small.Lab(held, columns=17), labels
-
-
-def window(labels, left, width, small, gap=12.0):
-    """A fit of two rows of the strip: cell (i, j) is column left + i of row 4 - j."""
-    cells = [(i, -r) for r in range(2) for i in range(width)]
-    shown = [labels[r][left + i] for r in range(2) for i in range(width)]
-    return cells, shown, small.sure_of(shown, least=-gap)
-
-
-@pytest.mark.parametrize(("gap", "looked_up"), [(6.1, True), (6.0, False), (5.9, False)])
-@pytest.mark.parametrize("against", ["symbol", "none"])
-def test_windows_are_looked_up_whose_every_cell_is_sure_by_six_nats(small, gap, looked_up, against):
-    lab, _ = strip(small)
-    cells, _, scores = window(np.array([[3, 3], [1, 1]]), 0, 2, small)
-    scores[2:, 4 if against == "none" else 0] = -gap
-    found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))
-    assert bool(found) is not looked_up  # the window is nowhere (no 3 is); label 1 is
-
-
-def test_of_a_window_the_weakest_cell_may_be_read_wrong(small):
-    lab, labels = strip(small)
-    for weak in range(6):
-        for wrong in range(6):
-            cells, shown, scores = window(labels, 3, 3, small)
-            own = shown[wrong]
-            other = (own + 1) % 3
-            scores[wrong] = -20.0
-            scores[wrong, other], scores[wrong, own] = 0.0, -9.0
-            scores[weak, 4] = -7.0  # the least sure
-            found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))
-            assert ((4, 3, 0) in where(found)) is (weak == wrong)
-
-
 @pytest.mark.parametrize("order", [2, 7])
 def test_windows_of_arrays_of_fewer_or_more_symbols(small, order):
     labels = np.random.default_rng(31).integers(0, order, (6, 9))
@@ -260,43 +165,6 @@ def test_windows_of_arrays_of_fewer_or_more_symbols(small, order):
         scores[weak, shown[weak]] = 0.0
         found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))
         assert (found[0].row, found[0].column) == (1, 4)
-
-
-def test_smaller_windows_are_not_looked_up_beside_larger_ones(small):
-    lab, labels = strip(small)
-    cells, _, scores = window(labels, 3, 2, small)
-    assert where(find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))) == {(4, 3, 0)}
-    cells, _, scores = window(labels, 3, 3, small)
-    for wrong in (2, 5):  # both of the third column
-        scores[wrong] = np.where(np.arange(5) == 3, 0.0, -12.0)
-    assert find_hypotheses(lab.embossed, (small.fit_of(cells, scores),)) == []
-
-
-def test_upright_windows_are_looked_up_as_level_ones_are(small):
-    labels = np.random.default_rng(5).integers(0, 4, (5, 2))
-    held = {(2 + r, 3 + c): (0, int(labels[r, c])) for r in range(5) for c in range(2)}
-    lab = small.Lab(held)
-    cells = [(i, -r) for r in range(3) for i in range(2)]
-    fit = small.fit_of(cells, small.sure_of([labels[1 + r][i] for r in range(3) for i in range(2)]))
-    assert where(find_hypotheses(lab.embossed, (fit,))) == {(3, 3, 0)}
-
-
-@pytest.mark.parametrize(("rank", "found"), [(3, True), (4, True), (5, False)])
-def test_the_four_surest_windows_are_looked_up(small, rank, found):
-    lab, labels = strip(small)
-    cells, shown, scores = window(labels, 2, 7, small)
-    for column in (2, 3):  # so that of the five windows the last alone is right
-        for row in (0, 1):
-            n = row * 7 + column
-            shown[n] = 3
-            scores[n] = np.where(np.arange(5) == 3, 0.0, -12.0)
-    # how sure the window that begins at each column is: by its first cell, or the last one's last
-    for column in range(4):
-        scores[column, 4] = -(7.0 + 0.1 * column)
-    least = {3: 7.15, 4: 7.05, 5: 6.95}[rank]
-    scores[6, 4] = -least
-    places = where(find_hypotheses(lab.embossed, (small.fit_of(cells, scores),)))
-    assert ((4, 2, 0) in places) is found
 
 
 def line(small, zeros, columns=20_000):
@@ -341,29 +209,6 @@ def test_after_six_cells_512_candidates_go_on(small, monkeypatch, cells, zeros, 
     found = find_hypotheses(lab.embossed, (fit,), ALL)
     assert len({place.column for place in found}) == len(found) == followed
     assert np.isfinite([place.score for place in found]).all()
-
-
-def test_the_surest_and_most_seen_cells_come_first(small, monkeypatch):
-    for name, value in (("ANCHORS", 1), ("FIRST_CELLS", 2), ("FOLLOWED", 2)):
-        monkeypatch.setattr(hypothesis, name, value)
-    # three candidates; the two best after two cells go on
-    lab = line(small, [0, 100, 200], columns=300)
-    lab.held[0, 101] = (0, 2)  # wrong at the second cell
-    lab.held[0, 202] = (0, 2)  # wrong at the third
-    lab = small.Lab(lab.held, rows=1, columns=300)
-    anchor = [0.0, -30, -30, -30, -30]
-    for second, third, dropped in (
-        ((5.0, 12.0), (4.0, 12.0), 100),
-        ((4.0, 12.0), (5.0, 12.0), 200),
-        ((4.0, 12.0), (5.0, 9.0), 100),
-        ((4.0, 12.0), (5.0, 9.9), 200),
-        ((4.0, 40.0), (5.0, 12.0), 200),  # more than twelve tactels tell no more
-        ((4.0, 12.0), (3.0, 40.0), 100),
-    ):
-        scores = [anchor] + [[-by, 0.0, -by, -by, -by] for by, _ in (second, third)]
-        fit = small.fit_of([(0, 0), (1, 0), (2, 0)], scores, [40.0, second[1], third[1]])
-        found = find_hypotheses(lab.embossed, (fit,), ALL)
-        assert {one.column for one in found} == {0, 100, 200} - {dropped}
 
 
 @pytest.mark.parametrize(("cells", "places"), [(1 << 18, 1), ((1 << 18) + 1, 0)])
@@ -412,15 +257,6 @@ def test_rivals_are_sought_from_two_cells_that_the_best_place_holds(small, seed)
     assert [one.score for one in few] == pytest.approx([one.score for one in found[:kept]])
 
 
-def test_a_cell_that_the_best_place_does_not_hold_is_no_anchor(small):
-    lab = small.two_faces()
-    cells = [(0, 0), (5, 0), (6, 0)]  # from (3, 7) on the last column: the others are beyond
-    scores = [[-0.5, -0.5, -0.5, -0.5, -0.7], *small.sure_of([1, 2]).tolist()]
-    fit = small.fit_of(cells, scores)
-    truth = {(r, c, face) for (r, c), (face, _) in lab.held.items()} - {(3, 7, 0)}
-    assert where(find_rivals(lab.embossed, fit, at(3, 7), 0, ALL)) == truth
-
-
 def test_a_place_of_the_same_cell_on_another_face_is_a_rival(small):
     # two faces side by side: a lattice over both is a place of either
     held = {(3, c): (int(c > 4), c % 3) for c in range(2, 8)}
@@ -431,20 +267,6 @@ def test_a_place_of_the_same_cell_on_another_face_is_a_rival(small):
     assert {(3, 2, 0), (3, 2, 1)} <= where(found)
     rivals = find_rivals(lab.embossed, fit, at(3, 2, 0), 0, ALL)
     assert (3, 2, 0) not in where(rivals)
-
-
-def test_the_cell_under_the_centre(small):
-    lab = small.two_faces()
-    for x, y, cell in (
-        (3.0, 3.0, (9, 12)),
-        (-0.1, 3.0, (9, 11)),
-        (7.1, 3.0, (9, 0)),  # the array goes round
-        (3.0, -0.1, (10, 12)),
-        (3.0, -7.1, (0, 12)),
-        (3.0, 7.1, (8, 12)),
-    ):
-        fit = small.fit_of([(0, 0)], [[0.0] * 5], x_mm=x, y_mm=y)
-        assert under_centre(lab.embossed, fit, at(9, 12, 1)) == cell
 
 
 def test_one_place_is_within_half_a_pitch_and_an_eighth_turn_round_the_array(small):
