@@ -41,12 +41,9 @@ objects:
 def lab(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lab")
     (folder / "set.yaml").write_text(SET)
-    encode(
-        read_specs([folder / "set.yaml"]),
-        folder=folder / "out",
-        database=f"sqlite:///{folder / 'lab.db'}",
-        formats=("stl",),
-    )
+    for spec in read_specs([folder / "set.yaml"]):  # a set has files of its own besides
+        encode([spec], folder=folder / "out", database=f"sqlite:///{folder / 'lab.db'}",
+               formats=("stl",))  # fmt: skip
     return folder
 
 
