@@ -134,7 +134,7 @@ def _weld(
         if joined and len(joined) == len(loops):
             left.append(joined)
             kept.append(old)
-    used = np.unique([v for loops in left for loop in loops for v in loop])
+    used = np.unique(np.array([v for loops in left for loop in loops for v in loop], np.int64))
     return welded[used], [[np.searchsorted(used, loop).tolist() for loop in f] for f in left], kept
 
 

@@ -195,6 +195,13 @@ def test_points_that_are_one_are_joined():
     assert kinds(solid) == [("cylinder", True, False)]
 
 
+def test_facets_that_are_joined_to_nothing_are_no_solid():
+    found = describe_shape(BRepPrimAPI_MakeCylinder(30, 80).Shape())
+    found["points"] = [[0.0, 0.0, float(z > 40)] for _, _, z in found["points"]]
+    with pytest.raises(ShapeError, match="make no"):
+        polyhedron_of_facets(found, "file")
+
+
 def test_a_solid_that_is_round_all_over_is_refused(tmp_path):
     torus = BRepPrimAPI_MakeTorus(20, 5).Shape()
     with pytest.raises(SpecError, match="no face of the object carries symbols"):
