@@ -87,6 +87,10 @@ class RecognizeOptions(Options):
         Path | None,
         Option("Read by what was learned of the sensor.", "FILE", names=("--sensor-state",)),
     ] = None
+    as_designed: Annotated[
+        bool,
+        Option("Parts are as their files, in a simulator: no error of a print in the answer."),
+    ] = False
     sensor: Annotated[
         int | None,
         Option("Which of the probe's sensors to read at a port.", "0...7", least=0, most=7),

@@ -41,6 +41,7 @@ from recognizer.command.scanning import (
     touches_for,
 )
 from recognizer.touch.lab import open_lab
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, UNCHECKED, Recognition
 from recognizer.touch.source import TouchImage, TouchSource, source_of
@@ -85,7 +86,8 @@ def recognize_touches(options: RecognizeOptions) -> int:
             origin = RecordingOrigin(sensor=options.port)
         if source.notice:
             warning(source.notice)
-        reader = Reader(lab, source.sensor)
+        known = ReaderOptions(as_designed=options.as_designed)
+        reader = Reader(lab, source.sensor, known)
         learning = learning_for(reader, source, options.learn, options.state)
         wiring = _wiring(options.flip, learning)
         if options.recording is not None:

@@ -173,12 +173,13 @@ class Recognition:
             way_out = f"; {self.way_out}" if self.way_out else ""
             step = f"; next: {self.next}" if self.next is not None else ""
             return f"not recognised: {said}{others}{way_out}{step}"
-        alone = self.margin is None or math.isinf(self.margin)
+        margin = "no other place comes near"
+        if self.margin is not None and math.isfinite(self.margin):
+            margin = f"{self.margin / math.log(2.0):.0f} bits over the next place"
         given = "" if math.isnan(self.spread_mm) else f" +- {self.spread_mm:.2f}"
         return (
             f"{self.object}/{self.face} at ({self.x_mm:.2f}, {self.y_mm:.2f}) mm{given}"
-            f" turned {self.theta_deg:.1f} degrees; array {self.index or (0, 0)}; "
-            + ("no other place comes near" if alone else f"margin {self.margin:.0f} nats")
+            f" turned {self.theta_deg:.1f} degrees; array {self.index or (0, 0)}; {margin}"
             + (f"; part {self.part}" if self.part else "")
         )
 

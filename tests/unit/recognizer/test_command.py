@@ -174,6 +174,15 @@ def test_a_calibration_that_is_missing_or_another_one(asked, lab, calibrated_tou
     assert "made with calibration abababababab..." in err
 
 
+def test_parts_of_a_simulator_are_as_designed(asked, lab, images):
+    path = recorded(lab / "designed.h5", images[:1])
+    usual, known = (
+        json.loads(asked(path, *more, "--json")[1])[0] for more in ((), ["--as-designed"])
+    )
+    assert (usual["part"], known["part"]) == ("not measured", "as designed")
+    assert known["covariance"][0][0] < usual["covariance"][0][0]
+
+
 def test_the_object_in_the_robots_base(asked, lab, images):
     path = recorded(lab / "posed.h5", images[:1], pose=T_BASE_SENSOR)
     code, out, _ = asked(path)
