@@ -222,15 +222,6 @@ def test_a_lab_from_before_there_were_keys_goes_on_as_it_was(capsys):
     assert "no lab key" in capsys.readouterr().out
 
 
-def test_published_arrays_are_the_same_in_every_lab():
-    text = "name: T\nshape: {cube: 120 mm}\nprofile: thesis\noutput: {formats: stl}\n"
-    Path("t.yaml").write_text(text)
-    for database, key in (("a.db", KEY), ("b.db", OTHER)):
-        assert run(["t.yaml", "--database", database, "--lab-key", key, "-o", f"{database}-T"]) == 0
-        assert held(database, "T").array.lab_key == ""
-    assert files("a.db", "T") == files("b.db", "T")
-
-
 def test_another_program_may_make_the_database_meanwhile(monkeypatch):
     """What was planned on a key of our own is planned anew on the one that is there."""
 

@@ -106,8 +106,6 @@ def test_a_file_that_is_no_text_of_ours(text, message):
     [
         (".", "this is a folder, not a spec", "name the files in it, for example *.yaml"),
         ("no/x.yaml", "there is no such file", "check the folder 'no'"),
-        ("x.yaml", "there is no such file",
-         "write a first one with: encode-object init cube -o cube.yaml"),
         ("a\0b", "cannot read: embedded null byte", "check the name and the rights of the file"),
         ("/dev/zero", "cannot read: it is a device, not a file",
          "check the name and the rights of the file"),
