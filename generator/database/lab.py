@@ -160,13 +160,8 @@ def read_fullness(connection: Connection) -> Fullness:
             for k in sorted(known)
         ),
         tuple(
-            PitchUse(
-                pitch,
-                order,
-                places[pitch, order],
-                symbols_seen(pitch),
-                touches_needed(order, largest[pitch, order], pitch),
-            )
+            PitchUse(pitch, order, places[pitch, order], symbols_seen(pitch),
+                     touches_needed(order, largest[pitch, order], pitch))
             for pitch, order in sorted(places)
         ),
-    )
+    )  # fmt: skip

@@ -306,35 +306,30 @@ def _schema_version(connection: Connection) -> int | None:
     )
     if {"key", "value"} <= set(columns):
         stored = {str(key): str(value) for key, value in connection.execute(select(meta))}
+
+    def refusal(cause: str, fix: str) -> DatabaseError:
+        return DatabaseError(cause, fix=fix, place=place_of(url))
+
     if stored.get("format") != FORMAT:
-        raise DatabaseError(
-            "this database belongs to another program",
-            fix="name a database of its own for encoded objects, such as lab.db",
-            place=place_of(url),
-        )
+        fix = "name a database of its own for encoded objects, such as lab.db"
+        raise refusal("this database belongs to another program", fix)
     if url.get_backend_name() == "sqlite":
         # Statements of a stranger, which would run without end as rows are read or written.
         foreign = text("SELECT type, name FROM sqlite_master WHERE type IN ('view', 'trigger')")
         if (row := connection.execute(foreign).first()) is not None:
-            raise DatabaseError(
+            raise refusal(
                 f"it holds a {row.type} '{str(row.name)[:40]}', which this tool never makes",
-                fix=f"delete it: sqlite3 FILE 'DROP {row.type.upper()} ...'; or take a copy",
-                place=place_of(url),
+                f"delete it: sqlite3 FILE 'DROP {row.type.upper()} ...'; or take a copy",
             )
     said = stored.get("schema_version", "")
     version = int(said) if said.isascii() and said.isdecimal() else 0
     if version < 1:
-        raise DatabaseError(
-            f"'{said}' is no schema version",
-            fix="restore the database from a copy",
-            place=place_of(url),
-        )
+        raise refusal(f"'{said}' is no schema version", "restore the database from a copy")
     if version > SCHEMA_VERSION:
-        raise DatabaseError(
+        raise refusal(
             f"the database has schema version {version}, newer than {SCHEMA_VERSION}, the newest "
             "that this tool knows",
-            fix="update with: pip install --upgrade encoded-objects",
-            place=place_of(url),
+            "update with: pip install --upgrade encoded-objects",
         )
     return version
 

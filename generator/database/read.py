@@ -274,11 +274,7 @@ def read_parts(connection: Connection, object_id: int) -> tuple[RegisteredPart, 
     parts = tables.parts.c
     return tuple(
         RegisteredPart(
-            row.name,
-            row.format,
-            row.file,
-            row.sha256,
-            read_only(json.loads(row.T_object_part)),
+            row.name, row.format, row.file, row.sha256, read_only(json.loads(row.T_object_part))
         )
         for row in connection.execute(
             select(tables.parts).where(parts.object_id == object_id).order_by(parts.position)

@@ -221,11 +221,7 @@ _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
         "wait until they have ended, then run the same command again",
     ),
     (("SQLITE_NOTADB",), "this file is not a database", "name another file, or move this one away"),
-    (
-        ("SQLITE_CORRUPT",),
-        "the database file is damaged",
-        _RESTORE,
-    ),
+    (("SQLITE_CORRUPT",), "the database file is damaged", _RESTORE),
     (
         ("SQLITE_READONLY", "25006", "42501"),
         "the database may not be written",

@@ -131,13 +131,37 @@ class PrintFile:
 
     @property
     def content(self) -> bytes:
-        """The 3MF with body and symbols as components."""
-        return _components(self)
+        """The 3MF with each part as an object of one or two components."""
+        pieces: list[str | DeflatedText] = [_header(self.title)]
+        items, number = [], 2  # of the next object; 1 are the materials
+        for part in self.parts:
+            references = ""
+            for mesh in part.meshes:
+                pieces += mesh_object(number, mesh, f'pid="1" pindex="{mesh.material}"')
+                references += f'<component objectid="{number}"/>'
+                number += 1
+            pieces.append(
+                f'<object id="{number}" type="model" name={quoteattr(part.name)}>'
+                f"<components>{references}</components></object>\n"
+            )
+            items.append(number)
+            number += 1
+        return _package(_model(pieces, items))
 
     @property
     def prusaslicer(self) -> bytes:
-        """The 3MF with body and symbols as volumes."""
-        return _volumes(self)
+        """The 3MF with each part as one mesh of one or two volumes, and PrusaSlicer's files."""
+        pieces: list[str | DeflatedText] = [_header(self.title)]
+        for number, part in enumerate(self.parts, 2):
+            body, *symbols = part.meshes
+            head = _mesh_head(number, part.name, f'pid="1" pindex="{len(symbols)}"')
+            points = [mesh.vertices for mesh in (*symbols, body)]
+            faces = [part.body_after or body.triangles, *(mesh.triangles for mesh in symbols)]
+            pieces += [head, *points, _TO_TRIANGLES, *faces, _TO_END]
+        more = {_CONFIG: _volume_settings(self)}
+        if self.settings is not None:
+            more |= _prusaslicer_files(self.settings)
+        return _package(_model(pieces, range(2, len(self.parts) + 2)), more)
 
 
 def write_plates(exported: ExportedObject) -> Files:
@@ -261,40 +285,6 @@ def _part_text(part: _BedPart, place: BedPlace) -> PartText:
         ),
         after,
     )
-
-
-def _components(file: PrintFile) -> bytes:
-    """Return a plate with each part as an object of one or two components."""
-    pieces: list[str | DeflatedText] = [_header(file.title)]
-    items, number = [], 2  # of the next object; 1 are the materials
-    for part in file.parts:
-        references = []
-        for mesh in part.meshes:
-            pieces += mesh_object(number, mesh, f'pid="1" pindex="{mesh.material}"')
-            references.append(f'<component objectid="{number}"/>')
-            number += 1
-        pieces.append(
-            f'<object id="{number}" type="model" name={quoteattr(part.name)}>'
-            f"<components>{''.join(references)}</components></object>\n"
-        )
-        items.append(number)
-        number += 1
-    return _package(_model(pieces, items))
-
-
-def _volumes(file: PrintFile) -> bytes:
-    """Return a plate with each part as one mesh of one or two volumes, and PrusaSlicer's files."""
-    pieces: list[str | DeflatedText] = [_header(file.title)]
-    for number, part in enumerate(file.parts, 2):
-        body, *symbols = part.meshes
-        head = _mesh_head(number, part.name, f'pid="1" pindex="{len(symbols)}"')
-        points = [mesh.vertices for mesh in (*symbols, body)]
-        faces = [part.body_after or body.triangles, *(mesh.triangles for mesh in symbols)]
-        pieces += [head, *points, _TO_TRIANGLES, *faces, _TO_END]
-    more = {_CONFIG: _volume_settings(file)}
-    if file.settings is not None:
-        more |= _prusaslicer_files(file.settings)
-    return _package(_model(pieces, range(2, len(file.parts) + 2)), more)
 
 
 def mesh_object(number: int, mesh: MeshText, properties: str = "") -> list[str | DeflatedText]:

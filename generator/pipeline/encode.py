@@ -12,6 +12,7 @@ import json
 import time
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import replace as replace_fields
 from pathlib import Path
 
 from sqlalchemy import Connection, Engine
@@ -193,11 +194,8 @@ def _dry_run(
         step(f"building {plan.spec.name}", 0.5)
         parts, warnings = parts_of(plan, placed.layout)
         faces = face_reports(plan, placed.layout, smallest=True)
-        made.append(
-            describe_object(
-                plan, placed.layout, len(parts), warnings, (), faces, reused=placed.reused
-            )
-        )
+        one = describe_object(plan, placed.layout, len(parts), warnings, faces)
+        made.append(replace_fields(one, reused=placed.reused))
         used = placed.taken + made[-1].symbols
     return made, used
 

@@ -10,8 +10,6 @@ their meshes and `NAME.usdc` for robots; the picture `NAME.png`, the build sheet
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +23,8 @@ from generator.export.formats import EXPORTERS, ExportedObject, stage_formats
 from generator.export.preview import preview_png
 from generator.export.threemf import SlicerSettings
 from generator.layout.placement import Layout, object_code
-from generator.pipeline.faces import FaceReport, face_reports, whole_rate
-from generator.pipeline.made import overhangs, stance_of
+from generator.pipeline.faces import face_reports
+from generator.pipeline.made import MadeObject, describe_object, overhangs, stance_of
 from generator.pipeline.place import BuiltParts
 from generator.pipeline.plan import TAG_BACK, ObjectPlan
 from generator.pipeline.progress import Progress
@@ -37,20 +35,6 @@ from generator.solid import Mesh, Part, emboss_whole, panels, prove_closed, tria
 from generator.solid.marks import NameMark
 from generator.solid.panels import with_name
 from generator.spec.problem import error_location
-
-if TYPE_CHECKING:
-    from generator.export.check import FitReport
-
-
-@dataclass(frozen=True, slots=True)
-class StagedObject:
-    """All files of one object, written but not yet under their final names."""
-
-    registered: tuple[RegisteredPart, ...]
-    parts: int
-    warnings: tuple[str, ...]
-    faces: tuple[FaceReport, ...]
-    fit: FitReport | None = None  #: of panels that were verified as STL
 
 
 def stage(
@@ -63,9 +47,10 @@ def stage(
     verify: bool,
     slice_plates: bool = False,
     progress: Progress,
-) -> StagedObject:
+) -> tuple[MadeObject, tuple[RegisteredPart, ...]]:
     """Write all files of an object into the staging folder: `formats` of `EXPORTERS`, and pictures.
 
+    Return the object as it will be made, still without files, and what is registered of its parts.
     Without formats nothing is written.
 
     Parameters
@@ -136,32 +121,31 @@ def stage(
             warnings += (f"plate {', '.join(large)}: larger than {bed}; take a larger printer",)
     if any(EXPORTERS[name].robot for name in formats):
         warnings += exported.robot.warnings
-    faces = face_reports(plan, layout)
+    made = describe_object(plan, layout, len(parts), warnings, face_reports(plan, layout), fit=fit)
     if formats:
         progress("drawing", 0.85)
-        _draw(plan, layout, parts, meshes, faces, on_sheet, staging)
-    return StagedObject(registered, len(parts), warnings, faces, fit)
+        _draw(plan, made, parts, meshes, on_sheet, staging)
+    return made, registered
 
 
 def _draw(
-    plan: ObjectPlan, layout: Layout, parts: Sequence[Part], meshes: Sequence[Mesh],
-    faces: Sequence[FaceReport], plates: Sequence[SheetPlate], staging: Staging,
+    plan: ObjectPlan, made: MadeObject, parts: Sequence[Part], meshes: Sequence[Mesh],
+    plates: Sequence[SheetPlate], staging: Staging,
 ) -> None:  # fmt: skip
     """Write the picture, the build sheet and the faces on the array."""
-    name = plan.spec.name
+    name, layout = plan.spec.name, made.layout
     size = outer_size_mm(plan.polyhedron, parts).tolist()
-    promise = whole_rate(plan, layout, faces)
     shares: dict[str, tuple[float, float | None]] = {}
-    if promise is not None:  # faces of which nothing is said are blank
+    if made.promise is not None:  # faces of which nothing is said are blank
         shares = dict.fromkeys([face.name for face in plan.polyhedron.faces], (0.0, None))
     shares |= {
         face.name: (face.promise.at_once, face.promise.within_three)
-        for face in faces
+        for face in made.face_reports
         if face.promise is not None
     }
     picture = preview_png(name, size, parts, meshes, shares)
     staging.write(f"{name}.png", picture)
-    page = build_sheet(plan, layout, parts, plates, picture, promise)
+    page = build_sheet(plan, layout, parts, plates, picture, made.promise)
     staging.write(f"{name}-build.html", page.encode())
     staging.write(f"{name}-array.svg", _array_picture(plan, layout).encode())
 
@@ -174,7 +158,7 @@ def settings_of(plan: ObjectPlan, layout: Layout) -> SlicerSettings | None:
         return None
     return SlicerSettings(
         plan.printer,
-        supports=overhangs(plan, layout).supports,
+        supports=bool(overhangs(plan, layout).faces),
         colour_change_mm=spec.wall_mm if panelled and spec.colours > 1 else 0.0,
         symbols_apart=panelled or spec.colours > 1,  # of one body they share all layers with it
     )

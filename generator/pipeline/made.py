@@ -30,10 +30,10 @@ class MadeObject:
     symbols: int
     places: int  #: how many places of it can be distinguished by touch
     parts: int
-    files: tuple[Path, ...]
     warnings: tuple[str, ...]
-    reused: bool  #: registered before, so the same cells again
     layout: Layout = field(repr=False, compare=False)  #: its symbols
+    files: tuple[Path, ...] = ()
+    reused: bool = False  #: registered before, so the same cells again
     skipped: bool = False  #: registered before, and all its files stand unchanged
     touches: int = 1  #: about so many that overlap name a place; 1: no scan is needed
     face_reports: tuple[FaceReport, ...] = ()  #: of what was made or would be, face by face
@@ -99,24 +99,18 @@ def describe_object(
     layout: Layout,
     parts: int,
     warnings: tuple[str, ...],
-    files: tuple[Path, ...],
     faces: tuple[FaceReport, ...] = (),
     *,
-    reused: bool,
-    skipped: bool = False,
     fit: FitReport | None = None,
 ) -> MadeObject:
-    """Return an object as it was made; a round face counts as one."""
+    """Return an object as it is made, without its files; a round face counts as one."""
     return MadeObject(
         name=plan.spec.name,
         faces=len({face.name.partition(".")[0] for face in plan.polyhedron.faces}),
         symbols=sum(len(face.labels) for face in layout.faces),
         places=sum(face.places for face in layout.faces),
         parts=parts,
-        files=files,
         warnings=(*plan.polyhedron.notes, *plan.notes, *layout.warnings, *warnings),
-        reused=reused,
-        skipped=skipped,
         fit=fit,
         lying=overhangs(plan, layout).text if plan.spec.parts == "whole" else None,
         touches=touches_needed(
@@ -146,12 +140,7 @@ class Overhangs:
     """How parts lie, and what hangs over: sheets, advice and slicer projects take it from here."""
 
     text: str
-    faces: tuple[str, ...] = ()  #: that hang over
-
-    @property
-    def supports(self) -> bool:
-        """Whether a slicer must make supports."""
-        return bool(self.faces)
+    faces: tuple[str, ...] = ()  #: that hang over: a slicer must make supports under them
 
 
 def overhangs(plan: ObjectPlan, layout: Layout) -> Overhangs:

@@ -22,8 +22,8 @@ from generator.database.registered import RegisteredPart
 from generator.database.transaction import WriteConflictError, write_transaction
 from generator.export.atomic import Staging
 from generator.layout.placement import Layout
-from generator.pipeline.files import StagedObject, parts_of, stage
-from generator.pipeline.made import MadeObject, describe_object
+from generator.pipeline.files import parts_of, stage
+from generator.pipeline.made import MadeObject
 from generator.pipeline.place import PlacedObject, occupancy_of, place_object
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
@@ -63,10 +63,10 @@ def make_under_lock(
                 placed = dry_build
             else:
                 placed = place_object(connection, plan, job.replace)
-            staged = _stage(job, placed, staging, part_of_progress(progress, 0.1, 0.9))
+            made, parts = _stage(job, placed, staging, part_of_progress(progress, 0.1, 0.9))
             progress(f"registering {name}", 0.9)
-            _register(connection, job, placed, staged, staging)
-        return _commit(job, placed, staged, staging)
+            _register(connection, job, placed, parts, staging)
+        return _commit(made, placed, staging)
 
 
 def make_at(
@@ -75,20 +75,20 @@ def make_at(
     """Make one object at a place chosen before, or under the lock if another writer took it."""
     try:
         with Staging(job.folder) as staging:
-            staged = _stage(job, placed, staging, part_of_progress(progress, 0.0, 0.9))
+            made, parts = _stage(job, placed, staging, part_of_progress(progress, 0.0, 0.9))
             with write_transaction(engine) as connection:
                 known = find_object(connection, job.plan.spec.name)
                 if (known is not None) != (placed.reused or placed.replaces):
                     raise WriteConflictError("an object of this name came or went meanwhile")
-                _register(connection, job, placed, staged, staging)
-            return _commit(job, placed, staged, staging)
+                _register(connection, job, placed, parts, staging)
+            return _commit(made, placed, staging)
     except WriteConflictError:
         return make_under_lock(engine, job, progress)
 
 
 def _stage(
     job: MakeJob, placed: PlacedObject, staging: Staging, progress: Progress
-) -> StagedObject:
+) -> tuple[MadeObject, tuple[RegisteredPart, ...]]:
     progress("building the parts", 0.0)
     return stage(
         job.plan, placed.layout, placed.built or parts_of(job.plan, placed.layout), job.formats,
@@ -106,16 +106,14 @@ def has_files_in(connection: Connection, name: str, folder: Path) -> bool:
 
 
 def _register(
-    connection: Connection, job: MakeJob, placed: PlacedObject, staged: StagedObject,
-    staging: Staging,
+    connection: Connection, job: MakeJob, placed: PlacedObject,
+    parts: tuple[RegisteredPart, ...], staging: Staging,
 ) -> None:  # fmt: skip
     plan, url = job.plan, connection.engine.url
     if not (job.replace or has_files_in(connection, plan.spec.name, job.folder)):
         staging.refuse_others()
-    parts = tuple(
-        dataclasses.replace(part, file=part_file(url, part.file)) for part in staged.registered
-    )
-    record = object_record(plan, placed.layout, parts)
+    named = tuple(dataclasses.replace(part, file=part_file(url, part.file)) for part in parts)
+    record = object_record(plan, placed.layout, named)
     register(connection, record, replace=placed.replaces)
 
 
@@ -138,11 +136,6 @@ def object_record(
     )
 
 
-def _commit(
-    job: MakeJob, placed: PlacedObject, staged: StagedObject, staging: Staging
-) -> MadeObject:
+def _commit(made: MadeObject, placed: PlacedObject, staging: Staging) -> MadeObject:
     written = tuple(file.path for file in staging.commit())
-    return describe_object(
-        job.plan, placed.layout, staged.parts, staged.warnings, written, staged.faces,
-        reused=placed.reused, fit=staged.fit,
-    )  # fmt: skip
+    return dataclasses.replace(made, files=written, reused=placed.reused)

@@ -139,4 +139,5 @@ def _intact_object(connection: Connection, job: MakeJob) -> MadeObject | None:
         return None
     files = (*(state.path for state in states), *others)
     layout = read_layout(connection, plan.spec.name)
-    return describe_object(plan, layout, len(parts), (), files, reused=True, skipped=True)
+    made = describe_object(plan, layout, len(parts), ())
+    return replace(made, files=files, reused=True, skipped=True)

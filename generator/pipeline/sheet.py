@@ -154,7 +154,7 @@ def _facts(
     volume_mm3 = sum(map(volume, parts))
     cost, source = cost_text([plate.cost for plate in plates]) if plates else "", "PrusaSlicer"
     usual = (printer.nozzle_mm, printer.layer_mm) == (0.4, 0.2)
-    if not cost and usual and not lying.supports:
+    if not cost and usual and not lying.faces:
         minutes, grams = USUAL_PRINT @ [_body_mm2(parts) / 100, volume_mm3 / 1000]
         cost, source = (
             f"about {_hours(minutes)}, {grams:.0f} g",

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
@@ -109,11 +110,17 @@ def resolve(
         shape = _shape(settings.shape, tree, refuse)
     mount = _mount(settings.mount, refuse)
     sensor = _sensor(settings, tree, problems)
-    named = _alphabet(settings, tree, problems)
+    named = None
+    if settings.symbols.alphabet is not None:
+        with _collected(problems):
+            named = _described_alphabet(settings.symbols.alphabet, tree)
     profile = _array_profile(settings, sensor, named)
     encoding, order = _array(settings, profile, refuse)
     defaults = _defaults(settings, profile, order, sensor)
-    printer = _printer(settings, defaults, tree, problems)
+    printer = printer_named(defaults.printer)
+    if settings.print.printer is not None:
+        with _collected(problems):
+            printer = _described_printer(settings.print.printer, tree)
     alphabet = named or ALPHABETS[defaults.alphabet]
     style = _style(settings, defaults, alphabet, printer)
     if order is not None and alphabet.order < order:
@@ -148,6 +155,7 @@ def resolve(
         shape = replace(shape, parameters={**shape.parameters, "thickness": thickness})
     if problems or shape is None:
         raise SpecError(problems)
+    usual_formats = (*FORMATS, "bambu") if printer.model else FORMATS
     spec = ObjectSpec(
         name=settings.name,
         shape=shape,
@@ -164,7 +172,7 @@ def resolve(
         down=settings.print.down or "",
         blank=tuple(settings.print.blank or ()),
         colours=settings.print.colours,
-        formats=tuple(dict.fromkeys(settings.output.formats or _usual_formats(printer))),
+        formats=tuple(dict.fromkeys(settings.output.formats or usual_formats)),
         folder=Path(settings.output.folder or f"out/{folder_name(settings.name)}"),
         database=settings.output.database or DATABASE,
         lab_key=settings.output.lab_key or "",
@@ -176,10 +184,6 @@ def resolve(
     if settings.copies == 1:
         return (spec,)
     return tuple(replace(spec, name=f"{spec.name}-{k + 1}") for k in range(settings.copies))
-
-
-def _usual_formats(printer: Printer) -> tuple[str, ...]:
-    return (*FORMATS, "bambu") if printer.model else FORMATS
 
 
 def folder_name(name: str) -> str:
@@ -221,26 +225,13 @@ def _sensor(settings: NamedSettings, tree: Tree, problems: list[Problem]) -> Sen
         return USUAL_SENSOR
 
 
-def _printer(
-    settings: NamedSettings, defaults: SymbolDefaults, tree: Tree, problems: list[Problem]
-) -> Printer:
-    """Return the printer; add problems of its file."""
-    if settings.print.printer is not None:
-        try:
-            return _described_printer(settings.print.printer, tree)
-        except SpecError as error:
-            problems += error.problems
-    return printer_named(defaults.printer)
-
-
-def _alphabet(settings: NamedSettings, tree: Tree, problems: list[Problem]) -> Alphabet | None:
-    """Return the alphabet that a spec gives, if any; add problems of its glyphs and its file."""
-    if settings.symbols.alphabet is not None:
-        try:
-            return _described_alphabet(settings.symbols.alphabet, tree)
-        except SpecError as error:
-            problems += error.problems
-    return None
+@contextmanager
+def _collected(problems: list[Problem]) -> Iterator[None]:
+    """Add the problems of a block, so that those of others are found as well."""
+    try:
+        yield
+    except SpecError as error:
+        problems += error.problems
 
 
 def _described_alphabet(given: AlphabetSettings, tree: Tree) -> Alphabet:

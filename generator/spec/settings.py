@@ -10,6 +10,7 @@ windows) is checked where the array is made; the keys are those of `generator.ar
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
@@ -102,21 +103,17 @@ def down_name(value: Any) -> str:
 def flange_name(value: Any) -> str:
     """Return the designation of a flange; the standard's number may be left out."""
     name = re.sub(r"^iso[ -]?9409-1-", "", str(value).strip(), flags=re.IGNORECASE).upper()
-    found = f"ISO 9409-1-{name}"
-    if found not in FLANGES:
-        raise refuse(
-            f"'{value!s:.40}' is no flange known here", f"choose one of {', '.join(FLANGES)}"
-        )
-    return found
+    return _one_of(FLANGES, f"ISO 9409-1-{name}", f"'{value!s:.40}' is no flange known here")
 
 
 def thread_name(value: Any) -> str:
     """Return the name of a metric thread."""
-    name = str(value).strip().upper()
-    if name not in SCREWS:
-        raise refuse(
-            f"'{value!s:.40}' is no screw known here", f"choose one of {', '.join(SCREWS)}"
-        )
+    return _one_of(SCREWS, str(value).strip().upper(), f"'{value!s:.40}' is no screw known here")
+
+
+def _one_of(known: Iterable[str], name: str, cause: str) -> str:
+    if name not in known:
+        raise refuse(cause, f"choose one of {', '.join(known)}")
     return name
 
 

@@ -91,10 +91,7 @@ def robot_model(
 
     Parts never overlap, so their meshes side by side are their union.
     """
-    vertices, triangles = join_meshes(
-        (transform(part.T_object_part, mesh.vertices), mesh.triangles)
-        for part, mesh in zip(parts, meshes, strict=True)
-    )
+    vertices, triangles = _in_object_frame(zip(parts, meshes, strict=True))
     inertia = inertia_of(vertices[triangles])
     pieces, warnings = _pieces(name, polyhedron, vertices)
     return RobotModel(
@@ -113,15 +110,21 @@ def robot_model(
 
 def _visuals(name: str, parts: Sequence[Part]) -> Iterator[ModelMesh]:
     """Yield the bodies of all parts in one mesh, and their symbols in another."""
-    bodies, symbols = [], []
-    for part in parts:
-        T = part.T_object_part
-        own = body_mesh(part)
-        bodies.append((transform(T, own.vertices), own.triangles))
-        symbols += [(transform(T, mesh.vertices), mesh.triangles) for mesh in symbol_meshes(part)]
-    yield _joined(f"{name}-visual-body", bodies, BODY_RGB)
-    if symbols:
-        yield _joined(f"{name}-visual-symbols", symbols, SYMBOL_RGB)
+    bodies = [(part, body_mesh(part)) for part in parts]
+    symbols = [(part, mesh) for part in parts for mesh in symbol_meshes(part)]
+    for what, colour, meshes in (("body", BODY_RGB, bodies), ("symbols", SYMBOL_RGB, symbols)):
+        if meshes:
+            vertices, triangles = _in_object_frame(meshes)
+            yield ModelMesh(f"{name}-visual-{what}", M * vertices, triangles, colour)
+
+
+def _in_object_frame(
+    meshes: Iterable[tuple[Part, Mesh]],
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Return meshes of parts as one, mm."""
+    return join_meshes(
+        (transform(part.T_object_part, mesh.vertices), mesh.triangles) for part, mesh in meshes
+    )
 
 
 def _pieces(
@@ -156,13 +159,6 @@ def _frames(name: str, polyhedron: Polyhedron) -> Iterator[FaceFrame]:
             yield FaceFrame(face, f"{name}-{face}", T)
 
 
-def _joined(
-    name: str, pieces: Sequence[tuple[Floats, NDArray[np.int64]]], colour: RGB
-) -> ModelMesh:
-    vertices, triangles = join_meshes(pieces)
-    return ModelMesh(name, M * vertices, triangles, colour)
-
-
 def mesh_files(meshes: Iterable[ModelMesh]) -> Iterator[tuple[str, Iterator[bytes]]]:
     """Yield name and content of the files of meshes, Wavefront OBJ."""
     for mesh in meshes:
@@ -193,24 +189,17 @@ def rgba(colour: RGB) -> str:
 
 def quaternion(R: Floats) -> Floats:
     """Return (w, x, y, z) of a rotation (3, 3), w not below 0; by the largest of the four."""
-    square = np.array(
-        [
-            1 + R[0, 0] + R[1, 1] + R[2, 2],
-            1 + R[0, 0] - R[1, 1] - R[2, 2],
-            1 - R[0, 0] + R[1, 1] - R[2, 2],
-            1 - R[0, 0] - R[1, 1] + R[2, 2],
-        ]
-    )
-    largest = int(np.argmax(square))
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R
     products = np.array(
         [
-            [square[0], R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
-            [R[2, 1] - R[1, 2], square[1], R[1, 0] + R[0, 1], R[0, 2] + R[2, 0]],
-            [R[0, 2] - R[2, 0], R[1, 0] + R[0, 1], square[2], R[2, 1] + R[1, 2]],
-            [R[1, 0] - R[0, 1], R[0, 2] + R[2, 0], R[2, 1] + R[1, 2], square[3]],
+            [1 + xx + yy + zz, zy - yz, xz - zx, yx - xy],
+            [zy - yz, 1 + xx - yy - zz, yx + xy, xz + zx],
+            [xz - zx, yx + xy, 1 - xx + yy - zz, zy + yz],
+            [yx - xy, xz + zx, zy + yz, 1 - xx - yy + zz],
         ]
     )
-    found: Floats = products[largest] / np.linalg.norm(products[largest])
+    found: Floats = products[np.argmax(products.diagonal())]
+    found = found / np.linalg.norm(found)
     return -found if found[0] < 0 else found
 
 

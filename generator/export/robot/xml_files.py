@@ -81,8 +81,11 @@ def mjcf_bytes(model: RobotModel) -> bytes:
         off = {"contype": "0", "conaffinity": "0"}
         SubElement(body, "geom", {**which, "type": "sdf", **off})
     for frame in model.frames:
-        site = {"name": frame.name, **_place(frame.T_object_face), "size": "0.001", "group": "4"}
-        SubElement(body, "site", site)
+        T = frame.T_object_face
+        SubElement(
+            body, "site", name=frame.name, pos=numbers(T[:3, 3]),
+            quat=numbers(quaternion(T[:3, :3])), size="0.001", group="4",
+        )  # fmt: skip
     return _document(root)
 
 
@@ -183,7 +186,9 @@ def urdf_bytes(model: RobotModel) -> bytes:
         joint = SubElement(root, "joint", name=f"{frame.name}-joint", type="fixed")
         SubElement(joint, "parent", link=model.name)
         SubElement(joint, "child", link=frame.name)
-        SubElement(joint, "origin", _origin(frame.T_object_face))
+        T = frame.T_object_face
+        turn = numbers(roll_pitch_yaw(T[:3, :3]))
+        SubElement(joint, "origin", xyz=numbers(T[:3, 3]), rpy=turn)
     return _document(root)
 
 
@@ -196,14 +201,6 @@ def read_urdf(model: RobotModel, path: Path) -> ReadModel:
     inertial = read.link_map[model.name].inertial
     frames = {frame.face: read.get_transform(frame.name, model.name) for frame in model.frames}
     return ReadModel(inertial.mass, inertial.origin[:3, 3], inertial.inertia, frames)
-
-
-def _place(T: Floats) -> dict[str, str]:
-    return {"pos": numbers(T[:3, 3]), "quat": numbers(quaternion(T[:3, :3]))}
-
-
-def _origin(T: Floats) -> dict[str, str]:
-    return {"xyz": numbers(T[:3, 3]), "rpy": numbers(roll_pitch_yaw(T[:3, :3]))}
 
 
 def _moments(model: RobotModel) -> dict[str, str]:

@@ -12,7 +12,7 @@ mm, angles in rad.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from itertools import groupby, pairwise
 from operator import itemgetter
 from typing import Any
@@ -75,16 +75,8 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
             f"symbols to {CHORD_ERROR_MM * coarser:g} mm: finer, they have {counts[-2]} "
             "facets"
         )
-    return {
-        "points": [list(map(float, point)) for point in found.points],
-        "faces": found.faces,
-        "names": found.names,
-        "surfaces": found.surfaces,
-        "blank": found.blank,
-        "kinds": found.kinds,
-        "notes": notes,
-        "error_mm": BLANK_ERROR_MM * coarser,
-    }
+    found.points = [list(map(float, point)) for point in found.points]
+    return asdict(found) | {"notes": notes, "error_mm": BLANK_ERROR_MM * coarser}
 
 
 def _tessellate(solid: Any, faces: list[Any], kinds: list[str], coarser: float) -> _Found:
@@ -234,15 +226,12 @@ class _Nodes:
             self.dropped.add(key)
         numbers = self.on_edge.get(key)
         if numbers is None:
-            ends = [
-                self._vertex(TopExp.FirstVertex_s(edge)),
-                self._vertex(TopExp.LastVertex_s(edge)),
-            ]
+            start = self._vertex(TopExp.FirstVertex_s(edge))
+            end = self._vertex(TopExp.LastVertex_s(edge))
             if BRep_Tool.Degenerated_s(edge):
-                numbers = [ends[0]] * len(nodes)
+                numbers = [start] * len(nodes)
             else:
-                inner = [self._new(node) for node in nodes[1:-1]]
-                numbers = [ends[0], *inner, ends[1]]
+                numbers = [start, *(self._new(node) for node in nodes[1:-1]), end]
             self.on_edge[key] = numbers
         self.of_face |= dict(zip(nodes, numbers, strict=True))
         return numbers[::-1] if edge.Orientation() == TopAbs_REVERSED else numbers
@@ -252,13 +241,13 @@ class _Nodes:
 
         key = self.vertices.Add(vertex)
         if key not in self.at_vertex:
-            point = BRep_Tool.Pnt_s(vertex)
-            self.found.points.append((point.X(), point.Y(), point.Z()))
-            self.at_vertex[key] = len(self.found.points) - 1
+            self.at_vertex[key] = self._add(BRep_Tool.Pnt_s(vertex))
         return self.at_vertex[key]
 
     def _new(self, node: int) -> int:
-        point = self.mesh.Node(node).Transformed(self.location.Transformation())
+        return self._add(self.mesh.Node(node).Transformed(self.location.Transformation()))
+
+    def _add(self, point: Any) -> int:
         self.found.points.append((point.X(), point.Y(), point.Z()))
         return len(self.found.points) - 1
 

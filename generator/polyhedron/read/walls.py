@@ -139,19 +139,12 @@ def _parts(vertices: Floats, strip: _Strip, off: float) -> Iterator[tuple[_Strip
             yield strip, whole
         return
     if strip.closed:  # begin where a run begins, and end where it comes back to
-        more = FEWEST + 1
-        strip = _Strip(
-            strip.facets + strip.facets[:more],
-            strip.low + strip.low[1 : more + 1],
-            strip.high + strip.high[1 : more + 1],
-        )
+        strip = _Strip(strip.facets * 2, strip.low[:-1] * 2, strip.high[:-1] * 2)
         works = [fit(k, k + FEWEST) is not None for k in range(count)]
         k = next((k for k in range(count) if works[k] and not works[k - 1]), -1)
         if k < 0:
             return
-        facets, low, high = (each[:count] for each in (strip.facets, strip.low, strip.high))
-        low, high = low[k:] + low[:k], high[k:] + high[:k]
-        strip = _Strip(facets[k:] + facets[:k], [*low, low[0]], [*high, high[0]])
+        strip = strip.part(k, k + count)
     first = 0
     while first + FEWEST <= count:
         last, step = first + FEWEST - 1, 1

@@ -16,7 +16,6 @@ from generator.alphabet import (
     alphabet_named,
     check_printable,
     counts,
-    outline,
     outlines,
 )
 from generator.alphabet.figures import FIGURES, figures_of, in_figures
@@ -129,32 +128,6 @@ FDM = PRINTERS["fdm-0.4"]
 DENSE = alphabet_named("dense-4")
 
 
-def test_a_stroke_is_an_octagon_drawn_along():
-    tiers = outline(
-        Glyph("-", line((-1, 0), (1, 0))), 2.0, SymbolStyle(stroke_mm=1.0, draft_rad=0.0)
-    )
-    (ring,) = tiers.rings[-1]
-    octagon = 2 * (math.sqrt(2) - 1)  # of inradius 1/2: area 8 r^2 tan(22.5 degrees)
-    assert len(ring) == 8
-    assert signed_area(ring) == pytest.approx(octagon + 4.0, rel=1e-14)
-    assert np.ptp(ring, axis=0) == pytest.approx([5.0, 1.0], rel=1e-14)
-
-
-def test_top_keeps_the_stroke_and_draft_widens_the_foot():
-    style = SymbolStyle(draft_rad=math.radians(10))
-    glyph = DENSE.glyphs[0]
-    tiers = outline(glyph, 1.82, style)
-    (foot,), (top,) = tiers.rings
-    draft = math.tan(math.radians(10))
-    assert np.ptp(top, axis=0) == pytest.approx([2 * 1.82 + 1.4] * 2, rel=1e-14)
-    assert np.ptp(foot, axis=0) == pytest.approx([2 * 1.82 + 1.4 + 2 * draft] * 2, rel=1e-14)
-    chamfered = outline(glyph, 1.82, replace(style, chamfer_mm=0.1))
-    assert np.ptp(chamfered.rings[-1][0], axis=0) == pytest.approx(
-        [2 * 1.82 + 1.4 + 2 * 0.1 * draft - 0.2] * 2, rel=1e-14
-    )
-    assert chamfered.rings[0][0] == pytest.approx(foot, rel=1e-14)
-
-
 @pytest.mark.parametrize(
     ("style", "words"),
     [
@@ -191,15 +164,6 @@ def test_gaps_are_measured_on_the_outline():
     assert gap_inside_mm(outlines(DENSE, SymbolStyle())[0]) == math.inf
     foot = 2 * 0.26 * 7 + 1.4 + 2 * math.tan(math.radians(10))
     assert gap_between_mm(DENSE, SymbolStyle()) == pytest.approx(7 - foot, rel=1e-12)
-
-
-def test_engraved_walls_stand_at_45_degrees():
-    tiers = engrave(Glyph("8", line((-1, 0), (1, 0))), 0.8, 0.8, 0.32)
-    (surface,), (floor,) = tiers.rings
-    assert tiers.z_mm == (0.0, -0.32)
-    assert np.ptp(surface, axis=0) - np.ptp(floor, axis=0) == pytest.approx([0.64] * 2)
-    with pytest.raises(AlphabetError, match="collapses"):
-        engrave(Glyph("8", line((-1, 0), (1, 0))), 0.8, 0.8, 0.4)
 
 
 def test_rings_tell_crossings_and_points_inside():

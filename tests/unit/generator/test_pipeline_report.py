@@ -17,17 +17,12 @@ from bench_page import CHROMIUM, FLAGS
 from generator.command import run
 from generator.command.made_report import next_step, rate_lines
 from generator.errors import PrintError
-from generator.export.drawing import Assembly, draw_steps
 from generator.layout.recognition_rate import LOW
 from generator.pipeline import encode
 from generator.pipeline.faces import face_reports, whole_rate
 from generator.pipeline.files import outer_size_mm, parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
-from generator.pipeline.sheet import _checks
-from generator.polyhedron import SHAPES
-from generator.polyhedron.assembly import assembly_order, distinct_faces
-from generator.polyhedron.frame import face_area, face_frame
 from generator.printed.slicer import PlateCost, read_cost
 from generator.spec.read import read_specs, tree_from
 
@@ -175,30 +170,6 @@ def test_another_sensor_has_the_rates_it_would_have_had_when_made(made, tmp_path
     assert shown(folder, "Bar", capsys, "--sensor-type", "gel-24x32") == {}
 
 
-@pytest.mark.parametrize("kind", ["cube", "dodecahedron", "tetrahedron"])
-def test_every_panel_meets_one_that_is_there(kind):
-    solid = SHAPES[kind](60.0)
-    steps = assembly_order(solid)
-    assert sorted(step.face for step in steps) == list(range(len(solid.faces)))
-    there = {steps[0].face}
-    for step in steps[1:]:
-        for number in step.edges:
-            edge = solid.edges[number]
-            assert {edge.left, edge.right} - {step.face} <= there
-        assert step.edges
-        there.add(step.face)
-    assert sum(len(step.edges) for step in steps) == len(solid.edges)
-
-
-def test_the_largest_face_lies_down_and_three_directions_are_touched():
-    solid = SHAPES["box"]((80.0, 60.0, 20.0))
-    assert face_area(solid, assembly_order(solid)[0].face) == pytest.approx(4800.0)
-    chosen = distinct_faces(solid, list(range(6)))
-    normals = np.array([face_frame(solid, face)[:3, 2] for face in chosen])
-    assert np.abs(normals @ normals.T).sum() == pytest.approx(3.0)  # a corner of the box
-    assert distinct_faces(solid, [2]) == (2,)
-
-
 def test_what_a_slicer_reckons():
     text = "; total filament used [g] = 22.41\n"
     text += "; estimated printing time (normal mode) = 1d 2h 36m 45s\n"
@@ -254,30 +225,6 @@ def test_a_cube_takes_two_pages_of_paper_and_a_can_one(tmp_path):
         assert re.search(r"<th>to buy</th><td>PLA, \d+ cm3 in all", text)
         assert re.search(r"<th>printing</th><td>about \d h \d+ min, \d+ g \(estimated", text)
     assert pages == {"Cube": 2, "Can": 1}
-
-
-def test_glue_steps_are_seen_from_one_side_and_name_what_can_be_seen():
-    solid = SHAPES["cube"](60.0)
-    order = assembly_order(solid)
-    polygons = [[solid.vertices[list(loop)] for loop in face.loops] for face in solid.faces]
-    names = [face.name for face in solid.faces]
-    steps = draw_steps(Assembly(names, polygons, [step.face for step in order], [[]] * 6))
-    drawn = [ET.fromstring(step) for step in steps]
-    assert len({step.get("viewBox") for step in drawn}) == 1
-    named = [{text.text for text in step if text.tag.endswith("text")} for step in drawn]
-    glued = [names[step.face] for step in order]
-    for number, seen in enumerate(named):
-        assert glued[number] in seen <= set(glued[: number + 1])
-    assert len(named[-1]) == 3  # of six: a cube shows three
-
-
-def test_touches_that_check_a_part_are_on_its_faces(tmp_path):
-    """The middle of an L lies beside it."""
-    wide = re.sub(r"\b12\b", "20", BRACKET)
-    checks = _checks(*laid_out(tmp_path, wide))
-    assert len(checks) == 3
-    assert {"F1", "F2"}.isdisjoint(touch.split()[0] for _, touch, _ in checks)
-    assert all(answer.startswith(f"A/{touch.split()[0]} at about") for _, touch, answer in checks)
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -56,11 +54,6 @@ def digests(folder: Path) -> dict[str, str]:
     }
 
 
-def rows(folder: Path) -> list[dict[str, str]]:
-    text = (folder / "out" / "lab-set-packing.csv").read_text()
-    return list(csv.DictReader(io.StringIO(text)))
-
-
 @pytest.fixture(scope="module")
 def once(tmp_path_factory: pytest.TempPathFactory):
     """A set that was made here, with its database."""
@@ -104,19 +97,6 @@ def test_a_changed_spec_in_a_set_is_refused_and_the_rest_stays(there):
     assert digests(there / "out") == before
     replaced = run(there, changed, jobs=1, replace=True)
     assert [made.reused for made in replaced.objects] == [False, True, True]
-
-
-def test_every_part_is_listed_on_a_plate_of_its_printer(once):
-    folder, result = once
-    listed = rows(folder)
-    assert len(listed) == sum(made.parts for made in result.objects) == 16
-    assert [row["part"] for row in listed[:6]] == [f"A-F{k}" for k in range(1, 7)]
-    assert {row["printer"] for row in listed if row["object"] == "C"} == {"fdm-0.25"}
-    names = {"lab-set-packing.csv", "lab-set-build.html", "lab-set-overview.pdf"}
-    for plate in {row["plate"] for row in listed}:
-        names |= {f"lab-set-plate-{plate}.3mf", f"lab-set-plate-{plate}-prusaslicer.3mf"}
-    assert {path.name for path in result.set_files} == names
-    assert sum(int(row["symbols"]) for row in listed) == sum(m.symbols for m in result.objects)
 
 
 class PlacesChosenError(Exception):

@@ -38,20 +38,6 @@ def unrolled(solid):
     return development(solid, solid.surfaces[0])
 
 
-@pytest.mark.parametrize("solid", SOLIDS, ids=lambda solid: solid.kind)
-def test_facets_are_where_the_plane_is_taken_to(solid):
-    d = unrolled(solid)
-    for k, T in enumerate(d.T_object_flat):
-        assert T[:3, :3] @ T[:3, :3].T == pytest.approx(np.eye(3), abs=1e-12)
-        for line in (k, k + 1):
-            for point, vertex in zip((d.low[line], d.high[line]), d.vertices[line], strict=True):
-                there = T @ [*point, 0.0, 1.0]
-                assert there[:3] == pytest.approx(solid.vertices[vertex], abs=1e-9)
-        outward = T[:3, 2]
-        assert outward @ d.bends[k] == pytest.approx(1.0)
-        assert outward @ d.bends[k + 1] == pytest.approx(1.0)
-
-
 def test_the_side_of_a_cylinder_has_the_width_of_the_round_one():
     d = unrolled(cylinder(60, 80))
     assert d.low[0] == pytest.approx([0, 0])

@@ -10,9 +10,8 @@ from random_shapes import extruded
 
 from generator.errors import SolidError
 from generator.layout.placement import Layout
-from generator.plane.polygon import edges_cross, points_inside, signed_area, triangle_areas
+from generator.plane.polygon import signed_area, triangle_areas
 from generator.polyhedron.shapes import box as solid_box
-from generator.polyhedron.shapes import cube, pyramid
 from generator.polyhedron.winged import polyhedron
 from generator.printers import PRINTERS
 from generator.solid import (
@@ -23,7 +22,6 @@ from generator.solid import (
     top_insets_mm,
 )
 from generator.solid.marks import NameMark, Pen, name_places
-from generator.solid.part import in_frame, turn
 from generator.solid.plate import inset, mitre, regular, shared_insets
 from generator.solid.triangulate import triangulate_rings, without_slivers
 
@@ -127,63 +125,6 @@ def test_collinear_edges_with_different_neighbours():
     assert insets[3] == insets[4]
     for part in panels(solid, EMPTY, (), 3.0, FDM).parts:
         prove_closed(part)
-
-
-@pytest.mark.parametrize("side", [20.0, 40.0, 90.0])
-def test_numbers_keep_clear_of_edges_and_each_other(side):
-    solid = pyramid(4, side, side)
-    made = panels(solid, EMPTY, (), 2.0, FDM)
-    for part in made.parts:
-        prove_closed(part)
-        back = part.facets[1]
-        texts = {}
-        for embossing in part.embossings:
-            assert embossing.facet == 1
-            assert embossing.face is None
-            rings = [
-                in_frame(embossing.T_part_facet, part.vertices[list(loop)])[:, :2]
-                for loop in back.loops
-            ]
-            R = turn(embossing.rotation_rad)
-            placed = zip(embossing.labels.tolist(), embossing.centres_mm, strict=True)
-            feet = [embossing.tiers[label].rings[0][0] @ R.T + at for label, at in placed]
-            assert not edges_cross([*rings, *feet])
-            assert points_inside(np.concatenate(feet), rings).all()
-            assert min(embossing.tiers[0].z_mm) >= -2.0 / 3
-            texts[embossing.names[0].split()[0]] = embossing
-        if side == 90.0:
-            assert len(texts) == len(back.loops[0]) + 1
-    if side == 90.0:
-        assert made.warnings == ()
-        assert all(
-            f"F{k + 1}" in str(part.embossings[-1].names) for k, part in enumerate(made.parts)
-        )
-    else:
-        assert len(made.warnings) <= 1
-        assert all(w.startswith("no room for the numbers of ") for w in made.warnings)
-
-
-def test_shared_edges_bear_the_same_number_and_six_is_underlined():
-    solid = cube(60.0)
-    made = panels(solid, EMPTY, (), 3.0, FDM)
-    seen = {}
-    for face, part in enumerate(made.parts):
-        for embossing in part.embossings:
-            text = embossing.names[0].split()[0]
-            bars = [name for name in embossing.names if " bar " in name]
-            assert bool(bars) == (text.isdecimal() and ("6" in text or "9" in text))
-            if text.isdecimal():
-                seen.setdefault(int(text), []).append(face)
-                # The number stands beside its own edge: nearest of all edge middles.
-                T = part.T_object_part @ embossing.T_part_facet
-                middle = embossing.centres_mm.mean(axis=0)
-                at = T[:3, :2] @ middle + T[:3, 3]
-                ends = [(solid.vertices[e.start] + solid.vertices[e.end]) / 2 for e in solid.edges]
-                nearest = int(np.argmin([np.linalg.norm(at - end) for end in ends]))
-                assert nearest + 1 == int(text)
-    assert seen == {
-        number + 1: sorted((edge.left, edge.right)) for number, edge in enumerate(solid.edges)
-    }
 
 
 def test_points_on_a_line_are_kept_without_flat_triangles():

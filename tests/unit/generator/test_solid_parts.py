@@ -1,11 +1,8 @@
 """Parts of known solids: closed, planar, of the right volume, without self-intersection."""
 
-import math
-
 import numpy as np
 import pymeshlab
 import pytest
-from reference.expanded_solid import assert_expanded
 from reference.laid_symbols import filled, is_closed, mesh_volume
 
 from generator.alphabet import SymbolStyle, alphabet_named, footprint_half_mm, outlines
@@ -13,46 +10,20 @@ from generator.errors import SolidError
 from generator.layout.placement import FaceLayout, Layout
 from generator.polyhedron.frame import volume as body_volume
 from generator.polyhedron.shapes import cube, tetrahedron
-from generator.polyhedron.winged import polyhedron
 from generator.printers import PRINTERS
 from generator.solid import (
     body_mesh,
-    box,
     emboss_whole,
-    panels,
     prove_closed,
     symbol_meshes,
     triangles,
     volume,
 )
-from generator.solid.measure import symbol_volume
 
 FDM = PRINTERS["fdm-0.4"]
 
 
-def block(outline, hole, height):
-    """Return a right prism over a polygon with a hole: faces bottom, top, sides."""
-    n, m = len(outline), len(hole)
-    flat = np.array([*outline, *hole], dtype=float)
-    vertices = np.concatenate([np.c_[flat, np.full(n + m, z)] for z in (0.0, height)])
-    rim, bore = list(range(n)), list(range(n, n + m))
-    up = n + m
-    faces = [[rim[::-1]], [[up + i for i in rim]]]
-    if m:
-        faces[0].append(bore[::-1])
-        faces[1].append([up + i for i in bore])
-    for ring in (rim, bore):
-        for a, b in zip(ring, ring[1:] + ring[:1], strict=True):
-            faces.append([[a, b, up + b, up + a]])
-    return polyhedron("polyhedron", vertices, faces)
-
-
-ELL = block(
-    [(0, 0), (60, 0), (60, 30), (30, 30), (30, 60), (0, 60)],
-    [(7, 7), (7, 23), (23, 23), (23, 7)],
-    40.0,
-)
-SOLIDS = {"cube": cube(60.0), "tetrahedron": tetrahedron(90.0), "ell": ELL}
+SOLIDS = {"cube": cube(60.0), "tetrahedron": tetrahedron(90.0)}
 
 
 def symbols(alphabet="dense-4", **style):
@@ -76,49 +47,6 @@ def assert_one_solid(mesh, wanted_volume):
     assert measures["boundary_edges"] == 0
     checked.compute_selection_by_self_intersections_per_face()
     assert checked.current_mesh().selected_face_number() == 0
-
-
-@pytest.mark.parametrize(
-    ("name", "turned"),
-    [("cube", 0.3), ("tetrahedron", 0.3), ("ell", 0.0), ("ell", math.pi / 2)],
-)
-def test_whole_bodies_are_closed_and_do_not_meet_themselves(name, turned):
-    tiers, half, order = symbols(chamfer_mm=0.1)
-    solid = SOLIDS[name]
-    layout = filled(solid, 7.0, half + 1.0, turned=turned, order=order)
-    part = emboss_whole(solid, layout, tiers, name)
-    prove_closed(part)
-    assert_expanded(part)
-    count = np.bincount(np.concatenate([face.labels for face in layout.faces]), minlength=4)
-    wanted = body_volume(solid) + sum(
-        n * symbol_volume(t) for n, t in zip(count, tiers, strict=True)
-    )
-    assert volume(part) == pytest.approx(wanted, rel=1e-12)
-    mesh = triangles(part)
-    assert_one_solid(mesh, volume(part))
-    low, high = box(part)
-    assert mesh.vertices.min(axis=0) == pytest.approx(low, abs=1e-12)
-    assert mesh.vertices.max(axis=0) == pytest.approx(high, abs=1e-12)
-    assert low + high == pytest.approx([0.0, 0.0, high[2]], abs=1e-12)
-    assert low[2] == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.parametrize("name", SOLIDS)
-def test_panels_are_closed_lie_flat_and_do_not_meet_themselves(name):
-    tiers, half, order = symbols()
-    solid = SOLIDS[name]
-    layout = filled(solid, 7.0, half + (6.0 if name == "tetrahedron" else 1.4), order=order)
-    made = panels(solid, layout, tiers, 3.0, FDM, name=name)
-    assert [part.name for part in made.parts] == [f"{name}-{face.name}" for face in solid.faces]
-    for part in made.parts:
-        prove_closed(part)
-        assert_expanded(part)
-        assert_one_solid(triangles(part), volume(part))
-        low, high = box(part)
-        symbols_on = any(embossing.face is not None for embossing in part.embossings)
-        assert low[2] == 0.0
-        assert high[2] == pytest.approx(4.0 if symbols_on else 3.0, rel=1e-14)
-        assert low[:2] + high[:2] == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
 def test_mesh_owners_and_separate_bodies_add_up():

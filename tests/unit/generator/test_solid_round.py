@@ -30,10 +30,7 @@ from generator.solid import (
     volume,
 )
 from generator.solid.analytic import (
-    BEND_ERROR_MM,
-    RoundSurfaceMap,
     analytic_faces,
-    bend_lines,
     bend_problem,
 )
 from generator.solid.measure import symbol_volume
@@ -70,20 +67,6 @@ def test_wrapped_symbols_make_one_closed_part(kind):
     flat = sum(symbol_volume(TIERS[label]) for label in (0, 1, 2, 3, 1))
     plain = volume(emboss_whole(solid, layout_on_round_face(solid, [], []), TIERS, ""))
     assert flat < volume(part) - plain < flat * (1 + 1.0 / 20)
-
-
-def test_tops_lie_at_their_height_over_the_facets():
-    solid = SOLIDS["cylinder"]
-    part = emboss_whole(solid, layout_on_round_face(solid, CENTRES, [0, 1, 2, 3, 1]), TIERS, "Part")
-    d = development(solid, solid.surfaces[0])
-    tops = [facet for facet in part.facets if facet.name.endswith("/top")]
-    assert tops
-    for facet in tops:
-        points = part.vertices[[k for loop in facet.loops for k in loop]]
-        points = points + part.T_object_part[:3, 3]
-        heights = np.array([(points - T[:3, 3]) @ T[:3, 2] for T in d.T_object_flat])
-        level = np.abs(heights - STYLE.height_mm).max(axis=1)
-        assert level.min() < 1e-9
 
 
 @given(st.floats(5.0, 180.0), st.floats(6.0, 70.0), st.floats(-math.pi, math.pi), st.integers(0, 3))
@@ -138,12 +121,6 @@ def test_a_hole_that_is_too_narrow_is_told():
     assert "meet in its middle" in bend_problem(hole, TIERS, high, printer)
 
 
-def plain_face(solid):
-    (surface,) = solid.surfaces
-    (face,) = analytic_faces(solid, {}, TIERS, {surface.carrier: surface.facets})
-    return face, development(solid, surface)
-
-
 @pytest.mark.parametrize("name", SOLIDS)
 def test_volume_of_the_body_is_that_of_the_round_solid(name):
     solid = SOLIDS[name]
@@ -152,51 +129,6 @@ def test_volume_of_the_body_is_that_of_the_round_solid(name):
     (face,) = part.analytic
     assert face.closed
     assert face.facets == solid.surfaces[0].facets
-
-
-@pytest.mark.parametrize("name", SOLIDS)
-def test_lines_keep_their_length_and_stay_on_the_face(name):
-    face, flat = plain_face(SOLIDS[name])
-    place = RoundSurfaceMap(face, flat)
-    starts = np.array([[20.0, 12.0], [33.0, 16.0], [25.0, 20.0]])
-    steps = np.array([[4.0, 0.0], [0.0, 3.0], [2.0, -2.5]])
-    curves = bend_lines(place, starts, steps, np.zeros(3), np.arange(3))
-    t = np.linspace(0.0, 1.0, 401)
-    for start, step, curve in zip(starts, steps, curves, strict=True):
-        own = np.vstack([curve, place(start + step, np.array(0.0))])
-        n = len(own) - 1
-        weights = np.array([math.comb(n, k) * t**k * (1 - t) ** (n - k) for k in range(n + 1)])
-        points = weights.T @ own
-        length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
-        assert length == pytest.approx(np.hypot(*step), rel=3e-4)
-        off = np.hypot(points[:, 0], points[:, 1]) - face.radius_at(points[:, 2], np.zeros(401))
-        assert np.abs(off).max() < 2 * BEND_ERROR_MM
-
-
-def test_heights_are_distances_from_the_face():
-    face, flat = plain_face(SOLIDS["cone"])
-    place = RoundSurfaceMap(face, flat)
-    at = np.array([[30.0, 20.0]])
-    foot, top = place(at, np.zeros(1)), place(at, np.ones(1))
-    assert np.linalg.norm(top - foot) == pytest.approx(1.0)
-    along = place(at + np.array([0.0, 1e-5]), np.zeros(1)) - foot
-    assert abs(float((top - foot)[0] @ along[0])) < 1e-9
-
-
-def test_symbols_on_the_face_stand_where_those_of_the_mesh_do():
-    solid = SOLIDS["cylinder"]
-    layout = layout_on_round_face(solid, [(20.0, 12.0), (40.0, 30.0)], [0, 1], rotation=0.3)
-    part = emboss_whole(solid, layout, TIERS, "part")
-    (face,) = part.analytic
-    T = face.T_part_axis
-    strip = {v for k in face.facets for loop in part.facets[k].loops for v in loop}
-    vertices = part.vertices[sorted(strip)]
-    for symbol in face.symbols:
-        assert symbol.z_mm == (0.0, STYLE.height_mm)
-        for tier in symbol.rings:
-            for edge in tier[0]:
-                corner = edge[0] @ T[:3, :3].T + T[:3, 3]
-                assert np.linalg.norm(vertices - corner, axis=1).min() < 0.03  # chord error
 
 
 def test_a_rim_on_several_faces_keeps_its_facets():
