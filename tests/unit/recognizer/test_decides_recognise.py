@@ -359,7 +359,8 @@ def exchanged(reads, monkeypatch):
         for name, value in (
             ("verify_hypotheses", verified), ("has_residual", leaves_much),
             ("swap_halves", lambda _, axis: axis), ("expected_matches", lambda *_, **__: 1e-9),
-            ("shows_strokes", lambda *_: True), ("may_find_more", lambda *_: False), ("place_bits", lambda *_: BITS),
+            ("may_find_more", lambda *_: False), ("place_bits", lambda *_: BITS),
+            ("shows_strokes", lambda *_: True),
         ):  # fmt: skip
             monkeypatch.setattr(recognizer.touch.recognise, name, value)
         image = np.zeros((2, 2))
