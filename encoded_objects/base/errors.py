@@ -14,6 +14,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 
@@ -43,7 +44,7 @@ class EncodedObjectsError(Exception):
 
     exit_code = 2
 
-    def __init__(self, cause: str, *, fix: str = "", place: object = "") -> None:
+    def __init__(self, cause: str, *, fix: str = "", place: str | Path = "") -> None:
         super().__init__(cause)
         self.cause = cause
         self.fix = fix

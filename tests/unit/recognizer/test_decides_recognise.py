@@ -31,6 +31,7 @@ from recognizer.touch.signal import Signal
 from recognizer.touch.verdict import Evidence
 
 TOUCHED = SimpleNamespace(contact=True, state=None)
+BARE = SimpleNamespace(contact=True, state=None)  # no strokes show
 BITS = 40.0
 READER = SimpleNamespace(
     sensor=SensorType(), options=ReaderOptions(), lab=SimpleNamespace(arrays=("one", "two"))
@@ -132,6 +133,10 @@ def reads(small, lab, monkeypatch):
             assert best is (first[0] if first else None)
             return wide_unless_sure(reader, given, answer, judged, best)
 
+        def shows(reader, given, least):
+            assert (reader, given, least) == (READER, signal, 0.25)
+            return signal is not BARE
+
         def found(touch, effort):
             assert touch.reader is READER
             assert touch.signal is signal
@@ -142,6 +147,7 @@ def reads(small, lab, monkeypatch):
         monkeypatch.setattr(recognizer.touch.recognise, "expected_matches", matches)
         monkeypatch.setattr(recognizer.touch.recognise, "expected_by_border", matches_by_border)
         monkeypatch.setattr(recognizer.touch.recognise, "place_bits", lambda *_: BITS)
+        monkeypatch.setattr(recognizer.touch.recognise, "shows_strokes", shows)
         monkeypatch.setattr(recognizer.touch.recognise, "propose_next", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "may_find_more", tells_more)
@@ -168,6 +174,11 @@ def test_without_contact_nothing_is_tried(reads):
     answer, judged, tries = reads.read([], signal=SimpleNamespace(contact=False))
     assert (answer.reason, judged, tries) == (NO_CONTACT, None, 0)
     assert answer.object is None
+
+
+def test_of_a_bare_plate_nothing_is_tried(reads):
+    answer, judged, tries = reads.read([reads.one()], signal=BARE)
+    assert (answer.reason, judged, tries) == (NOT_ENCODED, None, 0)
 
 
 def test_a_touch_that_is_not_numbered_is_the_first(reads):
@@ -349,6 +360,7 @@ def exchanged(reads, monkeypatch):
             ("verify_hypotheses", verified), ("has_residual", leaves_much),
             ("swap_halves", lambda _, axis: axis), ("expected_matches", lambda *_, **__: 1e-9),
             ("may_find_more", lambda *_: False), ("place_bits", lambda *_: BITS),
+            ("shows_strokes", lambda *_: True),
         ):  # fmt: skip
             monkeypatch.setattr(recognizer.touch.recognise, name, value)
         image = np.zeros((2, 2))
@@ -402,6 +414,7 @@ def test_only_what_is_refused_has_a_cause(reads, monkeypatch):
         )
         monkeypatch.setattr(recognizer.touch.recognise, "expected_matches", lambda *_, **__: 0.0)
         monkeypatch.setattr(recognizer.touch.recognise, "place_bits", lambda *_: BITS)
+        monkeypatch.setattr(recognizer.touch.recognise, "shows_strokes", lambda *_: True)
         assert recognise(READER, TOUCHED, 7).cause == cause
 
 
