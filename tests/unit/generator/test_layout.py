@@ -7,6 +7,8 @@ from generator.array.profiles import profile
 from generator.errors import LayoutError
 from generator.layout.footprint import (
     free_grid,
+    mirror_region,
+    move_region,
     region_of,
 )
 from generator.layout.layout import lay_out
@@ -250,3 +252,11 @@ def test_a_hole_keeps_its_distance_on_every_side():
     assert free.tolist() == [True, True, True, False, True, True, True]
     free = free_grid(region(1.0, hole), 0.7, np.array([5.0]), x)[0]
     assert free.tolist() == [False, False, False, False, False, False, False]
+
+
+def test_moved_and_mirrored_keep_the_face_on_the_left():
+    face = move_region(region(), np.pi / 2, 10.0, 0.0)
+    assert np.allclose(face.start[0], (10, 0))
+    x = np.array([5.0])
+    assert free_grid(face, 2.0, x, x).all()
+    assert free_grid(mirror_region(face), 2.0, x, x).all()
