@@ -12,21 +12,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from decoder.any_method import decode as decode
-    from decoder.decoded import Candidate as Candidate
-    from decoder.decoded import Decoded as Decoded
-    from decoder.decoded import Decodings as Decodings
-    from decoder.decoded import Reason as Reason
-    from decoder.errors import DecoderError as DecoderError
-    from decoder.errors import MethodError as MethodError
-    from decoder.errors import WindowError as WindowError
-    from decoder.exact import decode_exact as decode_exact
-    from decoder.good_tuple import decode_good_tuple as decode_good_tuple
-    from decoder.likelihood import Likelihood as Likelihood
-    from decoder.likelihood import decode_likelihood as decode_likelihood
-    from decoder.view import Strength as Strength
-    from decoder.view import strength as strength
-    from decoder.view import strength_of_window as strength_of_window
+    from decoder.any_method import decode
+    from decoder.decoded import Candidate, Decoded, Decodings, Reason
+    from decoder.errors import DecoderError, MethodError, WindowError
+    from decoder.exact import decode_exact
+    from decoder.good_tuple import decode_good_tuple
+    from decoder.likelihood import Likelihood, decode_likelihood
+    from decoder.view import Strength, strength, strength_of_window
 
 #: modules, loaded when one of their names is first used
 _HOMES = {
@@ -38,6 +30,24 @@ _HOMES = {
     "decoder.likelihood": ["Likelihood", "decode_likelihood"],
     "decoder.view": ["Strength", "strength", "strength_of_window"],
 }
+
+__all__ = [
+    "Candidate",
+    "Decoded",
+    "DecoderError",
+    "Decodings",
+    "Likelihood",
+    "MethodError",
+    "Reason",
+    "Strength",
+    "WindowError",
+    "decode",
+    "decode_exact",
+    "decode_good_tuple",
+    "decode_likelihood",
+    "strength",
+    "strength_of_window",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -41,8 +41,6 @@ LINES_MAX = 255  #: rows or columns: a packet holds each in a byte
 _NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,59}\Z")
 _LINES = re.compile(r"\s*([0-9]{1,4})\s*(?:-\s*([0-9]{1,4})\s*)?\Z")
 _PLAIN, _USUAL = SensorType(), Overlay()
-#: settings that are called as the fields of a type
-_SAME = ("name", "rows", "columns", "value", "unit", "bits", "exponent", "wiring", "noise")
 
 
 def _type_name(value: Any) -> str:
@@ -104,6 +102,12 @@ class OverlaySettings(Block):
     """Of a gel: way over which the membrane bridges beside a stroke, mm."""
     blur: LengthOrZero = _USUAL.blur_mm
     """Of a gel: standard deviation of the blur of optics and matching, mm."""
+
+    def overlay(self) -> Overlay:
+        """Return the overlay."""
+        return Overlay(
+            self.kind, self.height, self.tip, self.young, self.poisson, self.membrane, self.blur
+        )
 
 
 class MissingSettings(Block):
@@ -181,12 +185,21 @@ class SensorTypeSettings(Block):
             for row in range(place.rows[0], place.rows[1] + 1)
             for column in range(place.columns[0], place.columns[1] + 1)
         }
-        named = {name: getattr(self, name) for name in _SAME}
-        overlay = Overlay(*(value for _, value in self.overlay))  # its fields in their order
         return SensorType(
-            **named, pitch_mm=self.pitch, row_pitch_mm=self._row_pitch(), overlay=overlay,
+            rows=self.rows,
+            columns=self.columns,
+            pitch_mm=self.pitch,
+            overlay=self.overlay.overlay(),
+            name=self.name,
+            value=self.value,
+            unit=self.unit,
+            bits=self.bits,
+            exponent=self.exponent,
+            wiring=self.wiring,
+            noise=self.noise,
             missing=tuple(sorted(missing)),
-        )  # fmt: skip
+            row_pitch_mm=self._row_pitch(),
+        )
 
 
 _KIND = DocumentKind(

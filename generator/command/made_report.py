@@ -22,7 +22,6 @@ from generator.pipeline import Encoded, MadeObject
 from generator.pipeline.faces import FaceReport
 
 NAMED_KINDS = 3  #: kinds of faces that are named one by one
-COUNTED = ("places", "touches", "parts", "reused", "skipped")  #: of an object, in JSON
 BLOCKED = 0.1  #: share of places where the sensor meets another face, from which that is said
 
 
@@ -146,9 +145,15 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
     return {
         "objects": [
             {
-                **{name: getattr(made, name) for name in ("name", "faces", "symbols")},
+                "name": made.name,
+                "faces": made.faces,
+                "symbols": made.symbols,
                 "files": [str(file) for file in made.files],
-                **{name: getattr(made, name) for name in COUNTED},
+                "places": made.places,
+                "touches": made.touches,
+                "parts": made.parts,
+                "reused": made.reused,
+                "skipped": made.skipped,
                 "surface": None if made.promise is None else made.promise.shares,
                 "promise": [line.strip() for line in rate_lines(made.face_reports, made.promise)],
                 "face_reports": [asdict(face) for face in made.face_reports],

@@ -233,17 +233,18 @@ def _by_region(faces: Sequence[_Face]) -> list[_Face]:
     ]
 
 
-def _fields(value: object, *names: str) -> dict[str, Any]:
-    return {name: getattr(value, name) for name in names}
-
-
 def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
     return {
         "name": entry.name,
         "shape": entry.object_type,
-        **_fields(entry, "faces", "symbols", "profile"),
-        "array": _fields(entry, "rows", "columns"),
-        **_fields(entry, "pitch_mm", "spec_hash", "tool_version", "utc"),
+        "faces": entry.faces,
+        "symbols": entry.symbols,
+        "profile": entry.profile,
+        "array": {"rows": entry.rows, "columns": entry.columns},
+        "pitch_mm": entry.pitch_mm,
+        "spec_hash": entry.spec_hash,
+        "tool_version": entry.tool_version,
+        "utc": entry.utc,
         "retired_utc": entry.retired_utc or None,
     }
 
@@ -271,7 +272,9 @@ def _object_values(
             for each in files
         ],
         "provenance": {
-            **_fields(entry, "tool_version", "spec_hash", "utc"),
+            "tool_version": entry.tool_version,
+            "spec_hash": entry.spec_hash,
+            "utc": entry.utc,
             "spec": held.spec,
             "imported_from": entry.imported_from or None,
             "imported_utc": entry.imported_utc or None,
@@ -334,9 +337,14 @@ def fullness_values(fullness: Fullness) -> dict[str, Any]:
     return {
         "arrays": [
             {
-                **_fields(use.array, "profile", "rows", "columns"),
+                "profile": use.array.profile,
+                "rows": use.array.rows,
+                "columns": use.array.columns,
                 "lab_key": use.array.lab_key or None,
-                **_fields(use, "own", "objects", "taken", "room"),
+                "own": use.own,
+                "objects": use.objects,
+                "taken": use.taken,
+                "room": use.room,
             }
             for use in fullness.arrays
         ],
@@ -346,7 +354,9 @@ def fullness_values(fullness: Fullness) -> dict[str, Any]:
                 "symbols": use.order,
                 "places": use.places,
                 "symbols_a_touch": round(use.symbols, 1),
-                **_fields(use, "touches", "chance", "most_places"),
+                "touches": use.touches,
+                "chance": use.chance,
+                "most_places": use.most_places,
             }
             for use in fullness.pitches
         ],

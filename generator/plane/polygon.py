@@ -101,22 +101,8 @@ def face_vector(loops: Sequence[Points]) -> Points:
     vector: Points = np.zeros(3)
     for loop in loops:
         arms = loop - loop[0]
-        vector += cross(arms, np.concatenate([arms[1:], arms[:1]])).sum(axis=0) / 2
+        vector += np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0) / 2
     return vector
-
-
-def cross(a: Points, b: Points) -> Points:
-    """Return the cross products (..., 3) of vectors; the bits of `np.cross` in a fifth of its time.
-
-    Of a few vectors at a time, which is what facets have.
-    """
-    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    u, v, w = b[..., 0], b[..., 1], b[..., 2]
-    product[..., 0] = y * w - z * v
-    product[..., 1] = z * u - x * w
-    product[..., 2] = x * v - y * u
-    return product
 
 
 def signed_volume(vertices: Points, faces: Sequence[Sequence[Sequence[int]]]) -> float:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from encoded_objects.base.console import DONE, FAILED
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
-from recognizer.validation.campaign import PRINTED, Campaign, campaign_of, series_of
+from recognizer.validation.campaign import PRINTED, campaign_of, series_of
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import done_shards, write_json
 from recognizer.validation.report import circumstances, require_report, write_results
@@ -32,7 +32,6 @@ from recognizer.validation.workers import workers_of
 
 EXPORTS = ("npz", "lerobot")
 PROVENANCE = "provenance.json"
-CAMPAIGN = tuple(field.name for field in fields(Campaign))  #: arguments of `validate`, too
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +192,6 @@ def validate(
     >>> print(result)  # doctest: +ELLIPSIS
     4 touches: ... right, 0 wrong, ... refused; ...
     """
-    given = locals()
     require_report("validate-set")
     if export and export not in EXPORTS:
         raise ValidationError(
@@ -203,7 +201,23 @@ def validate(
     named = [Path(spec) for spec in ([specs] if isinstance(specs, str | Path) else specs)]
     place, steps = Path(folder), progress or TouchProgress()
     sensor = sensor_type and choose_sensor_type(sensor_type, "", None, "--sensor-type")
-    options = {name: given[name] for name in CAMPAIGN} | {"sensor_type": sensor}
+    options = {
+        "touches": touches,
+        "seed": seed,
+        "kinds": kinds,
+        "levels": levels,
+        "sensor_type": sensor,
+        "overlay": overlay,
+        "surfaces": surfaces,
+        "print_profile": print_profile,
+        "faults": faults,
+        "engine": engine,
+        "sensor_per": sensor_per,
+        "policy": policy,
+        "study": study,
+        "limits": limits,
+        "shard": shard,
+    }
     known = resume and (place / RECORD).exists()
     campaign = campaign_of(options, read_record(place).campaign if known else None)
     printed = campaign.surfaces == PRINTED

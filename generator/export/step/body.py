@@ -14,7 +14,6 @@ from generator.export.step.entities import (
     step_string,
     unit,
 )
-from generator.plane.polygon import cross
 from generator.solid.part import AnalyticFace, Part, Rim
 
 
@@ -55,7 +54,7 @@ class StepBody:
             facet = self.part.facets[number]
             corners = self.vertices[list(facet.loops[0])]
             following = np.roll(corners, -1, axis=0)
-            normal = unit(cross(corners - corners[0], following - corners[0]).sum(axis=0))
+            normal = unit(np.cross(corners - corners[0], following - corners[0]).sum(axis=0))
             longest = int(np.argmax(np.linalg.norm(following - corners, axis=1)))
             along = unit(following[longest] - corners[longest])
             placement = self.entities.placement(self._on(facet.loops[0]), normal, along)

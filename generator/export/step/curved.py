@@ -21,7 +21,6 @@ from generator.export.step.entities import (
     step_string,
     unit,
 )
-from generator.plane.polygon import cross
 from generator.solid.part import AnalyticFace, BentSymbol, transform
 
 Points = NDArray[np.float64]
@@ -177,7 +176,7 @@ class _RoundSymbol:
         a, b = self.places[tier][ring][k][0], self.places[tier][ring][j][0]
         d, c = self.places[tier + 1][ring][k][0], self.places[tier + 1][ring][j][0]
         if below not in self.controls and above not in self.controls:
-            normal = unit(cross(c - a, d - b))
+            normal = unit(np.cross(c - a, d - b))
             if (
                 abs(float((b - a) @ normal)) < _PLANAR_MM
                 and abs(float((c - a) @ normal)) < _PLANAR_MM
@@ -207,7 +206,7 @@ class _RoundSymbol:
         own = self.places[tier][ring]
         j = (k + 1) % len(own)
         a, b = own[k][0], own[j][0]
-        off = np.linalg.norm(cross(own[k][1:] - a, unit(b - a)), axis=1)
+        off = np.linalg.norm(np.cross(own[k][1:] - a, unit(b - a)), axis=1)
         ends = f"{self.corners[tier][ring][k]},{self.corners[tier][ring][j]}"
         if off.max() < _STRAIGHT_MM:
             line = f"LINE('',{self.points[tier][ring][k]},{self.file.vector(unit(b - a))})"

@@ -28,7 +28,6 @@ from generator.export.fixed_text import (
     with_references,
 )
 from generator.export.step.entities import Entities, unit, unit_text
-from generator.plane.polygon import cross
 from generator.solid.triangulate import number_rings, outline_points
 
 KINDS = ("top", "side", "inside")  #: of a symbol's faces; "inside": the facet within a ring
@@ -122,7 +121,7 @@ def _components(topology: _SymbolTopology, points: bytes, frame: bytes) -> tuple
     edges = np.array([ends for _, what, ends in topology.referred if what == _EDGE], np.int64)
     found = {
         _AXIS: axes,
-        _SIDE: unit(cross(b_next - a, b - a_next)),
+        _SIDE: unit(np.cross(b_next - a, b - a_next)),
         _FOOT: unit(a_next - a),
         _EDGE: unit(corners[edges[:, 1]] - corners[edges[:, 0]]),
     }

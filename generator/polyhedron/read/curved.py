@@ -12,7 +12,7 @@ mm, angles in rad.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 from operator import itemgetter
 from typing import Any
@@ -75,8 +75,16 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
             f"symbols to {CHORD_ERROR_MM * coarser:g} mm: finer, they have {counts[-2]} "
             "facets"
         )
-    found.points = [list(map(float, point)) for point in found.points]
-    return asdict(found) | {"notes": notes, "error_mm": BLANK_ERROR_MM * coarser}
+    return {
+        "points": [list(map(float, point)) for point in found.points],
+        "faces": found.faces,
+        "names": found.names,
+        "surfaces": found.surfaces,
+        "blank": found.blank,
+        "kinds": found.kinds,
+        "notes": notes,
+        "error_mm": BLANK_ERROR_MM * coarser,
+    }
 
 
 def _tessellate(solid: Any, faces: list[Any], kinds: list[str], coarser: float) -> _Found:
