@@ -5,7 +5,7 @@
     command, options   open-bench
     serve              options -> a server that runs
     guard              who may ask: host, origin, token, sizes, and what the page may load
-    app, routes        the page, its live line, the requests
+    app, routes        the page, its live line, the requests;  making  those that make parts
     controllers        calibration, sensor and print, as the page works them
     session            one probe and all that is done with it; shared by every page
     feed               frames of a probe that may go and come back, or of a recording

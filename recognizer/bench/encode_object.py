@@ -7,9 +7,7 @@ time, which ends when the page that waits for it leaves or the server ends.
 
 from __future__ import annotations
 
-import asyncio
 import json
-import os
 import re
 import tempfile
 import threading
@@ -18,13 +16,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from subprocess import Popen
-from typing import IO, TYPE_CHECKING, Any, TypeVar
-from urllib.parse import quote
-
-from fastapi import APIRouter, Request
-from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import StreamingResponse
-from pydantic import BaseModel, ConfigDict, Field
+from typing import IO, Any
 
 from encoded_objects.base.foreign import run_limited, waiting_process
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
@@ -34,11 +26,6 @@ from recognizer.bench.errors import BenchError, BusyError, RefusedError
 from recognizer.bench.files import part_folder
 from recognizer.bench.lab_json import object_json
 from recognizer.bench.options import LAB
-
-if TYPE_CHECKING:
-    from recognizer.bench.session import Session
-
-_Made = TypeVar("_Made")
 
 EXAMPLE = "name: Example\nshape: {cube: 60 mm}\n"
 SHORT_S = 60.0  #: of processor time, to try a part and to show one; most take 1 to 3 s
@@ -50,7 +37,6 @@ ZIPPED = 512 * 1024**2  #: bytes of all files of a zip; a cube takes 12 MB
 LOADS = ("generator.pipeline", "generator.spec.option", "generator.command.made_report", "numpy.ma")
 #: what trying a part needs: four fifths of its time, spent while nobody waits
 LOOK_S = 0.05  #: between two looks at whether it is still waited for
-PIECE = 1 << 16  #: bytes of a zip that are sent at once
 
 _FILE = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,99}")  #: names of objects that can name a spec
 _TURN = threading.Lock()  #: one command at a time
@@ -253,59 +239,3 @@ def _ask(
     if "error" in found:
         raise RefusedError(found["error"])
     return dict(found)
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    name: str = Field(max_length=200)
-    spec: str = Field(max_length=32_000)  #: YAML
-    keep: bool  #: in the lab that is open, or a new one; otherwise in one of its own
-
-
-def add_making_routes(routes: APIRouter, session: Session) -> None:
-    """Add the requests that make parts: what can be made, what it would be, a zip of its files."""
-
-    def lab_of(body: _Part) -> str:
-        return (session.database or LAB) if body.keep else ""
-
-    @routes.get("/make")
-    def settings() -> dict[str, Any]:
-        schema = part_settings()
-        load_ahead()
-        lab = normal_url(session.database or LAB).render_as_string()  # without its password
-        return {
-            "schema": schema, "sensor_type": session.sensor.name,
-            "lab": lab.removeprefix("sqlite:///"), "new": not session.database,
-        }  # fmt: skip
-
-    @routes.post("/make/try")
-    async def attempt(body: _Part, request: Request) -> dict[str, Any]:
-        return await _while_there(
-            request, lambda gone: try_part(body.spec, body.name, lab_of(body), gone)
-        )
-
-    @routes.post("/make")
-    async def make(body: _Part, request: Request) -> StreamingResponse:
-        name, made, packed = await _while_there(
-            request, lambda gone: make_part(body.spec, body.name, lab_of(body), gone)
-        )
-        if body.keep:
-            await run_in_threadpool(session.read_again)
-        headers = {
-            "content-disposition": f'attachment; filename="{name}.zip"',
-            "content-length": str(os.fstat(packed.fileno()).st_size),
-            "x-object": quote(made),
-        }
-        chunks = iter(lambda: packed.read(PIECE), b"")
-        return StreamingResponse(chunks, media_type="application/zip", headers=headers)
-
-
-async def _while_there(request: Request, work: Callable[[Callable[[], bool]], _Made]) -> _Made:
-    """Do work in a thread, and tell it when the page that waits for it has left."""
-    gone = threading.Event()
-    doing = asyncio.ensure_future(run_in_threadpool(work, gone.is_set))
-    while not (await asyncio.wait({doing}, timeout=LOOK_S))[0]:
-        if await request.is_disconnected():
-            gone.set()
-    return doing.result()

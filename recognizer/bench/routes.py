@@ -31,10 +31,11 @@ from generator.database.transaction import read_transaction
 from probe.port.listing import list_ports
 from probe.recording.record import Recorder
 from recognizer.bench import controllers
-from recognizer.bench.encode_object import EXAMPLE, add_making_routes, face_promises, make_part
+from recognizer.bench.encode_object import EXAMPLE, face_promises, make_part
 from recognizer.bench.errors import BusyError, UnknownError
 from recognizer.bench.files import Uploads, find_file, part_folder, part_to_send
 from recognizer.bench.lab_json import arrays_json, map_json, object_json, object_svg, objects_json
+from recognizer.bench.making import add_making_routes
 from recognizer.bench.message import FILTERS
 from recognizer.bench.options import LAB
 from recognizer.bench.session import Session
