@@ -142,7 +142,7 @@ def verify_hypotheses(touch: TouchImages, effort: Effort) -> list[VerifiedHypoth
 def _verify_on_flat_faces(
     image: Image, embossed: EmbossedArray, fits: tuple[Fit, ...]
 ) -> list[VerifiedHypothesis]:
-    """Return the likeliest places, best first, fitted to the registered symbols."""
+    """Return the likeliest places, fitted to the registered symbols."""
     candidates = _near_best(_on_flat_faces(embossed, find_hypotheses(embossed, fits)))
     if not candidates:
         return []
@@ -155,7 +155,7 @@ def _verify_on_flat_faces(
     if others:  # also places that were verified before, under a fit that is not as good
         everything = [replace(best.hypothesis, fit=len(fits)), *others]
         verified += _fit_hypotheses(image, embossed, everything, (*fits, best.fit))
-    return sorted(verified, key=lambda one: -one.score)
+    return verified
 
 
 def _near_best(candidates: list[Hypothesis]) -> list[Hypothesis]:
