@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import signal
 import sqlite3
-from contextlib import closing
+from contextlib import ExitStack, closing
 
 import httpx
 import pytest
@@ -57,7 +57,9 @@ def test_a_silent_and_a_killed_server_are_said_and_one_that_comes_back_is_found(
         error = page.get_by_test_id("error")
         expect(error).to_contain_text("open-bench does not answer")
         expect(error).to_contain_text("What is on the page stays")
-    with process_of(lab, int(address.split(":")[-1].strip("/"))):
+    with ExitStack() as kept:
+        with page.expect_navigation(timeout=PATIENCE_MS):  # of another server, the page is too
+            kept.enter_context(process_of(lab, int(address.split(":")[-1].strip("/"))))
         expect(state).to_contain_text("probe is there", timeout=PATIENCE_MS)
         until(page, "bench.shown !== '' && bench.frames > 0")
         until(page, "bench.touch === 0")  # nothing is left of the other server's touches
