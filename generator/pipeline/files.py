@@ -136,7 +136,7 @@ def _draw(
     name, layout = plan.spec.name, made.layout
     size = outer_size_mm(plan.polyhedron, parts).tolist()
     shares: dict[str, tuple[float, float | None]] = {}
-    if made.promise is not None:  # faces of which nothing is said are blank
+    if made.promise is not None and not made.promise.one_side:  # blank faces answer nothing
         shares = dict.fromkeys([face.name for face in plan.polyhedron.faces], (0.0, None))
     shares |= {
         face.name: (face.promise.at_once, face.promise.within_three)
