@@ -133,8 +133,9 @@ def resolve(
             _refuse_style(found, refuse)
         else:
             style = found
-    wall = settings.print.wall or printer.printed_mm(WALL_MM)
     thinnest = WALL_STROKES * printer.stroke_min_mm
+    solid = thinnest + 0.4999 * printer.layer_mm  # the next whole layer
+    wall = settings.print.wall or printer.printed_mm(max(WALL_MM, solid))
     if wall < thinnest:
         refuse(
             "print.wall",

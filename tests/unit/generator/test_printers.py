@@ -65,11 +65,13 @@ def test_what_is_wrong_with_a_printer_is_said_where_it_stands(tmp_path, text, pl
 @pytest.mark.parametrize(
     ("printer", "wall", "height"),
     [("fdm-0.4", 3.0, 1.0), ("{layer: 0.3 mm}", 3.0, 0.9), ("{layer: 0.28 mm}", 3.08, 1.12),
-     ("prusa-mk4-0.25", 3.0, 1.0), ("resin", 3.0, 1.0)],
+     ("prusa-mk4-0.25", 3.0, 1.0), ("resin", 3.0, 1.0), ("fdm-0.8", 3.2, 0.8),
+     ("{layer: 0.3 mm, nozzle: 1.0 mm, stroke: 1.9 mm}", 3.9, 0.9)],
 )  # fmt: skip
 def test_walls_and_symbols_are_whole_layers(tmp_path, printer, wall, height) -> None:
     spec = spec_of(tmp_path, f"print: {{printer: {printer}}}\n")
     assert (spec.wall_mm, spec.style.height_mm) == (wall, height)
+    assert spec.wall_mm >= 2 * spec.printer.stroke_min_mm
     layers = (spec.wall_mm - spec.printer.first_layer_mm) / spec.printer.layer_mm
     assert layers == pytest.approx(round(layers))
 
