@@ -90,8 +90,8 @@ def _fault(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> tuple[st
     if top < printer.stroke_min_mm / 2:
         most = (style.stroke_mm - printer.stroke_min_mm / 2) / 2
         cause = (
-            f"a chamfer of {style.chamfer_mm:g} mm leaves {top:.2g} mm of the stroke's top, but "
-            f"{printer.name} needs {printer.stroke_min_mm / 2:g} mm"
+            f"a chamfer of {style.chamfer_mm:g} mm leaves {max(top, 0.0):.2g} mm of the stroke's "
+            f"top, but {printer.name} needs {printer.stroke_min_mm / 2:g} mm"
         )
         return cause, f"set chamfer to {math.floor(100 * most) / 100:g} mm or less"
     footprint_half_mm(alphabet, style)

@@ -2,10 +2,10 @@
 
 The array is the lab's own of the profile. `auto` takes the smallest array of its symbols in which
 the objects fit together with what the database holds, an empty one with room for more: `tactel-8`
-or `large`, by the sensor type, and the next sizes. Registered objects keep their array and pitch,
-those that came from another lab keep that lab's array, and a lab goes on with the arrays that it
-has. Finer symbols are taken where the printer makes them and they show places on faces that would
-stay blank.
+or `large`, by the sensor type, and the next sizes. Registered objects keep their array, and their
+pitch unless they are made again from a changed spec; those that came from another lab keep that
+lab's array, and a lab goes on with the arrays that it has. Finer symbols are taken where the
+printer makes them and they show places on faces that would stay blank.
 """
 
 from __future__ import annotations
@@ -135,13 +135,22 @@ def choose_array(
     kept = other or _array_kept(lab, known)
     if kept is not None:
         made = kept.definition, kept.lab_key
-        pitches = {name: entry.pitch_mm for name, entry in known.items()}
-        new = next(iter(pitches.values()), None)  # of new objects: that of those registered
-        found = [
-            with_profile(one, kept.profile, AUTO, *made, pitches.get(one.name, new))
-            for one in specs
-        ]
-        return ArrayChoice(plan_objects(found, solid))
+        new = next((entry.pitch_mm for entry in known.values()), None)  # that of those registered
+
+        def at(one: ObjectSpec, pitch_mm: float | None) -> ObjectSpec:
+            return with_profile(one, kept.profile, AUTO, *made, pitch_mm)
+
+        def pitch_of(one: ObjectSpec) -> float | None:
+            entry = known.get(one.name)
+            if entry is None or not replace_changed:
+                return new if entry is None else entry.pitch_mm
+            try:  # one that is made again from a changed spec has the pitch of that
+                (plan,) = plan_objects([at(one, entry.pitch_mm)], solid)
+            except GeneratorError:
+                return None
+            return entry.pitch_mm if entry.same_spec(plan.meaning) else None
+
+        return ArrayChoice(plan_objects([at(one, pitch_of(one)) for one in specs], solid))
     short: list[str] = []  # why each smaller array does not do
     smallest = _smallest(specs, lab)
     for candidate in _candidates(smallest):

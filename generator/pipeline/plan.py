@@ -164,7 +164,12 @@ def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan
         outlines_of,
         faces.blank,
         stance,
-        (*faces.notes, *_covered_note(polyhedron, covered, reach), *_layer_note(spec)),
+        (
+            *faces.notes,
+            *_covered_note(polyhedron, covered, reach),
+            *_pitch_note(spec),
+            *_layer_note(spec),
+        ),
     )
 
 
@@ -322,6 +327,14 @@ def _chosen_stance(polyhedron: Polyhedron, spec: ObjectSpec) -> Stance | None:
     if held is not None and (stance := stance_on(polyhedron, held, steepest)) is not None:
         return stance
     return best_stance(polyhedron, _flat(polyhedron), steepest)
+
+
+def _pitch_note(spec: ObjectSpec) -> tuple[str, ...]:
+    """Return the note that symbols are coarser than usual, which a touch shows fewer of."""
+    pitch, usual = spec.style.pitch_mm, spec.sensor.symbol_pitch_mm
+    return (
+        (f"pitch {pitch:g} mm is taken; at {usual:g} mm: {spec.coarser}",) if spec.coarser else ()
+    )
 
 
 def _layer_note(spec: ObjectSpec) -> tuple[str, ...]:

@@ -123,19 +123,21 @@ def resolve(
             printer = _described_printer(settings.print.printer, tree)
     alphabet = named or ALPHABETS[defaults.alphabet]
     style = _style(settings, defaults, alphabet, printer)
+    coarser = ""
     if order is not None and alphabet.order < order:
         _refuse_order(alphabet, order, refuse)
     elif order is not None:
         found = _printable(alphabet, style, printer, settings.symbols.draft is None)
         if isinstance(found, AlphabetError) and settings.symbols.pitch is None:
+            coarser = found.cause
             found = _coarser(settings, defaults, alphabet, printer) or found
         if isinstance(found, AlphabetError):
             _refuse_style(found, refuse)
         else:
             style = found
     thinnest = WALL_STROKES * printer.stroke_min_mm
-    solid = thinnest + 0.4999 * printer.layer_mm  # the next whole layer
-    wall = settings.print.wall or printer.printed_mm(max(WALL_MM, solid))
+    whole_mm = thinnest + 0.4999 * printer.layer_mm  # the next whole layer
+    wall = settings.print.wall or printer.printed_mm(max(WALL_MM, whole_mm))
     if wall < thinnest:
         refuse(
             "print.wall",
@@ -181,6 +183,7 @@ def resolve(
         collision=settings.robot.collision,
         sensor=sensor,
         source=tree,
+        coarser=coarser,
     )
     if settings.copies == 1:
         return (spec,)

@@ -82,6 +82,7 @@ class ObjectSpec:
     sensor: SensorType = USUAL_SENSOR  #: what will touch it
     #: name of the file or set that was given: files of a set bear it
     origin: str = field(default="", compare=False)
+    coarser: str = field(default="", compare=False)  #: why symbols of the usual pitch do not print
     array_key: str = ""  #: lab key that `encoding` was made from; empty: the published array
 
     @property

@@ -116,6 +116,21 @@ def test_auto_takes_finer_symbols_where_the_usual_ones_show_no_place(tmp_path):
     assert "1.7 times larger" in problem.fix
 
 
+def test_an_object_that_is_made_again_has_the_pitch_of_its_changed_spec(tmp_path):
+    text = "name: A\nshape: {{cube: 60 mm}}\nsymbols: {}\n"
+    pitches = []
+    for symbols in ("{stroke: 2.4 mm}", "{}", "{}", "{stroke: 2.4 mm}"):
+        (made,) = dry(
+            tmp_path, text.format(symbols), dry_run=False, replace=True, formats=[]
+        ).objects
+        pitches.append((made.layout.pitch_mm, made.reused))
+        said = [
+            note for note in made.warnings if note.startswith("pitch 10 mm is taken; at 5 mm: ")
+        ]
+        assert bool(said) == (symbols != "{}")
+    assert pitches == [(10.0, False), (5.0, False), (5.0, True), (10.0, False)]
+
+
 def test_auto_goes_on_where_the_database_is_full(tmp_path):
     text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole, down: none}}\n"
     text += "symbols: {{alphabet: dense-4}}\ncopies: {}\n"
