@@ -4,10 +4,11 @@ import json
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
-from contextlib import chdir
+from contextlib import chdir, closing
 from importlib import import_module
 from pathlib import Path
 
@@ -116,6 +117,14 @@ def test_show_tells_missing_and_changed_files(cube, capsys):
     third.rmdir()
     make()
     assert {file["state"] for file in said(capsys, "show", "Cube")["files"]} == {"ok"}
+
+
+def test_an_object_of_a_pitch_that_no_face_bears_is_called_damaged(cube, capsys):
+    with closing(sqlite3.connect("lab.db")) as base:
+        base.execute("update objects set pitch_mm = 1e-9")
+        base.commit()
+    assert run(["show", "Cube"]) == 4
+    assert "never written" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("answer", "left"), [("n", 1), ("y", 0)])
