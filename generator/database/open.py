@@ -87,7 +87,7 @@ def without_password(url: str) -> str:
     >>> without_password("postgresql://lab:secret@host/objects")
     'postgresql://lab:***@host/objects'
     """
-    return make_url(url).render_as_string(hide_password=True)
+    return make_url(url).render_as_string(hide_password=True) if "://" in url else url
 
 
 def part_file(url: URL, file: str) -> str:

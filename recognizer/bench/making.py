@@ -15,6 +15,7 @@ from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from generator.database.open import normal_url
+from generator.database.transaction import place_of
 from recognizer.bench.encode_object import LOOK_S, load_ahead, make_part, part_settings, try_part
 from recognizer.bench.options import LAB
 from recognizer.bench.session import Session
@@ -42,10 +43,10 @@ def add_making_routes(routes: APIRouter, session: Session) -> None:
     def settings() -> dict[str, Any]:
         schema = part_settings()
         load_ahead()
-        lab = normal_url(session.database or LAB).render_as_string()  # without its password
+        lab = place_of(normal_url(session.database or LAB))  # without its password
         return {
             "schema": schema, "sensor_type": session.sensor.name,
-            "lab": lab.removeprefix("sqlite:///"), "new": not session.database,
+            "lab": lab, "new": not session.database,
         }  # fmt: skip
 
     @routes.post("/make/try")

@@ -22,6 +22,7 @@ from generator.database.lab import lab_arrays, lab_key
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
+from recognizer.touch.lab import open_lab
 
 KEY, OTHER = "0123-4567-89AB-CDER", "F1XT-VRES-0000-000Q"
 V2 = Path(__file__).parents[3] / "fixtures" / "database" / "v2.db"
@@ -117,6 +118,28 @@ def test_show_tells_missing_and_changed_files(cube, capsys):
     third.rmdir()
     make()
     assert {file["state"] for file in said(capsys, "show", "Cube")["files"]} == {"ok"}
+
+
+@pytest.mark.parametrize(
+    ("folder", "name"), [(".", "a?b.db"), (".", "l%41b.db"), ("w%41?#x", "lab.db?x=1")]
+)
+def test_a_database_is_the_file_that_is_named(folder, name, tmp_path, capsys):
+    home = tmp_path / folder
+    home.mkdir(exist_ok=True)
+    named = name if folder == "." else str(home / name)
+    spec = Path("c.yaml")
+    spec.write_text("name: Cube\nshape: {cube: 60 mm}\noutput: {formats: [stl]}\n")
+    trial = ["--dry-run", "--trial", f"t{named}" if folder == "." else f"{named}t"]
+    assert run([str(spec), "--database", named, *trial]) == 0
+    assert Path(trial[-1]).is_file()
+    assert run([str(spec), "--database", named]) == 0
+    assert f"registered in {named}" in capsys.readouterr().out.replace("\n", "")
+    assert (home / name).is_file()
+    assert len(open_lab(named).arrays[0].faces) == 6
+    assert said(capsys, "export", f"{named}.out", "--database", named)["exported"] == ["Cube"]
+    assert run(["import", f"{named}.out", "--database", f"{named}.new"]) == 0
+    made = {path.name for path in home.iterdir()} - {"c.yaml", "out", "w%41?#x"}
+    assert made == {name, f"{name}.out", f"{name}.new", Path(trial[-1]).name}
 
 
 def test_an_object_of_a_pitch_that_no_face_bears_is_called_damaged(cube, capsys):
