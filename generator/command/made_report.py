@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from encoded_objects.base import output
-from generator.database.open import without_password
+from encoded_objects.base.errors import without_password
 from generator.layout.recognition_rate import (
     LOW,
     NOT_READABLE,

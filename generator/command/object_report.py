@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 
 from encoded_objects.base import output
-from generator.database.open import without_password
+from encoded_objects.base.errors import without_password
 from generator.database.read import natural_key, surfaces_of
 
 if TYPE_CHECKING:

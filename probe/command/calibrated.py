@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.console import FAILED, interruption
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.files import refuse_taken
 from encoded_objects.base.foreign import MOST_TEXT, foreign_bytes
 from encoded_objects.base.output import message, pairs, warning, write, write_json
@@ -380,7 +381,7 @@ def guide_loads(options: GuideOptions) -> int:
     guide = CalibrationGuide(options.forces_n, options.seconds)
     with Client(port, sensor=options.sensor) as client:
         sensor = name_of(client.wait_for_ident(), options.url)
-        message(f"{sensor or options.url}; recordings go to {folder}")
+        message(f"{sensor or without_password(options.url)}; recordings go to {folder}")
         given: list[LoadRecording] = []
         while True:
             while not guide.done:

@@ -27,6 +27,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.sensor_type import SensorType
 from probe.frame import WRIST, Frame
 
@@ -56,6 +57,14 @@ class RecordingOrigin:
     units: str = "counts"
     sensor_type: str = ""  #: as YAML, `sensor_type_text`; empty: not known
     more: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        """Keep no password, also of a recording that has one."""
+        more = {
+            name: without_password(value) if isinstance(value, str) else value
+            for name, value in self.more.items()
+        }
+        object.__setattr__(self, "more", MappingProxyType(more))
 
     def texts(self) -> dict[str, str]:
         """Return the fields that are texts, by their names, as `of_texts` takes them."""
