@@ -131,6 +131,30 @@ def test_an_object_that_is_made_again_has_the_pitch_of_its_changed_spec(tmp_path
     assert pitches == [(10.0, False), (5.0, False), (5.0, True), (10.0, False)]
 
 
+def test_printed_parts_of_a_replaced_object_are_not_read_as_the_new_one(tmp_path):
+    def made(side: int, printer: str, **options):
+        text = f"name: A\nshape: {{cube: {side} mm}}\nprint: {{printer: {printer}}}\n"
+        (one,) = dry(tmp_path, text, replace=True, **options).objects
+        cells = {
+            cell for face in one.layout.faces
+            for cell in zip(face.rows.tolist(), face.columns.tolist(), strict=True)
+        }  # fmt: skip
+        return cells, " ".join(one.warnings)
+
+    first, said = made(60, "fdm-0.4", dry_run=False, formats=["step", "stl"])
+    assert said == ""
+    again, said = made(60, "prusa-mini", dry_run=False, formats=["stl"])  # printed ones stay good
+    assert again == first
+    assert "A-F1.step, A-F2.step" in said
+    assert "destroy" not in said
+    planned, said = made(50, "prusa-mini")
+    assert "destroy its printed parts" in said
+    other, said = made(50, "prusa-mini", dry_run=False, formats=["stl"])
+    assert other == planned
+    assert not other & first
+    assert "destroy its printed parts" in said
+
+
 def test_auto_goes_on_where_the_database_is_full(tmp_path):
     text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole, down: none}}\n"
     text += "symbols: {{alphabet: dense-4}}\ncopies: {}\n"
