@@ -25,6 +25,8 @@ from generator.spec.problem import error_location
 
 BuiltParts = tuple[tuple[Part, ...], tuple[str, ...]]  #: the parts, and what they lack
 
+SMALL_MODEL_MM = 12.0  #: a model of another unit: no place can be told on it
+
 NO_CELLS = (np.empty(0, np.int64), np.empty(0, np.int64))
 
 
@@ -155,6 +157,16 @@ def lay_out_object(plan: ObjectPlan, others: Occupancy | Cells) -> Layout:
         )
 
     layout = attempt(allow_blank_faces=True)
-    if len(layout.blank_faces) == len(plan.polyhedron.faces):
+    if len(layout.blank_faces) < len(plan.polyhedron.faces):
+        return layout
+    try:
         return attempt(allow_blank_faces=False)  # says what to change
-    return layout
+    except LayoutError as error:
+        size = np.ptp(plan.polyhedron.vertices, axis=0).tolist()
+        if plan.spec.shape.file is None or max(size) > SMALL_MODEL_MM:
+            raise
+        fix = (
+            f"check the model's unit: it is {' x '.join(f'{v:.3g}' for v in size)} mm; in inches "
+            "it needs scale: 25.4, in metres 1000"
+        )
+        raise LayoutError(error.cause, fix=fix, place=error.place) from None

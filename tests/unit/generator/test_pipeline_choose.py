@@ -240,11 +240,25 @@ def test_each_face_is_told_with_the_least_size_that_shows_a_place(tmp_path):
          r"(?s)array 63x65 is full.*fix: .*set profile: auto"),
         ("cylinder: {diameter: 40 mm, height: 30 mm}}\nprint: {parts: panels}\n",
          r":3:16: error: a round face cannot be printed as a flat"),
+        ("file: inch.obj}\n",
+         r"(?s)no place can be identified.*it is 3 x 2 x 1.5 mm; in inches it needs scale: 25.4"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_made_is_refused_where_it_is_asked_for(tmp_path, settings, said):
+    box = [(x, y, z) for x in (0, 3) for y in (0, 2) for z in (0, 1.5)]
+    faces = ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4")
+    lines = [f"v {x} {y} {z}" for x, y, z in box] + [f"f {face}" for face in faces]
+    (tmp_path / "inch.obj").write_text("\n".join(lines))
     with pytest.raises(SpecError, match=said):
         dry(tmp_path, f"name: A\nshape: {{{settings}")
+
+
+def test_a_part_larger_than_the_bed_is_told_before_it_is_made(tmp_path):
+    text = "name: A\nshape: {tag: 400 x 20 mm}\n"
+    said = "larger than the bed of fdm-0.4, 250 x 210 mm: A; take a larger printer"
+    for options in ({}, {"dry_run": False, "formats": ["stl"]}):
+        (one,) = dry(tmp_path, text, **options).objects
+        assert said in one.warnings
 
 
 @pytest.mark.parametrize("copies", [1, 3])
