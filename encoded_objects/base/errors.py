@@ -13,6 +13,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -45,10 +46,10 @@ class EncodedObjectsError(Exception):
     exit_code = 2
 
     def __init__(self, cause: str, *, fix: str = "", place: str | Path = "") -> None:
-        super().__init__(cause)
-        self.cause = cause
-        self.fix = fix
-        self.place = str(place)
+        self.cause = without_password(cause)
+        super().__init__(self.cause)
+        self.fix = without_password(fix)
+        self.place = without_password(str(place))
 
     def __str__(self) -> str:
         head = f"{self.place}: {self.cause}" if self.place else self.cause
@@ -141,3 +142,20 @@ def install_line(extra: str) -> str:
 def printable(text: str) -> str:
     """Return `text` without characters that would disturb a terminal."""
     return "".join(c if c == " " or c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+_PASSWORD = re.compile(r"(\w*(?:sql|postgres)[\w+]*://[^:/@\s]*):[^@]*@(?:[^@/?#\s]*@)*")
+_PASSWORD_OPTION = re.compile(r"([?&](?:ssl)?password=)[^&#\s]*")
+
+
+def without_password(text: str, instead: str = "***") -> str:
+    """Return a text in which addresses of databases have no password, as it may be shown and kept.
+
+    >>> without_password("sim:postgresql://lab:secret@host/objects#Cube/F1")
+    'sim:postgresql://lab:***@host/objects#Cube/F1'
+    >>> without_password("postgresql://lab:secret@host/objects", "")
+    'postgresql://lab@host/objects'
+    """
+    colon = ":" if instead else ""
+    shown = _PASSWORD.sub(rf"\1{colon}{instead}@", text)
+    return _PASSWORD_OPTION.sub(rf"\1{instead}", shown)

@@ -196,7 +196,8 @@ def _confirm_places(
 def _places_outside(spec: ObjectSpec, folder: Path | None, url: str | None) -> Iterator[Problem]:
     """Yield what a spec says of places outside its folder and the current one."""
     from encoded_objects.base.document import Problem
-    from generator.database.open import normal_url, without_password
+    from encoded_objects.base.errors import without_password
+    from generator.database.open import normal_url
     from generator.spec.problem import mark_of
 
     said = spec.source.value.get("output") if isinstance(spec.source.value, dict) else None

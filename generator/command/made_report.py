@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 from encoded_objects.base import output
-from generator.database.open import without_password
+from encoded_objects.base.errors import without_password
 from generator.layout.recognition_rate import (
     LOW,
     NOT_READABLE,
@@ -115,10 +117,11 @@ def _face_lines(reports: Sequence[FaceReport]) -> list[str]:
             answered = f"{once:.0%} answered at once, {later}"
             if face.promise.meets:
                 answered += f"{face.promise.obstacle}, "
-        text = (
-            f"{size} mm, {_count(face.symbols, 'symbol')}, "
-            f"{answered}places can be told down to {least} mm"
-        )
+        shown = f"{_count(face.symbols, 'symbol')}, {answered}places can be told down to {least} mm"
+        if not face.symbols:
+            told = math.isfinite(face.smallest_mm[0])
+            shown = f"blank: places could be told from {least} mm" if told else "blank"
+        text = f"{size} mm, {shown}"
         named.setdefault(text, []).append(face.name)
     titles = [f"{output.some_of(names)}:" for names in named.values()]
     width = max(map(len, titles), default=0)
@@ -205,7 +208,8 @@ def _low_text(why: str, remedy: str, faces: Sequence[FaceReport]) -> str:
     share = f"{_range(shares)} of touches are answered at once"
     later = [one.within_three for one in promises if one.within_three is not None]
     share += f", {_range(later)} within three" if later else ""
-    others = f" (and {', '.join(f.name for f in faces[1:])}, as narrow)" if faces[1:] else ""
+    names = output.some_of([face.name for face in faces[1:]])
+    others = f" (and {names}, as narrow)" if names else ""
     said = why if not max(shares) else f"{why}; {share}" if why else share
     help_ = f"; would help: {remedy}" if remedy else ""
     return f"  {faces[0].name}, {faces[0].place}{others}: {said}{help_}"
@@ -227,16 +231,18 @@ def next_step(result: Encoded) -> str:
 
 
 def _of_set(result: Encoded) -> str:
-    files = result.set_files
-    plain = _plates(files)
-    sheet = next((file for file in files if file.name.endswith("-build.html")), None)
+    files = result.to_print
+    sheets = (file for file in result.set_files if file.name.endswith("-build.html"))
+    sheet = next(sheets, None)
     steps = []
-    if plain:
-        first = plain[0].name if len(plain) == 1 else f"{plain[0].name} ... {plain[-1].name}"
-        lies = "as it lies" if len(plain) == 1 else "as they lie"
+    if files:
+        lies = "as it lies" if len(files) == 1 else "as they lie"
         if all(made.lying is None for made in result.objects):
             lies += ", backs down, symbols up, no supports, 100 % scale"
-        where = f"{first} in {plain[0].parent} ({_opened_by(plain[0])})"
+        kinds = [list(some) for _, some in groupby(files, _is_project)]
+        where = " and ".join(
+            f"{_first_and_last(some)} in {some[0].parent} ({_opened_by(some[0])})" for some in kinds
+        )
         steps.append(f"print {where} {lies}")
     if sheet:
         steps.append(f"put the objects together by {sheet}")
@@ -246,6 +252,10 @@ def _of_set(result: Encoded) -> str:
     if whole:
         steps.append("; ".join(f"{made.name}: {made.lying}" for made in whole))
     return "next: " + ", then ".join(steps)
+
+
+def _first_and_last(files: Sequence[Path]) -> str:
+    return files[0].name if len(files) == 1 else f"{files[0].name} ... {files[-1].name}"
 
 
 def _of_object(made: MadeObject) -> list[str]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 
 from encoded_objects.base import output
-from generator.database.open import without_password
+from encoded_objects.base.errors import without_password
 from generator.database.read import natural_key, surfaces_of
 
 if TYPE_CHECKING:
@@ -268,6 +268,7 @@ def _object_values(
                 "file": str(each.path),
                 "sha256": each.part.sha256,
                 "state": each.state,
+                "T_object_part": each.part.T_object_part.tolist(),
             }
             for each in files
         ],

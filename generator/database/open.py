@@ -73,21 +73,14 @@ def normal_url(url: str) -> URL:
             fix = "write sqlite:///lab.db alone; a file with '?' in its name as a plain file name"
             raise DatabaseError(f"'{url}' has settings that are not known", fix=fix)
         return URL.create("sqlite", database=parsed.database)
+    if "@" in (parsed.host or ""):
+        raise DatabaseError(f"'{url}' has an @ in its password", fix="write it as %40")
     if parsed.drivername in ("postgresql", "postgres", "postgresql+psycopg"):
         return parsed.set(drivername="postgresql+psycopg")
     raise DatabaseError(
         f"cannot keep objects in '{parsed.drivername}'; allowed are sqlite and postgresql",
         fix="write sqlite:///lab.db or postgresql://user@host:5432/name",
     )
-
-
-def without_password(url: str) -> str:
-    """Return a database's address as it may be shown.
-
-    >>> without_password("postgresql://lab:secret@host/objects")
-    'postgresql://lab:***@host/objects'
-    """
-    return make_url(url).render_as_string(hide_password=True) if "://" in url else url
 
 
 def part_file(url: URL, file: str) -> str:

@@ -23,6 +23,7 @@ import numpy as np
 from sqlalchemy import URL, Connection, Engine, ExceptionContext, text
 from sqlalchemy.exc import DBAPIError, OperationalError, SQLAlchemyError
 
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.foreign import DAMAGE
 from encoded_objects.base.output import message
 from generator.errors import DatabaseError, GeneratorError
@@ -174,23 +175,26 @@ def place_of(url: URL) -> str:
     """Return how messages name a database: a SQLite file by its path, others without password."""
     if url.get_backend_name() == "sqlite":
         return url.database or "sqlite"
-    return url.set(drivername=url.get_backend_name()).render_as_string(hide_password=True)
+    return without_password(url.set(drivername=url.get_backend_name()).render_as_string())
 
 
 def explain_error(error: Exception, url: URL) -> DatabaseError:
     """Return the cause and the way out of what the database driver reports, or a row says."""
     place = place_of(url)
+    restore = _RESTORE if url.get_backend_name() == "sqlite" else _RESTORE_SERVER
     if not isinstance(error, DBAPIError):
         reason = str(error).partition("\n")[0][:100]
         cause = f"the database is damaged, it holds what was never written: {reason}"
-        return DatabaseError(cause, fix=_RESTORE, place=place)
+        return DatabaseError(cause, fix=restore, place=place)
     # SQLite names its errors (SQLITE_BUSY), PostgreSQL numbers them (SQLSTATE 55P03).
     code = getattr(error.orig, "sqlite_errorname", None) or getattr(error.orig, "sqlstate", None)
+    if code is None and error.connection_invalidated:
+        code = _GONE
     said = str(error.orig).strip().splitlines()
     first_line = said[0] if said else type(error.orig).__name__
     for codes, cause, fix in _MEANINGS:
         if code is not None and code.startswith(codes):
-            return DatabaseError(cause, fix=fix, place=place)
+            return DatabaseError(cause.format(first_line), fix=fix, place=place)
     if code in _RACES:
         fix = "run the same command again"
         return WriteConflictError("another writer was first", fix=fix, place=place)
@@ -208,17 +212,20 @@ def explain_error(error: Exception, url: URL) -> DatabaseError:
                 place=place,
             )
         cause = f"the database refuses the object: {first_line}"
-        return DatabaseError(cause, fix=_RESTORE, place=place)
+        return DatabaseError(cause, fix=restore, place=place)
     if code is None and url.get_backend_name() == "sqlite":
         return DatabaseError(f"the database is damaged: {first_line}", fix=_RESTORE, place=place)
     if code is None:
         return connection_error(str(error.orig), url, place)
-    return DatabaseError(f"the database failed: {first_line} ({code})", fix=_RESTORE, place=place)
+    return DatabaseError(f"the database failed: {first_line} ({code})", fix=restore, place=place)
 
 
 _RACES = ("40001", "40P01")  # serialization failure, deadlock
 _NOT_UNIQUE = ("SQLITE_CONSTRAINT_PRIMARYKEY", "SQLITE_CONSTRAINT_UNIQUE", "23505")
 
+_GONE = "08006"  # SQLSTATE: connection failure
+
+_RESTORE_SERVER = "see the server's log; restore the database from a copy if it is damaged"
 _RESTORE = "restore it from a copy, or rescue what is left with `sqlite3 FILE .recover`"
 
 _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
@@ -243,6 +250,16 @@ _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
         ("SQLITE_FULL", "53100"),
         "no space is left for the database",
         "free some space, then run the same command again",
+    ),
+    (
+        ("SQLITE_IOERR",),
+        "the database file cannot be read or written: {}",
+        "check the disk, its space and the limit of a file's size, then run the same command again",
+    ),
+    (
+        ("57", "08", "53"),
+        "the server ended the connection, what was begun is undone: {}",
+        "run the same command again",
     ),
 )
 

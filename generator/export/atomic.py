@@ -229,5 +229,6 @@ _FIXES = {
     errno.EEXIST: "a file stands where the folder should be: move it or choose another -o",
     errno.EISDIR: "a folder has the name of the file: move it or choose another -o",
     errno.ENAMETOOLONG: "give the object a shorter name",
-    errno.ENOENT: "the folder was removed meanwhile: run the command again",
+    errno.ENOENT: "no folder can be made there, or it was removed meanwhile: choose another -o, or "
+    "run the command again",
 }

@@ -90,6 +90,7 @@ def encode(
     )
     rest = part_of_progress(progress, 0.1, 1.0)
     files: tuple[Path, ...] = ()
+    to_print: tuple[Path, ...] = ()
     if engine is None or dry_run:
         with read_transaction(engine) if engine else nullcontext() as connection:
             made, used = _dry_run(connection, plans, replace, rest)
@@ -113,7 +114,7 @@ def encode(
         else:
             from generator.pipeline.sets import make_set, set_folder  # loads what sets alone need
 
-            made, files = make_set(
+            made, files, to_print = make_set(
                 engine, url, to_make, set_folder(to_make, folder), jobs, rest,
                 slice_plates=slice_plates,
             )  # fmt: skip
@@ -121,7 +122,7 @@ def encode(
             used = occupancy(connection, plans[0].array).used
     array = plans[0].array
     seconds = time.perf_counter() - began
-    return Encoded(tuple(made), url, array.rows, array.columns, used, seconds, files)
+    return Encoded(tuple(made), url, array.rows, array.columns, used, seconds, files, to_print)
 
 
 def plan_in_lab(
@@ -193,6 +194,7 @@ def _dry_run(
         placed = next(places)
         step(f"building {plan.spec.name}", 0.5)
         parts, warnings = parts_of(plan, placed.layout)
+        warnings += (placed.gone,) if placed.gone else ()
         faces = face_reports(plan, placed.layout, smallest=True)
         one = describe_object(plan, placed.layout, len(parts), warnings, faces)
         made.append(replace_fields(one, reused=placed.reused))

@@ -14,11 +14,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.output import some_of
 from generator.alphabet.figures import in_figures
 from generator.database.registered import RegisteredPart
 from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.atomic import Staging
 from generator.export.bambu import PLATES_MAX
+from generator.export.bed import arrange_plates
 from generator.export.formats import EXPORTERS, ExportedObject, stage_formats
 from generator.export.preview import preview_png
 from generator.export.threemf import SlicerSettings
@@ -31,7 +33,7 @@ from generator.pipeline.progress import Progress
 from generator.pipeline.sheet import SheetPlate, build_sheet
 from generator.polyhedron import Polyhedron, face_polygon
 from generator.polyhedron.shapes import FRAME_STEP_MM
-from generator.solid import Mesh, Part, emboss_whole, panels, prove_closed, triangles
+from generator.solid import Mesh, Part, box, emboss_whole, panels, prove_closed, triangles
 from generator.solid.marks import NameMark
 from generator.solid.panels import with_name
 from generator.spec.problem import error_location
@@ -114,11 +116,6 @@ def stage(
             else:
                 name = staged["3mf"][2 * number].path.name
             on_sheet.append(SheetPlate(name, plate.plate, cost))
-        large = [str(n) for n, plate in enumerate(plates, 1) if not plate.plate.fits]
-        if large:
-            width, depth = plan.printer.bed_mm
-            bed = f"the bed of {plan.printer.name}, {width:g} x {depth:g} mm"
-            warnings += (f"plate {', '.join(large)}: larger than {bed}; take a larger printer",)
     if any(EXPORTERS[name].robot for name in formats):
         warnings += exported.robot.warnings
     made = describe_object(plan, layout, len(parts), warnings, face_reports(plan, layout), fit=fit)
@@ -166,6 +163,21 @@ def settings_of(plan: ObjectPlan, layout: Layout) -> SlicerSettings | None:
 
 def parts_of(plan: ObjectPlan, layout: Layout) -> BuiltParts:
     """Return the parts of an object, panels or the whole body, and what they lack."""
+    parts, warnings = _built(plan, layout)
+    width, depth = plan.printer.bed_mm
+    sizes = [(high - low)[:2].tolist() for low, high in map(box, parts)]
+    large = [
+        part.name
+        for part, size in zip(parts, sizes, strict=True)
+        if not all(plate.fits for plate in arrange_plates([size], (width, depth)))
+    ]
+    if large:
+        bed = f"the bed of {plan.printer.name}, {width:g} x {depth:g} mm"
+        warnings += (f"larger than {bed}: {some_of(large)}; take a larger printer",)
+    return parts, warnings
+
+
+def _built(plan: ObjectPlan, layout: Layout) -> BuiltParts:
     spec = plan.spec
     if spec.parts == "whole":
         stance = stance_of(plan, layout)

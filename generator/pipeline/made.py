@@ -62,6 +62,7 @@ class Encoded:
     used_cells: int  #: of the array, by all objects in the database
     seconds: float
     set_files: tuple[Path, ...] = ()  #: of a set: its plates, overview and packing list
+    to_print: tuple[Path, ...] = ()  #: of these, what is opened to print all plates
 
     @property
     def name(self) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
+from encoded_objects.base.output import some_of
 from generator.database.open import part_file, part_path
 from generator.database.read import find_object, read_parts
 from generator.database.register import ObjectRecord, register
@@ -138,4 +139,10 @@ def object_record(
 
 def _commit(made: MadeObject, placed: PlacedObject, staging: Staging) -> MadeObject:
     written = tuple(file.path for file in staging.commit())
-    return dataclasses.replace(made, files=written, reused=placed.reused)
+    new = {os.path.normpath(path.absolute()) for path in written}
+    left = [path for path in placed.old_files if str(path) not in new and path.is_file()]
+    warnings = (*made.warnings, placed.gone) if placed.gone else made.warnings
+    if left:
+        names = some_of([path.name for path in left])
+        warnings += (f"files of what it replaces stay in {left[0].parent}: {names}",)
+    return dataclasses.replace(made, files=written, reused=placed.reused, warnings=warnings)

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from sqlalchemy import Connection
 
 from generator.database.cells import cells_of, find_array, occupancy
-from generator.database.read import find_object, read_layout
+from generator.database.open import part_path
+from generator.database.read import find_object, read_layout, read_object
 from generator.database.register import require_same_spec
+from generator.database.registered import RegisteredObject
+from generator.errors import LayoutError
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Cells, Occupancy
 from generator.layout.placement import Layout
@@ -19,6 +24,8 @@ from generator.solid import Part
 from generator.spec.problem import error_location
 
 BuiltParts = tuple[tuple[Part, ...], tuple[str, ...]]  #: the parts, and what they lack
+
+SMALL_MODEL_MM = 12.0  #: a model of another unit: no place can be told on it
 
 NO_CELLS = (np.empty(0, np.int64), np.empty(0, np.int64))
 
@@ -31,6 +38,8 @@ class PlacedObject:
     taken: int  #: cells that other objects hold
     reused: bool  #: registered before, on these cells
     replaces: bool  #: registered before from another spec, which goes
+    gone: str = ""  #: what to do with printed parts of the replaced object; empty: they stay good
+    old_files: tuple[Path, ...] = ()  #: of the replaced object
     built: BuiltParts | None = None  #: its parts, where a dry build made them
 
 
@@ -54,21 +63,51 @@ def place_object(
         The array is full, no place of the object can be identified, or another spec is registered
         under its name.
     """
-    others = occupancy_of(connection, plan) if taken is None else taken
-    replaces = False
+    everything = occupancy_of(connection, plan) if taken is None else taken
     known = None if connection is None else find_object(connection, plan.spec.name)
-    if connection is not None and known is not None:
-        if (array_id := find_array(connection, plan.array)) is not None:
-            others = others.without_cells(*cells_of(connection, known.object_id, array_id))
-        if not replace or known.same_spec(plan.meaning):
-            require_same_spec(connection, known, plan.meaning)
-            layout = read_layout(connection, plan.spec.name)
-            return PlacedObject(layout, others.used, reused=True, replaces=False)
-        replaces = True
-    with error_location(plan.spec.source, "shape"):
-        return PlacedObject(
-            lay_out_object(plan, others), others.used, reused=False, replaces=replaces
+    if connection is None or known is None:
+        layout = _lay_out_at_shape(plan, everything)
+        return PlacedObject(layout, everything.used, reused=False, replaces=False)
+    others = everything
+    if (array_id := find_array(connection, plan.array)) is not None:
+        others = others.without_cells(*cells_of(connection, known.object_id, array_id))
+    if not replace or known.same_spec(plan.meaning):
+        require_same_spec(connection, known, plan.meaning)
+        layout = read_layout(connection, plan.spec.name)
+        return PlacedObject(layout, others.used, reused=True, replaces=False)
+    layout, gone = _lay_out_at_shape(plan, others), ""
+    before = read_object(connection, known.name)
+    files = tuple(part_path(connection.engine.url, part.file) for part in before.parts)
+    if known.array_id == array_id and _same_places(before, plan, layout):
+        layout = before.layout  # its printed parts stay good
+    else:
+        gone = (
+            f"it replaces what was registered under this name ({known.utc}), whose cells are free "
+            "for others: destroy its printed parts"
         )
+        with suppress(LayoutError):  # beside it, so that its printed parts are not read as the new
+            layout = lay_out_object(plan, everything)
+    return PlacedObject(layout, others.used, False, True, gone=gone, old_files=files)
+
+
+def _same_places(before: RegisteredObject, plan: ObjectPlan, layout: Layout) -> bool:
+    """Whether a changed spec has the same solid, with symbols at the same places."""
+    old = before.layout
+    return (
+        np.array_equal(before.polyhedron.vertices, plan.polyhedron.vertices)
+        and (old.pitch_mm, old.blank_faces) == (layout.pitch_mm, layout.blank_faces)
+        and len(old.faces) == len(layout.faces)
+        and all(
+            np.array_equal(a.centres_mm, b.centres_mm)
+            for a, b in zip(old.faces, layout.faces, strict=True)
+        )
+    )
+
+
+def _lay_out_at_shape(plan: ObjectPlan, others: Occupancy) -> Layout:
+    """Lay out as `lay_out_object`; errors name the line of the shape."""
+    with error_location(plan.spec.source, "shape"):
+        return lay_out_object(plan, others)
 
 
 def occupancy_of(connection: Connection | None, plan: ObjectPlan) -> Occupancy:
@@ -118,6 +157,16 @@ def lay_out_object(plan: ObjectPlan, others: Occupancy | Cells) -> Layout:
         )
 
     layout = attempt(allow_blank_faces=True)
-    if len(layout.blank_faces) == len(plan.polyhedron.faces):
+    if len(layout.blank_faces) < len(plan.polyhedron.faces):
+        return layout
+    try:
         return attempt(allow_blank_faces=False)  # says what to change
-    return layout
+    except LayoutError as error:
+        size = np.ptp(plan.polyhedron.vertices, axis=0).tolist()
+        if plan.spec.shape.file is None or max(size) > SMALL_MODEL_MM:
+            raise
+        fix = (
+            f"check the model's unit: it is {' x '.join(f'{v:.3g}' for v in size)} mm; in inches "
+            "it needs scale: 25.4, in metres 1000"
+        )
+        raise LayoutError(error.cause, fix=fix, place=error.place) from None

@@ -70,8 +70,8 @@ def write_set(
     *,
     slice_plates: bool = False,
     replace: bool = False,
-) -> tuple[Path, ...]:
-    """Write the files of a set; return their paths.
+) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+    """Write the files of a set; return their paths, and those that print all plates.
 
     Raises
     ------
@@ -97,10 +97,16 @@ def write_set(
     ]
     projects = _projects(name, plates, of_bambu)
     models += [project.file for project in projects]
+    packed_in = {number for project in projects for number in project.plates}
+    to_print = tuple(folder / project.file for project in projects) + tuple(
+        folder / f"{name}-plate-{number + 1}.3mf"
+        for number in range(len(plates))
+        if with_models and number not in packed_in
+    )
     overview = [f"{name}-overview.pdf"] if can_draw() else []
     names = [f"{name}-packing.csv", f"{name}-build.html", *overview, *models]
     if not slice_plates and _same_files(folder, names, listed):
-        return tuple(folder / each for each in names)
+        return tuple(folder / each for each in names), to_print
     costs: list[PlateCost | None] = [None] * len(plates)
     with Staging(folder) as staging:
         if models:
@@ -137,7 +143,7 @@ def write_set(
         if not replace:
             staging.refuse_others()
         staging.commit()
-    return tuple(folder / each for each in names)
+    return tuple(folder / each for each in names), to_print
 
 
 def build_sheet_path(job: MakeJob) -> Path:

@@ -39,8 +39,10 @@ def make_set(
     progress: Progress,
     *,
     slice_plates: bool = False,
-) -> tuple[list[MadeObject], tuple[Path, ...]]:
+) -> tuple[list[MadeObject], tuple[Path, ...], tuple[Path, ...]]:
     """Make the objects of a set, and the files of the set in `folder`; return both, in order.
+
+    Last come those of the files that are opened to print all plates.
 
     Processes open the database at `url` for themselves; `processes` None: one on each processor,
     if there is enough to do.
@@ -72,7 +74,7 @@ def make_set(
         found = workers.done(list(tasks.values()), part_of_progress(progress, 0.1, 0.8))
         made |= dict(zip(tasks, found, strict=True))
         objects = [made[number] for number in range(len(to_make))]
-        files = () if not any(job.formats for job in to_make) else write_set(
+        files, to_print = ((), ()) if not any(job.formats for job in to_make) else write_set(
             [(job, one.layout) for job, one in zip(to_make, objects, strict=True)],
             folder, workers, part_of_progress(progress, 0.8, 1.0), slice_plates=slice_plates,
             replace=ours,
@@ -80,7 +82,7 @@ def make_set(
     if files and not can_draw():
         notice = f"the set has no overview: matplotlib is not installed; {install_line('report')}"
         objects[0] = replace(objects[0], warnings=(*objects[0].warnings, notice))
-    return objects, files
+    return objects, files, to_print
 
 
 def set_folder(to_make: Sequence[MakeJob], folder: Path | None) -> Path:

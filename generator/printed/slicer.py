@@ -317,7 +317,7 @@ def _call(command: Sequence[str], written: Path, file: Path, what: str, **more: 
         raise PrintError(
             f"PrusaSlicer did not end within {TIMEOUT_S} s",
             fix=f"print a smaller {what}",
-            place=str(file),
+            place=file.name,
         ) from None
     if done.returncode or not written.exists():
         lines = (done.stderr + done.stdout).splitlines()
@@ -325,7 +325,7 @@ def _call(command: Sequence[str], written: Path, file: Path, what: str, **more: 
         raise PrintError(
             f"PrusaSlicer refuses: {said[-1] if said else f'exit code {done.returncode}'}",
             fix=f"open the {what} in PrusaSlicer and look",
-            place=str(file),
+            place=file.name,
         )
 
 

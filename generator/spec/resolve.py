@@ -122,6 +122,12 @@ def resolve(
         with _collected(problems):
             printer = _described_printer(settings.print.printer, tree)
     alphabet = named or ALPHABETS[defaults.alphabet]
+    if 0 < printer.nozzle_mm < printer.layer_mm:
+        refuse(
+            "print.printer.layer, print.printer",
+            f"layers of {printer.layer_mm:g} mm do not leave a nozzle of {printer.nozzle_mm:g} mm",
+            f"set layer to {0.75 * printer.nozzle_mm:g} mm or less",
+        )
     style = _style(settings, defaults, alphabet, printer)
     coarser = ""
     if order is not None and alphabet.order < order:

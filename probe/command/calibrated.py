@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.console import FAILED, interruption
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.files import refuse_taken
 from encoded_objects.base.foreign import MOST_TEXT, foreign_bytes
 from encoded_objects.base.output import message, pairs, warning, write, write_json
@@ -167,6 +168,9 @@ def board_from(text: str) -> Electronics | None:
 def _one_sensor(given: list[LoadRecording]) -> str:
     names = {Recording(load.recording).origin.sensor for load in given}
     if len(names) != 1 or "" in names:
+        if names == {""}:
+            fix = "say which one it is: --sensor NAME"
+            raise CalibrationError("the recordings do not name their sensor", fix=fix)
         shown = ", ".join(sorted(name or "not named" for name in names))
         raise CalibrationError(
             f"the recordings are of these sensors: {shown}",
@@ -380,7 +384,7 @@ def guide_loads(options: GuideOptions) -> int:
     guide = CalibrationGuide(options.forces_n, options.seconds)
     with Client(port, sensor=options.sensor) as client:
         sensor = name_of(client.wait_for_ident(), options.url)
-        message(f"{sensor or options.url}; recordings go to {folder}")
+        message(f"{sensor or without_password(options.url)}; recordings go to {folder}")
         given: list[LoadRecording] = []
         while True:
             while not guide.done:

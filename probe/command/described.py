@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base import output
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.output import count_of, pairs, write_json
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from encoded_objects.base.sensor_type_file import (
@@ -75,7 +76,7 @@ def _describe_probe(url: str, sensor: int | None, seconds: float, sensor_type: s
         ident, device = client.wait_for_ident(), client.device
         counts, notices = client.statistics(), client.notices()
     values = {
-        "url": url,
+        "url": without_password(url),
         "sensor": name_of(ident, url),
         "shape": list(shape),
         "sensor_type": None if kind is None else kind.name,
@@ -85,7 +86,7 @@ def _describe_probe(url: str, sensor: int | None, seconds: float, sensor_type: s
         "peak": peak,
         "notices": notices,
     }
-    lines = {"port": url}
+    lines = {"port": without_password(url)}
     if ident is not None:
         major, minor = ident.firmware
         settling = f", settling {ident.settling_us:g} us" if ident.settling_us else ""

@@ -32,7 +32,7 @@ from rich.segment import Segment, Segments
 from rich.style import Style
 
 from encoded_objects.base.console import INTERRUPTED, interruption
-from encoded_objects.base.errors import MissingExtraError, require
+from encoded_objects.base.errors import MissingExtraError, require, without_password
 from encoded_objects.base.files import staged_file
 from encoded_objects.base.output import message, write, write_json
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
@@ -407,7 +407,7 @@ def _head(state: LiveState) -> list[Segment]:
         head += [Segment("REC ", RED), Segment(recorded)]
     if state.paused:
         head += [Segment("PAUSED  ", RED)]
-    return [*head, Segment(state.url)]
+    return [*head, Segment(without_password(state.url))]
 
 
 def _numbers(

@@ -27,6 +27,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.sensor_type import SensorType
 from probe.frame import WRIST, Frame
 
@@ -56,6 +57,14 @@ class RecordingOrigin:
     units: str = "counts"
     sensor_type: str = ""  #: as YAML, `sensor_type_text`; empty: not known
     more: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        """Keep no password, also of a recording that has one."""
+        more = {
+            name: without_password(value) if isinstance(value, str) else value
+            for name, value in self.more.items()
+        }
+        object.__setattr__(self, "more", MappingProxyType(more))
 
     def texts(self) -> dict[str, str]:
         """Return the fields that are texts, by their names, as `of_texts` takes them."""
@@ -136,17 +145,6 @@ def join_blocks(blocks: Sequence[FrameBlock], shape: tuple[int, int]) -> FrameBl
     counts, t_ns, seq, wrist = map(np.concatenate, arrays)
     pose = np.concatenate(poses) if known else None
     return FrameBlock(counts, t_ns, seq, wrist, pose).frozen()
-
-
-def are_rigid(poses: NDArray[Any]) -> bool:
-    """Tell whether poses (n, 4, 4) are rigid transforms, or NaN."""
-    known = poses[~np.isnan(poses).all(axis=(1, 2))].astype(np.float64)
-    turn = known[:, :3, :3]
-    return bool(
-        np.isfinite(known).all()
-        and np.allclose(turn @ turn.transpose(0, 2, 1), np.eye(3), atol=1e-6)
-        and (known[:, 3] == (0, 0, 0, 1)).all()
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.files import staged_file
 from encoded_objects.base.sensor_type import (
     SensorType,
@@ -223,7 +224,7 @@ class SimulatedProbe:
             T = self.path.T_base_object
             scan = {"scan": self.options.scan, "T_base_object": None if T is None else T.tolist()}
         return {
-            "target": self.target, "object": self.scene.object_name or None,
+            "target": without_password(self.target), "object": self.scene.object_name or None,
             "face": self.scene.face or None, "sensor_type": self.sensor.name,
             "overlay": self.overlay, "level": self.level,
             "seed": self.options.seed, "frames_per_touch": self.options.frames,

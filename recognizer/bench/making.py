@@ -14,8 +14,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from generator.database.open import normal_url
-from generator.database.transaction import place_of
+from encoded_objects.base.errors import without_password
 from recognizer.bench.encode_object import LOOK_S, load_ahead, make_part, part_settings, try_part
 from recognizer.bench.options import LAB
 from recognizer.bench.session import Session
@@ -43,10 +42,10 @@ def add_making_routes(routes: APIRouter, session: Session) -> None:
     def settings() -> dict[str, Any]:
         schema = part_settings()
         load_ahead()
-        lab = place_of(normal_url(session.database or LAB))  # without its password
+        lab = without_password(session.database or LAB)
         return {
             "schema": schema, "sensor_type": session.sensor.name,
-            "lab": lab, "new": not session.database,
+            "lab": lab.removeprefix("sqlite:///"), "new": not session.database,
         }  # fmt: skip
 
     @routes.post("/make/try")

@@ -24,6 +24,7 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.sensor_type import usual_force_n
 from generator.database.open import open_database
 from generator.database.read import object_entry, read_object, read_parts
@@ -143,17 +144,19 @@ def api_routes(session: Session, ports: Ports, parts: Path | None) -> APIRouter:
 
 
 def _add_session_routes(routes: APIRouter, session: Session, ports: Ports) -> None:
-    def port_list() -> list[dict[str, Any]]:
+    def offered() -> dict[str, tuple[str, str]]:
+        """Return URL and label of each port, by the URL as it is shown."""
         there = [(entry.url, f"{entry.device} {entry.vendor} {entry.product}".strip())
                  for entry in list_ports()]  # fmt: skip
-        return [{"url": url, "label": label} for url, label in dict([*ports, *there]).items()]
+        labels = [(url, without_password(label)) for url, label in (*ports, *there)]
+        return {without_password(url): (url, label) for url, label in labels}
 
     @routes.get("/bench")
     def bench() -> dict[str, Any]:
         sensor, reader = session.sensor, session.recognition.reader
         return {
-            "ports": port_list(),
-            "database": session.database,
+            "ports": [{"url": shown, "label": label} for shown, (_, label) in offered().items()],
+            "database": without_password(session.database),
             "folder": str(session.folder),
             "filters": FILTERS,
             "sensor": {
@@ -167,12 +170,13 @@ def _add_session_routes(routes: APIRouter, session: Session, ports: Ports) -> No
 
     @routes.post("/port")
     def port(body: _Port) -> dict[str, Any]:
-        if body.url and body.url not in {entry["url"] for entry in port_list()}:
+        url, _ = offered().get(body.url, ("", ""))
+        if body.url and not url:
             raise UnknownError(
                 f"{body.url[:80]} is none of the ports that are offered",
                 fix="choose one from the list, or start open-bench with --port",
             )
-        session.open(body.url, body.sensor)
+        session.open(url, body.sensor)
         return session.as_json()
 
     @routes.post("/sensor")

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.sensor_type import SensorType
 from probe.frame import Frame
 from probe.port.url import address_of
@@ -177,7 +178,7 @@ class Session:
         with self.changed():
             self.database = self.recognition.database = database
             self.recognition.reload()
-            self.note(f"objects are those of {database}")
+            self.note(f"objects are those of {without_password(database)}")
 
     def touch_next(self) -> None:
         """Let the simulated probe make the step that the newest answer proposes."""
@@ -212,7 +213,7 @@ class Session:
         """Return the state for the page."""
         with self.lock:
             return {
-                "port": self._url,
+                "port": without_password(self._url),
                 "feed": self.feed.as_json(),
                 "simulated": self.simulation is not None,
                 **self.frames.as_json(),

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.options import Application, Argument, Json, Option, command
 from recognizer.command.options import Calibration, Database
 
@@ -70,8 +71,8 @@ def as_built(
         write(as_built_sentences(found, verdict))
     if printer is not None:
         name = " ".join(filter(None, (printer.printer or "its printer", printer.material)))
-        message(f"kept in {database}; parts of {name} that are not known by touches of their "
-                f"own: {as_built_sizes(printer)}")  # fmt: skip
+        message(f"kept in {without_password(database)}; parts of {name} that are not known by "
+                f"touches of their own: {as_built_sizes(printer)}")  # fmt: skip
     return 0
 
 

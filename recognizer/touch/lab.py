@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, Engine
 
 from encoded_objects.base.compiled import addresses
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.output import count_of
 from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
 from generator.array import FoldedArray, ProductArray
@@ -192,7 +193,7 @@ class Lab:
             count_of(faces, "face"),
             count_of(symbols, "symbol"),
         )
-        return f"{self.url}: {', '.join(held)}"
+        return f"{without_password(self.url)}: {', '.join(held)}"
 
 
 def open_lab(database: str | Path) -> Lab:

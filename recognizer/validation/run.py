@@ -26,6 +26,7 @@ from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.output import ProgressBar
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from generator.database.open import normal_url
@@ -119,10 +120,10 @@ def _check_same(before: Work, now: Work, folder: Path) -> None:
 
 
 def relative_database(database: str, folder: Path) -> str:
-    """Return how a record names a database: a file from the folder, a server by its URL."""
+    """Return how a record names a database: a file from the folder, a server without password."""
     url = normal_url(database)
     if url.get_backend_name() != "sqlite" or url.database is None:
-        return database
+        return without_password(database, "")
     return Path(os.path.relpath(Path(url.database).absolute(), folder.absolute())).as_posix()
 
 
@@ -185,7 +186,9 @@ def prepare_run(
             place=str(folder),
         )
     known = before.database if before else str(folder / LAB)
-    name = relative_database(database or known, folder)
+    name = database or known
+    if normal_url(name).get_backend_name() == "sqlite":
+        name = relative_database(name, folder)
     names = tuple(map(str, specs)) if specs or before is None else before.specs
     work = _work(folder, campaign, name, "", code_digest(), names)
     if before is None:  # else its set is there: it was made before the record was written

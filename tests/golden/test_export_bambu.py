@@ -12,6 +12,7 @@ from reference.bambu_project import read_project
 from reference.cube_panels import cube_panels
 
 from generator.command import run as run_command
+from generator.command.made_report import next_step
 from generator.errors import WriteError
 from generator.export.bambu import PLATES_MAX, plate_origins_mm, project_3mf, project_names
 from generator.export.threemf import PrintFile, SlicerSettings, print_files
@@ -170,6 +171,10 @@ def test_a_set_has_a_project_for_each_of_its_printers(tmp_path: Path) -> None:
     made = encode(read_specs([spec]), folder=tmp_path, database=url, jobs=1)
     names = sorted(path.name for path in made.set_files if "-bambu" in path.name)
     assert names == ["lab-bambu-1.3mf", "lab-bambu-2.3mf"]
+    assert [path.name for path in made.to_print] == [*names, "lab-plate-4.3mf"]
+    said = next_step(made)
+    assert f"lab-bambu-1.3mf ... lab-bambu-2.3mf in {tmp_path} (in Bambu Studio or OrcaS" in said
+    assert f"and lab-plate-4.3mf in {tmp_path} (in PrusaSlicer lab-plate-4-prusaslicer.3mf)" in said
     first, second = (read_project((tmp_path / name).read_bytes()) for name in names)
     held = [{one.name.split("-F")[0] for one in plate} for plate in first.plates]
     assert held == [{"A"}, {"B"}]

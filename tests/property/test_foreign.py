@@ -132,7 +132,7 @@ FOUND = {
         f"{value} in {table}.{column}": (
             "database",
             "lab.db",
-            partial(_lab_where, f'update {table} set "{column}" = {value}'),
+            partial(_lab_where, f'update or replace {table} set "{column}" = {value}'),
             "never written",
         )
         for table, columns, value in (

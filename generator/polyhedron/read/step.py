@@ -48,6 +48,8 @@ def read_step(content: bytes, place: str, scale: float = 1.0) -> Polyhedron:
     if not content.lstrip().startswith(_START):
         shown = content[:20].decode("ascii", "replace").strip()
         cause = f"it starts with '{shown}', not with '{_START.decode()}': no STEP file"
+        if not shown.isprintable() or "\ufffd" in shown:
+            cause = "it is no text: no STEP file"
         raise ShapeError(cause, fix="export the model as STEP", place=place)
     if _END not in content[-200:]:
         cause = f"it ends at byte {len(content)} without '{_END.decode()}'"

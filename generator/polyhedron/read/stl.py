@@ -15,6 +15,7 @@ from generator.polyhedron.read.soup import Soup, soup_of_triangles
 MOST_TRIANGLES = 500_000  #: of a mesh: bounds time and memory
 MOST_PART_TRIANGLES = 20_000_000  #: of a part that was written; in binary STL they take 1 GB
 _AGAIN = "export the model again; the file may be cut off"
+_MARK = b"\xef\xbb\xbf"  # of bytes' order, before some texts
 _HEAD, _RECORD = 84, 50
 _FRAME = {b"solid", b"facet", b"outer", b"endloop", b"endfacet", b"endsolid"}
 
@@ -33,8 +34,9 @@ def stl_triangles(
     programs leave. Raises `ShapeError` if it is no STL, is cut short, too large, or holds NaN or
     infinity.
     """
-    if _is_ascii(content):
-        return _ascii_triangles(content, place, most)
+    text = content.removeprefix(_MARK)
+    if _is_ascii(text):
+        return _ascii_triangles(text, place, most)
     return _binary_triangles(content, place, most, padded)
 
 

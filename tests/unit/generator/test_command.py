@@ -1,5 +1,6 @@
 """The command `encode-object` as people run it: interruption, what is registered, the lab's key."""
 
+import asyncio
 import json
 import os
 import shutil
@@ -12,8 +13,11 @@ from contextlib import chdir, closing
 from importlib import import_module
 from pathlib import Path
 
+import httpx
 import pytest
 
+from encoded_objects.base.errors import EncodedObjectsError, without_password
+from encoded_objects.base.sensor_type import SensorType
 from generator.array import profile
 from generator.array.lab_key import lab_key_of
 from generator.command import run
@@ -22,7 +26,13 @@ from generator.database.lab import lab_arrays, lab_key
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
+from probe.command import run as probe_sensor
+from recognizer.bench.app import application
+from recognizer.bench.broker import Broker
+from recognizer.bench.session import Session
 from recognizer.touch.lab import open_lab
+from recognizer.validation.campaign import Campaign
+from recognizer.validation.run import prepare_run, read_record
 
 KEY, OTHER = "0123-4567-89AB-CDER", "F1XT-VRES-0000-000Q"
 V2 = Path(__file__).parents[3] / "fixtures" / "database" / "v2.db"
@@ -182,6 +192,56 @@ def test_passwords_are_not_shown(cube, capsys, database_on):
         text, messages = capsys.readouterr()
         assert "postgres:***@" in text
         assert "secret" not in text + messages
+
+
+async def open_at_bench(url, face):
+    """Return what open-bench says of a database, and of its first port once that is open."""
+    broker = Broker()
+    with closing(Session(url, Path.cwd(), SensorType(), broker)) as session:
+        app = application(session, broker, ((f"sim:{face}", "face"),), None)
+        bench = httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://bench")
+        async with bench:
+            offered = (await bench.get("/api/bench")).json()
+            port = {"url": offered["ports"][0]["url"]}
+            return offered, (await bench.post("/api/port", json=port)).json()
+
+
+def test_no_password_is_kept(cube, capsys, database_on):
+    with database_on("postgresql") as url:
+        url = url.replace("postgres@", "postgres:secret@", 1)
+        assert run(["export", "x.db"]) == run(["import", "x.db", "--database", url]) == 0
+        face = f"{url}#Cube/F1"
+        assert probe_sensor(["simulate", face, "-o", "a.h5", "--truth", "a.json"]) == 0
+        assert probe_sensor(["record", f"sim:{face}", "-o", "b.h5", "--frames", "2"]) == 0
+        assert probe_sensor(["info", f"sim:{face}", "--seconds", "0.1"]) == 0
+        assert probe_sensor(["simulate", f"{url}#Nope/F1"]) == 2
+        work = prepare_run(Path.cwd(), Campaign(kinds=(("face", 1.0),)), [], url, resume=False)
+        assert work.database == url
+        assert read_record(Path.cwd()).database == url.replace(":secret", "")
+        offered, opened = asyncio.run(open_at_bench(url, face))
+        assert offered["database"] == url.replace("secret", "***")
+        assert opened["port"] == offered["ports"][0]["url"]
+        assert "secret" not in json.dumps([offered, opened])
+    assert "secret" not in "".join(capsys.readouterr())
+    kept = {path.name: path.read_bytes() for path in Path.cwd().glob("*.*") if path.is_file()}
+    assert {"a.h5", "a.json", "b.h5", "asked.json"} <= kept.keys()
+    assert not [name for name, content in kept.items() if b"secret" in content]
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        ("lab.db", "lab.db"),
+        ("sqlite:///a:b@c.db", "sqlite:///a:b@c.db"),
+        ("postgresql://u@h:5432/d#A/F1", "postgresql://u@h:5432/d#A/F1"),
+        ("sim:postgresql+psycopg://u:p%20/ q@h/d#A/F1", "sim:postgresql+psycopg://u:***@h/d#A/F1"),
+        ("no postgres://:p@ss@h/d, or", "no postgres://:***@h/d, or"),
+        ("postgresql://h/d?user=u&password=p&a=b#A", "postgresql://h/d?user=u&password=***&a=b#A"),
+    ],
+)
+def test_only_passwords_are_hidden(given, shown):
+    assert without_password(given) == shown
+    assert str(EncodedObjectsError(given)) == shown
 
 
 def test_a_new_lab_draws_a_key_and_keeps_it(capsys, monkeypatch):

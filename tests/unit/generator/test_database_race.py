@@ -1,8 +1,12 @@
 """Writers that meet: who loses places anew, a bounded number of times, and says so in the end."""
 
+import os
+import resource
+import socket
 import threading
 
 import numpy as np
+import psycopg
 import pytest
 from sqlalchemy import text
 
@@ -167,6 +171,43 @@ def test_a_writer_without_turns_on_a_server_is_a_race_too(new_database):
     assert len(tries) == 2
     with read_transaction(engine) as connection:
         assert find_object(connection, "mine") is not None
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_a_connection_that_the_server_ends_is_no_damage(new_database, postgresql_server, told):
+    engine = open_database(new_database("postgresql"))
+
+    def work(connection):
+        register(connection, registration("lost", placed(connection)))
+        if told:
+            process = connection.scalar(text("SELECT pg_backend_pid()"))
+            with psycopg.connect(postgresql_server, autocommit=True) as other:
+                other.execute("SELECT pg_terminate_backend(%s, 10000)", [process])
+        else:  # as where a network fails
+            line = os.dup(connection.connection.driver_connection.fileno())
+            with socket.socket(fileno=line) as cut:
+                cut.shutdown(socket.SHUT_RDWR)
+        connection.execute(text("SELECT 1"))
+
+    with pytest.raises(DatabaseError, match="the server ended the connection") as caught:
+        retry_on_conflict(engine, work)
+    assert caught.value.fix == "run the same command again"
+    with read_transaction(engine) as connection:
+        assert list_objects(connection) == ()
+
+
+def test_no_room_for_a_database_is_no_damage(tmp_path):
+    engine = open_database(str(tmp_path / "lab.db"))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, hard))
+    try:
+        with pytest.raises(DatabaseError, match=r"cannot be read or written|no space") as caught:
+            retry_on_conflict(engine, lambda at: register(at, registration("one", placed(at))))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert "space" in caught.value.fix
+    with read_transaction(engine) as connection:
+        assert list_objects(connection) == ()
 
 
 def test_a_writer_waits_no_longer_than_it_is_told(lab_url):

@@ -131,6 +131,30 @@ def test_an_object_that_is_made_again_has_the_pitch_of_its_changed_spec(tmp_path
     assert pitches == [(10.0, False), (5.0, False), (5.0, True), (10.0, False)]
 
 
+def test_printed_parts_of_a_replaced_object_are_not_read_as_the_new_one(tmp_path):
+    def made(side: int, printer: str, **options):
+        text = f"name: A\nshape: {{cube: {side} mm}}\nprint: {{printer: {printer}}}\n"
+        (one,) = dry(tmp_path, text, replace=True, **options).objects
+        cells = {
+            cell for face in one.layout.faces
+            for cell in zip(face.rows.tolist(), face.columns.tolist(), strict=True)
+        }  # fmt: skip
+        return cells, " ".join(one.warnings)
+
+    first, said = made(60, "fdm-0.4", dry_run=False, formats=["step", "stl"])
+    assert said == ""
+    again, said = made(60, "prusa-mini", dry_run=False, formats=["stl"])  # printed ones stay good
+    assert again == first
+    assert "A-F1.step, A-F2.step" in said
+    assert "destroy" not in said
+    planned, said = made(50, "prusa-mini")
+    assert "destroy its printed parts" in said
+    other, said = made(50, "prusa-mini", dry_run=False, formats=["stl"])
+    assert other == planned
+    assert not other & first
+    assert "destroy its printed parts" in said
+
+
 def test_auto_goes_on_where_the_database_is_full(tmp_path):
     text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole, down: none}}\n"
     text += "symbols: {{alphabet: dense-4}}\ncopies: {}\n"
@@ -216,11 +240,25 @@ def test_each_face_is_told_with_the_least_size_that_shows_a_place(tmp_path):
          r"(?s)array 63x65 is full.*fix: .*set profile: auto"),
         ("cylinder: {diameter: 40 mm, height: 30 mm}}\nprint: {parts: panels}\n",
          r":3:16: error: a round face cannot be printed as a flat"),
+        ("file: inch.obj}\n",
+         r"(?s)no place can be identified.*it is 3 x 2 x 1.5 mm; in inches it needs scale: 25.4"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_made_is_refused_where_it_is_asked_for(tmp_path, settings, said):
+    box = [(x, y, z) for x in (0, 3) for y in (0, 2) for z in (0, 1.5)]
+    faces = ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4")
+    lines = [f"v {x} {y} {z}" for x, y, z in box] + [f"f {face}" for face in faces]
+    (tmp_path / "inch.obj").write_text("\n".join(lines))
     with pytest.raises(SpecError, match=said):
         dry(tmp_path, f"name: A\nshape: {{{settings}")
+
+
+def test_a_part_larger_than_the_bed_is_told_before_it_is_made(tmp_path):
+    text = "name: A\nshape: {tag: 400 x 20 mm}\n"
+    said = "larger than the bed of fdm-0.4, 250 x 210 mm: A; take a larger printer"
+    for options in ({}, {"dry_run": False, "formats": ["stl"]}):
+        (one,) = dry(tmp_path, text, **options).objects
+        assert said in one.warnings
 
 
 @pytest.mark.parametrize("copies", [1, 3])

@@ -367,6 +367,7 @@ def test_step_that_crashes_the_kernel_is_refused(written):
         ("a.obj", TETRAHEDRON + "?\n", "a.obj:9", "no word of OBJ"),
         ("a.obj", "v 0 0 0\n", "a.obj", "no faces"),
         ("a.step", "solid\n", "a.step", "it starts with 'solid'"),
+        ("a.step", bytes(84), "a.step", "it is no text"),
         ("a.step", "ISO-10303-21;\nHEADER;", "a.step", "ends at byte 21 without 'END-ISO-1"),
         ("a", "x", "a", "no suffix"),
     ],
@@ -376,6 +377,12 @@ def test_bad_files_give_place_cause_and_way_out(tmp_path, written, name, content
     assert error.place == str(tmp_path / place)
     assert says in error.cause
     assert error.fix
+
+
+def test_a_mark_of_bytes_order_before_an_ascii_stl_is_no_binary_one(written):
+    text = (SHAPES_FOLDER / "l_bracket_ascii.stl").read_bytes()
+    marked = read_shape(written("marked.stl", b"\xef\xbb\xbf" + text))
+    assert np.array_equal(marked.vertices, read_shape(written("plain.stl", text)).vertices)
 
 
 def test_missing_and_large_files(tmp_path, monkeypatch):

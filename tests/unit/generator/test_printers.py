@@ -51,6 +51,7 @@ def test_own_printers_count_by_their_values_known_ones_by_their_names(tmp_path) 
         ("{bed: 300 mm}", "c.yaml:3:24", "write bed: 250 x 210 mm"),
         ("mine.yaml", "mine.yaml:1:1", "did you mean 'layer'?"),
         ("none.yaml", "none.yaml", "did you mean"),
+        ("{like: ender-3, layer: 0.5 mm}", "c.yaml:3:41", "set layer to 0.3 mm or less"),
     ],
 )
 def test_what_is_wrong_with_a_printer_is_said_where_it_stands(tmp_path, text, place, fix) -> None:
