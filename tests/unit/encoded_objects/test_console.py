@@ -1,6 +1,7 @@
 """A command: its process, its help page, its options, declared once for it and for Python."""
 
 import json
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from encoded_objects.base import console
-from encoded_objects.base.errors import UsageError
+from encoded_objects.base.errors import UsageError, require
 from encoded_objects.base.options import Application, Argument, Json, Option, Options, command
 
 PROGRAM = """
@@ -56,6 +57,60 @@ def test_a_command_does_not_walk_through_what_stays():
 def test_plugins_that_somebody_asks_for_are_left():
     done = process(PROGRAM, PYDANTIC_DISABLE_PLUGINS="one")
     assert json.loads(done.stdout)[1] == "one"
+
+
+STREAMS = """
+import sys
+from encoded_objects.base import console
+from encoded_objects.base.options import Application, Json, command
+
+app = Application()
+
+@command(app)
+def act(as_json: Json = False):
+    print("an answer")
+    sys.stderr.write("a message\\n")
+    return {}
+
+console.main("do", lambda _: app, bare=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("result", "redirect", "code", "out", "err"),
+    [
+        ("0", "2>&-", 0, "an answer\n", ""),
+        ("0", ">&-", 0, "", "a message\n"),
+        ("open('made', 'x').fileno() < 3", "<&- >&- 2>&-", 0, "", ""),
+        ("0", ">/dev/full", 1, "", "cannot write: No space left on device"),
+        ("0", "--json >/dev/full", 1, "", "cannot write: No space left on device"),
+        ("open('gone/made', 'x')", "", 2, "an answer", "cannot write 'gone/made': No such file"),
+        ("open('/dev/full', 'w', 1).write('x\\n')", "", 1, "an answer", "cannot write: No space"),
+        ("bytearray(1 << 62)", "", 1, "an answer", "the memory is used up"),
+        ("bytearray(1 << 62)", "--json", 1, '"exit_code": 1', "a message\n"),
+    ],
+)
+def test_streams_that_are_closed_or_full(result, redirect, code, out, err, tmp_path):
+    (tmp_path / "do.py").write_text(STREAMS.format(result))
+    done = subprocess.run(
+        f"{sys.executable} do.py {redirect}", shell=True, cwd=tmp_path, capture_output=True,
+        text=True, env={"PATH": "", "PYTHONPATH": ":".join(sys.path)},
+    )  # fmt: skip
+    assert done.returncode == code, done.stderr
+    assert out in done.stdout
+    assert err in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_module_is_loaded_whole_before_an_interruption_counts(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    text = "import signal\nsignal.raise_signal(signal.SIGINT)\nwhole = 1\n"
+    (tmp_path / "slow_module.py").write_text(text)
+    with pytest.raises(KeyboardInterrupt):
+        require("slow_module", extra="cad", purpose="this")
+    assert sys.modules["slow_module"].whole
+    with pytest.raises(KeyboardInterrupt):  # as before
+        signal.raise_signal(signal.SIGINT)
 
 
 app = Application(help="Do things.", version_of="do")
