@@ -82,10 +82,21 @@ def _counts(values: ArrayLike, shape: tuple[int, ...] | None, name: str) -> NDAr
     return _freeze(array, np.uint16)
 
 
+def are_rigid(poses: NDArray[Any]) -> bool:
+    """Tell whether poses (n, 4, 4) are rigid transforms, or NaN."""
+    known = poses[~np.isnan(poses).all(axis=(1, 2))].astype(np.float64)
+    turn = known[:, :3, :3]
+    return bool(
+        np.isfinite(known).all()
+        and np.allclose(turn @ turn.transpose(0, 2, 1), np.eye(3), atol=1e-6)
+        and (np.linalg.det(turn) > 0).all()
+        and (known[:, 3] == (0, 0, 0, 1)).all()
+    )
+
+
 def _pose(values: ArrayLike) -> NDArray[np.float64]:
     pose = np.asarray(values, dtype=np.float64)
-    rotation = pose[:3, :3] if pose.shape == (4, 4) else np.zeros((3, 3))
-    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6) or not np.isfinite(pose).all():
+    if pose.shape != (4, 4) or np.isnan(pose).any() or not are_rigid(pose[None]):
         raise FrameError(
             "the pose is no rigid transform", fix="give a 4x4 matrix T_base_sensor, mm"
         )

@@ -158,6 +158,7 @@ class AnsweredShare:
     Logistic in the loaded share: larger sensors hang over borders, which membranes of gels bridge.
     """
 
+    tactel_mm: float  #: of the type, the larger of its pitches
     across_mm: float  #: of the type, as `SensorType.across_mm`
     symbol_pitch_mm: float  #: that it was measured on
     constant: float
@@ -168,7 +169,7 @@ class AnsweredShare:
         return np.asarray(1 / (1 + np.exp(-(self.constant + self.by_loaded * loaded))))
 
 
-ROUND = AnsweredShare(USUAL_SENSOR.across_mm, 5.0, -9.1, 13.3)
+ROUND = AnsweredShare(USUAL_SENSOR.pitch_mm, USUAL_SENSOR.across_mm, 5.0, -9.1, 13.3)
 """Of round faces: a plate that touches along a line and hangs over a rim, or over the seam of the
 symbols, is read less than on a flat face; the likeliest numbers for the same touches."""
 
@@ -297,19 +298,29 @@ def answered_shares(
 def answered_share(sensor: SensorType) -> AnsweredShare | None:
     """Return what a sensor type answers of what the usual one would; None of the usual one.
 
-    Of a type that was not measured it is that of the one most like it in size and pitch.
+    Of a type that was not measured it is that of the one most like it.
     """
-    known = measured_types()
-    if sensor.name == USUAL_SENSOR.name or sensor.name in known:
-        return known.get(sensor.name)
-    nearest = min(known.values(), key=lambda one: _unlike(one, sensor))
-    return nearest if _unlike(nearest, sensor) < _unlike(USUAL_SENSOR, sensor) else None
+    return measured_types().get(like_measured(sensor))
 
 
-def _unlike(one: AnsweredShare | SensorType, sensor: SensorType) -> float:
-    size = one.across_mm / sensor.across_mm
-    pitch = one.symbol_pitch_mm / sensor.symbol_pitch_mm
-    return math.hypot(math.log(size), math.log(pitch))
+def like_measured(sensor: SensorType) -> str:
+    """Return the name of the measured type whose answers a type is taken to have.
+
+    Itself, or the one most like it in tactels to a symbol and symbols across the sensor.
+    """
+    usual, tactel, across = USUAL_SENSOR, max(USUAL_SENSOR.step_mm), USUAL_SENSOR.across_mm
+    known = {usual.name: AnsweredShare(tactel, across, usual.symbol_pitch_mm, 0.0, 0.0)}
+    known |= measured_types()
+    if sensor.name in known:
+        return sensor.name
+
+    def unlike(name: str) -> float:
+        one, ours = known[name], sensor.symbol_pitch_mm
+        tactels = one.symbol_pitch_mm / one.tactel_mm * max(sensor.step_mm) / ours
+        symbols = one.across_mm / one.symbol_pitch_mm * ours / sensor.across_mm
+        return math.hypot(math.log(tactels), math.log(symbols))
+
+    return min(known, key=unlike)
 
 
 def answered_at_once(
@@ -333,7 +344,7 @@ def measured_types() -> dict[str, AnsweredShare]:
     """Return the shares of the sensor types that were measured, by name."""
     text = (resources.files("generator.layout") / "answers_of_types.json").read_text("utf-8")
     return {
-        name: AnsweredShare(one["across_mm"], one["pitch_mm"], *one["logit"])
+        name: AnsweredShare(one["tactel_mm"], one["across_mm"], one["pitch_mm"], *one["logit"])
         for name, one in json.loads(text).items()
     }
 

@@ -23,6 +23,7 @@ from generator.alphabet.printable import check_printable
 from generator.array import SymbolArray, array_from
 from generator.errors import GeneratorError, LayoutError, SolidError
 from generator.layout.layout import Clearances, Outlines
+from generator.layout.recognition_rate import like_measured
 from generator.polyhedron import Polyhedron, dihedral, face_polygon
 from generator.polyhedron.development import Development, development
 from generator.polyhedron.front import Loop, covered_parts
@@ -169,6 +170,7 @@ def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan
             *_covered_note(polyhedron, covered, reach),
             *_pitch_note(spec),
             *_layer_note(spec),
+            *_sensor_note(spec),
         ),
     )
 
@@ -335,6 +337,12 @@ def _pitch_note(spec: ObjectSpec) -> tuple[str, ...]:
     return (
         (f"pitch {pitch:g} mm is taken; at {usual:g} mm: {spec.coarser}",) if spec.coarser else ()
     )
+
+
+def _sensor_note(spec: ObjectSpec) -> tuple[str, ...]:
+    """Return the note that another type's answers stand for those of a type of one's own."""
+    name, like = spec.sensor.name, like_measured(spec.sensor)
+    return () if like == name else (f"promises for {name} are those of {like}: not measured",)
 
 
 def _layer_note(spec: ObjectSpec) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import RecordingError
+from probe.frame import are_rigid
 from probe.recording.files import draft_of, explain_errors, final_name
 from probe.recording.guard import MOST_TACTELS, open_hdf5
 from probe.recording.layout import (
@@ -28,7 +29,6 @@ from probe.recording.layout import (
     FrameBlock,
     FrameFile,
     RecordingOrigin,
-    are_rigid,
 )
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.foreign import open_regular
 from probe.errors import RecordingError
-from probe.frame import WRIST
+from probe.frame import WRIST, are_rigid
 from probe.recording.files import (
     blank_error,
     explain_errors,
@@ -46,7 +46,6 @@ from probe.recording.layout import (
     FrameBlock,
     FrameFile,
     RecordingOrigin,
-    are_rigid,
     json_value,
 )
 

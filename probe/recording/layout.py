@@ -147,17 +147,6 @@ def join_blocks(blocks: Sequence[FrameBlock], shape: tuple[int, int]) -> FrameBl
     return FrameBlock(counts, t_ns, seq, wrist, pose).frozen()
 
 
-def are_rigid(poses: NDArray[Any]) -> bool:
-    """Tell whether poses (n, 4, 4) are rigid transforms, or NaN."""
-    known = poses[~np.isnan(poses).all(axis=(1, 2))].astype(np.float64)
-    turn = known[:, :3, :3]
-    return bool(
-        np.isfinite(known).all()
-        and np.allclose(turn @ turn.transpose(0, 2, 1), np.eye(3), atol=1e-6)
-        and (known[:, 3] == (0, 0, 0, 1)).all()
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class FrameFile:
     """An open file of frames, HDF5 or a journal."""

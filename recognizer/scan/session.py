@@ -23,6 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.arm import SensorPose
+from probe.frame import are_rigid
+from recognizer.errors import MosaicError
 from recognizer.scan.belief import ScanBelief, ScanHypothesis, begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import (
     ARM_SD,
@@ -142,7 +144,7 @@ class Scan:
         Raises
         ------
         MosaicError
-            Another sensor's image.
+            Another sensor's image, or a pose that is no rigid transform.
         """
         given = touch.seq if isinstance(touch, TouchImage) and seq is None else seq
         if isinstance(touch, TouchImage):
@@ -327,7 +329,12 @@ def _is_one_object(a: _ObjectHypothesis, b: _ObjectHypothesis) -> bool:
 
 
 def _matrix(pose: SensorPose | ArrayLike) -> Array:
-    return np.asarray(pose.T_base_sensor if isinstance(pose, SensorPose) else pose, np.float64)
+    T = np.asarray(pose.T_base_sensor if isinstance(pose, SensorPose) else pose, np.float64)
+    if T.shape != (4, 4) or np.isnan(T).any() or not are_rigid(T[None]):
+        raise MosaicError(
+            "the pose is no rigid transform", fix="give a 4x4 matrix T_base_sensor, mm"
+        )
+    return T
 
 
 def _inverse(T: Array) -> Array:

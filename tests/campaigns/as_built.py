@@ -56,6 +56,7 @@ PRINTS = {  # scale x, scale y, skew (rad)
     **{f"{scale:g}": (scale, scale, 0.0) for scale in SCALES},
     "X .99": (0.99, 1.0, 0.0),
     "X .97": (0.97, 1.0, 0.0),
+    "X .988, Y .994": (0.988, 0.994, 0.0),
     "skew .01": (1.0, 1.0, 0.01),
 }
 Errors = list[tuple[float, float, float]]

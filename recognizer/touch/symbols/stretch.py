@@ -34,8 +34,10 @@ from recognizer.touch.symbols.template import STROKE_UNIT_MM
 
 Array = NDArray[np.float64]
 
-STEPS = 8  #: of damped least squares, at most
-SETTLED = 0.01  #: nats by which a step may change a stretch that counts as found
+STEPS = 12  #: of damped least squares, at most
+SETTLED = 0.01  #: nats by which a step may better a stretch that counts as found
+EVERYTHING = np.arange(UNKNOWNS + 2)
+SHAPE = np.array([0, 1, 2, POSE - 1, UNKNOWNS, UNKNOWNS + 1])  #: place, turn, scale and shear
 LARGEST = 0.15  #: of scale - 1 and of both unknowns of the shear
 WIDEST = 2.5  #: tenths of a mm, of the stroke's excess
 SHEAR_STEP = (0.01, 0.01)  #: largest change of the shear in one step
@@ -70,20 +72,29 @@ def fit_stretch(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> 
     best = _evaluate(image, precision, pose, gain, np.zeros(2), labels_at)
     damping = DAMPING
     for _ in range(STEPS):
-        system = best.normal + np.diag(np.diagonal(best.normal) * damping + least)
-        step = np.clip(np.linalg.solve(system, best.right), -most, most)
-        pose, gain = best.pose + step[:POSE], best.gain + step[POSE:UNKNOWNS]
-        pose[3:] = np.clip(pose[3:], -limits, limits)
-        gain[1] = np.clip(gain[1], SHALLOWER * best.gain[1], DEEPEST_GAIN)
-        gain = bounded_gain(gain[None])[0]
-        stretch = np.clip(best.stretch + step[UNKNOWNS:], -LARGEST, LARGEST)
-        tried = _evaluate(image, precision, pose, gain, stretch, labels_at)
-        settled = abs(tried.value - best.value) < SETTLED
-        if tried.value > best.value:
+        # The likelihood is no sum of squares: a step that also widens strokes can lower it, and
+        # what is held at its start counts in full. Then the shape of the lattice moves alone.
+        for free in (EVERYTHING, SHAPE):
+            system = (best.normal + np.diag(np.diagonal(best.normal) * damping + least))[
+                np.ix_(free, free)
+            ]
+            step = np.zeros(len(least))
+            step[free] = np.linalg.solve(system, best.right[free])
+            step = np.clip(step, -most, most)
+            pose, gain = best.pose + step[:POSE], best.gain + step[POSE:UNKNOWNS]
+            pose[3:] = np.clip(pose[3:], -limits, limits)
+            gain[1] = np.clip(gain[1], SHALLOWER * best.gain[1], DEEPEST_GAIN)
+            gain = bounded_gain(gain[None])[0]
+            stretch = np.clip(best.stretch + step[UNKNOWNS:], -LARGEST, LARGEST)
+            tried = _evaluate(image, precision, pose, gain, stretch, labels_at)
+            if tried.value > best.value:
+                break
+        better = tried.value - best.value
+        if better > 0:
             best, damping = tried, damping / EASIER
         else:
             damping *= HARDER
-        if settled:
+        if 0 < better < SETTLED:
             break
     return _stretch_of(best)
 

@@ -178,8 +178,10 @@ def test_other_sensors_answer_a_share_of_what_the_usual_one_does():
 def test_a_type_of_your_own_is_taken_for_the_one_most_like_it():
     mine = SensorType(33, 31, 2.0, name="mine")  # 62 x 66 mm: the mat is 64 x 64
     assert answered_share(mine) is measured_types()["mat-32x32"]
-    fine = SensorType(pitch_mm=1.0, name="fine")
+    fine = SensorType(40, 40, 0.6, name="fine")
     assert answered_share(fine) is measured_types()["gel-24x32"]
+    small = SensorType(12, 12, 2.2, name="small")  # 26 mm, as fsr-8x8, and three tactels a symbol
+    assert answered_share(small) is None
     same = SensorType(name="same")
     assert answered_share(same) is None
 

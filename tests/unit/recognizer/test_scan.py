@@ -14,6 +14,7 @@ from probe.simulate.scene import Scene
 from probe.simulate.world.levels import TYPICAL
 from probe.simulate.world.sensor import LevelSensor
 from probe.surface.polygon import polygon
+from recognizer.errors import MosaicError
 from recognizer.scan.belief import ScanHypothesis, begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import BY_HAND_SD, PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces, _Face, _hypotheses_of, contradict, join_faces
@@ -160,6 +161,22 @@ def one_touch(make_lab):
         return counts, T_base_object @ scene.T_object_surface @ surface_to_sensor(x, y, 0.4)
 
     return Reader(lab, SENSOR), felt
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [np.full((4, 4), np.nan), np.zeros((4, 4)), np.diag([1.0, 1, -1, 1]), np.diag([7.0, 1, 1, 1]),
+     np.eye(4)[:3]],
+)  # fmt: skip
+def test_a_pose_that_is_no_rigid_transform_is_refused(lab, pose):
+    with pytest.raises(MosaicError, match="no rigid transform"):
+        TouchPlaces().keep(pose)
+    counts = np.zeros((16, 16))
+    counts[2:14:3] = 200.0
+    scan = Scan(lab)
+    scan.add(counts, pose=np.eye(4))
+    with pytest.raises(MosaicError, match="no rigid transform"):
+        scan.add(counts, pose=pose)
 
 
 def test_faces_of_one_object_are_one_belief_and_a_moved_object_is_a_new_one(one_touch):
