@@ -102,6 +102,7 @@ def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) 
     app = None
     try:
         app = chosen(arguments)
+        arguments = app.with_json_of_command(arguments)
         unsaid = unsaid or arguments in [[group] for group in app.groups]
         asked = [*arguments, "--help"] if unsaid else arguments
         if any(word in HELP_OPTIONS for word in asked):

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from encoded_objects.base import console
 from encoded_objects.base.errors import UsageError, require
 from encoded_objects.base.options import Application, Argument, Json, Option, Options, command
+from encoded_objects.base.output import write, write_json
 
 PROGRAM = """
 import gc, json, os, sys
@@ -136,6 +137,20 @@ def three() -> int:
     return 3
 
 
+@command(app)
+def four(sort: Annotated[str, Option("Which.")] = "", as_json: Json = False) -> int:
+    """Do four."""
+    write_json({"sort": sort}) if as_json else write(sort)
+    return 0
+
+
+@command(part)
+def five(as_json: Json = False) -> int:
+    """Do five."""
+    write_json("five") if as_json else write("five")
+    return 0
+
+
 @pytest.mark.parametrize(
     "words",
     [["--help"], ["-h"], ["one", "--help"], ["part", "-h"], ["part", "two", "--help"],
@@ -147,9 +162,31 @@ def test_page_is_that_of_typer(words, capsys):
     assert capsys.readouterr().out == expected.output
 
 
+@pytest.mark.parametrize(
+    ("words", "code", "out"),
+    [
+        (["--json", "four", "--sort", "x"], 0, '"sort": "x"'),
+        (["--json", "part", "five"], 0, '"five"'),
+        (["--json", "part", "five", "--json"], 0, '"five"'),
+        (["--json", "--version"], 0, '"version"'),
+        (["--json"], 2, "no command is named"),
+        (["--json", "part"], 2, "Missing command"),
+        (["--json", "six"], 2, "No such command 'six'"),
+        (["--json", "one", "7"], 2, "No such option: --json"),
+        ([], 2, "Do things."),
+    ],
+)
+def test_json_before_a_command_is_the_commands(words, code, out, capsys):
+    assert console.run("do", lambda _: app, words) == code
+    said = capsys.readouterr()
+    assert out in said.out
+    assert said.err == ""
+    assert not words or json.loads(said.out)
+
+
 def test_errors_beside_help_are_told(capsys):
-    assert console.run("do", lambda _: app, ["four", "--help"]) == 2
-    assert "four" in capsys.readouterr().err
+    assert console.run("do", lambda _: app, ["six", "--help"]) == 2
+    assert "six" in capsys.readouterr().err
 
 
 @dataclass(frozen=True, slots=True)
