@@ -268,6 +268,7 @@ def _object_values(
                 "file": str(each.path),
                 "sha256": each.part.sha256,
                 "state": each.state,
+                "T_object_part": each.part.T_object_part.tolist(),
             }
             for each in files
         ],

@@ -168,6 +168,9 @@ def board_from(text: str) -> Electronics | None:
 def _one_sensor(given: list[LoadRecording]) -> str:
     names = {Recording(load.recording).origin.sensor for load in given}
     if len(names) != 1 or "" in names:
+        if names == {""}:
+            fix = "say which one it is: --sensor NAME"
+            raise CalibrationError("the recordings do not name their sensor", fix=fix)
         shown = ", ".join(sorted(name or "not named" for name in names))
         raise CalibrationError(
             f"the recordings are of these sensors: {shown}",

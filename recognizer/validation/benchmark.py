@@ -66,7 +66,7 @@ from recognizer.validation.statistics import (
     round_digits,
     share_of,
 )
-from recognizer.validation.trial import judge
+from recognizer.validation.trial import NEAR_MM, judge
 from recognizer.validation.workers import prepare_reader
 
 Array = NDArray[Any]
@@ -423,7 +423,7 @@ def _figures_of(whole: Mapping[str, Array], some: NDArray[np.bool_]) -> dict[str
     scores = np.sort(part["score"][wrong])[::-1]
     least = float(scores[allowed]) if len(scores) > allowed else -math.inf
     sure = right & (part["score"] > least)
-    bound = right & np.isfinite(part["bound_mm"])
+    bound = right & (part["bound_mm"] < NEAR_MM)  # where nothing is bounded, nothing is compared
     chi2 = part["chi2"][np.isfinite(part["chi2"])]
     line: dict[str, Any] = {
         "touches": total,
