@@ -66,20 +66,23 @@ def main(
         Follows "interrupted" ("; go on with --resume").
     """
     signal.signal(signal.SIGTERM, _end)
+    _open_closed_streams()
     _spare_start()
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a name the terminal cannot show
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = run(name, chosen, given, bare=bare)
-        sys.stdout.flush()
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would end us without our code
         sys.stderr.write(f"\n{name}: interrupted{advice}\n")
         code = INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone, as in `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = FAILED
+    try:
+        sys.stdout.flush()
+    except OSError:  # what is left of it would be written once more at the end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     gc.freeze()  # the process ends: what still refers to itself is not walked through once more
     sys.exit(code)
 
@@ -87,13 +90,19 @@ def main(
 def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) -> int:
     """Run one command; returns its exit code. Errors are reported, not raised."""
     from encoded_objects.base import output
-    from encoded_objects.base.errors import EncodedObjectsError, UsageError, without_touch
+    from encoded_objects.base.errors import (
+        EncodedObjectsError,
+        UsageError,
+        exit_code_of_write,
+        without_touch,
+    )
 
     as_json = "--json" in arguments
     unsaid = not (arguments or bare)
     app = None
     try:
         app = chosen(arguments)
+        arguments = app.with_json_of_command(arguments)
         unsaid = unsaid or arguments in [[group] for group in app.groups]
         asked = [*arguments, "--help"] if unsaid else arguments
         if any(word in HELP_OPTIONS for word in asked):
@@ -103,6 +112,7 @@ def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) 
                 asked, prog_name=name, standalone_mode=False
             )
         code = action() if callable(action) else int(action or 0)
+        sys.stdout.flush()
         return BAD_INPUT if unsaid else code
     except EncodedObjectsError as error:
         code, problem = error.exit_code, error
@@ -120,7 +130,12 @@ def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) 
         problem = EncodedObjectsError(
             f"{what}: {error.strerror or error}", fix="check folder, space and rights"
         )
-        code = problem.exit_code
+        code = exit_code_of_write(error)
+    except MemoryError:
+        problem = EncodedObjectsError(
+            "the memory is used up", fix="end other programs, allow more, or do less at once"
+        )
+        code = FAILED
     except Exception as error:
         typer = sys.modules.get("typer")
         if typer is not None and isinstance(error, typer.Exit):
@@ -128,7 +143,12 @@ def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) 
         if typer is None or not isinstance(error, typer.BadParameter.__mro__[1]):
             raise
         code, problem = BAD_INPUT, _misuse(error, name, app, arguments)
-    output.error(problem, as_json=as_json)
+    problem.exit_code = code
+    try:
+        output.error(problem, as_json=as_json)
+        sys.stdout.flush()
+    except OSError:
+        output.error(problem, as_json=False)
     return code
 
 
@@ -156,6 +176,14 @@ def interruption() -> Iterator[threading.Event]:
         yield interrupted
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def _open_closed_streams() -> None:
+    """Open the null device for standard streams that are closed; a file would take their place."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            stream = open(os.devnull, mode, encoding="utf-8")  # noqa: SIM115  open to the end
+            setattr(sys, name, stream)
 
 
 def _spare_start() -> None:

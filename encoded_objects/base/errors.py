@@ -14,8 +14,12 @@
 from __future__ import annotations
 
 import re
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
+from threading import current_thread, main_thread
 from typing import Any
 
 
@@ -30,6 +34,8 @@ class EncodedObjectsError(Exception):
         The way out, as an instruction ("set pitch to 5.7 mm or less").
     place
         Where: a file, `file:line:column`, the name of a face, a port's URL; kept as text.
+    exit_code
+        Of the command; None: that of the class.
 
     Examples
     --------
@@ -45,11 +51,15 @@ class EncodedObjectsError(Exception):
 
     exit_code = 2
 
-    def __init__(self, cause: str, *, fix: str = "", place: str | Path = "") -> None:
+    def __init__(
+        self, cause: str, *, fix: str = "", place: str | Path = "", exit_code: int | None = None
+    ) -> None:
         self.cause = without_password(cause)
         super().__init__(self.cause)
         self.fix = without_password(fix)
         self.place = without_password(str(place))
+        if exit_code is not None:
+            self.exit_code = exit_code
 
     def __str__(self) -> str:
         head = f"{self.place}: {self.cause}" if self.place else self.cause
@@ -109,11 +119,29 @@ installed; pip install 'encoded-objects[report]'
     """
     for module in modules:
         try:
-            import_module(module)
+            with _signals_held():
+                import_module(module)
         except ImportError as error:
             absent = isinstance(error, ModuleNotFoundError)
             why = "is not installed" if absent else f"cannot be loaded ({error})"
             raise _missing(module, extra, purpose, why) from error
+
+
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """Hold requests to end back until a module is loaded: one in C++ would fail or abort."""
+    came: list[int] = []
+    before = {}
+    if current_thread() is main_thread():
+        for one in (signal.SIGINT, signal.SIGTERM):
+            before[one] = signal.signal(one, lambda number, _frame: came.append(number))
+    try:
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+        for number in came[:1]:
+            signal.raise_signal(number)
 
 
 TOUCH_LIBRARIES = ("cobs", "h5py", "scipy", "serial")  #: of the extra `touch`
@@ -132,6 +160,12 @@ def _missing(
 ) -> MissingExtraError:
     cause = f"{purpose} needs {module.partition('.')[0]}, which {why}"
     return MissingExtraError(cause, fix=install_line(extra))
+
+
+def exit_code_of_write(error: OSError) -> int:
+    """Return 2 where the name of a file is wrong, 1 where there is no space or no right for it."""
+    wrong_names = (FileNotFoundError, NotADirectoryError, IsADirectoryError)
+    return 2 if isinstance(error, wrong_names) else 1
 
 
 def install_line(extra: str) -> str:

@@ -208,20 +208,33 @@ class Application:
 
     def _head(self) -> Callable[..., None]:
         """Return the function of a line without a command."""
-        from typer import Exit
+        from typer import Context, Exit
 
-        def head(version: bool, as_json: bool) -> None:
+        def head(context: Context, version: bool, as_json: bool) -> None:
             if version:
                 _report_version(self._version_of, dict, as_json)
                 raise Exit
+            if context.invoked_subcommand is None:
+                raise UsageError("no command is named")
 
         given = {"version": _VERSION, "as_json": typing.get_args(Json)[1]}
-        head.__annotations__ = {
+        head.__annotations__ = {"context": Context} | {
             name: Annotated[bool, option.for_typer(name, default=False)]
             for name, option in given.items()
         }
         head.__defaults__ = (False, False)
         return head
+
+    def with_json_of_command(self, arguments: list[str]) -> list[str]:
+        """Return the arguments with a `--json` that stands before a command handed to it."""
+        if not self._version_of or arguments[:1] != ["--json"] or {*HELP_OPTIONS} & {*arguments}:
+            return arguments
+        groups = self.groups
+        for place, word in enumerate(arguments[1:], start=2):
+            if word not in groups:
+                return [*arguments[1:place], "--json", *arguments[place:]]
+            groups = groups[word].groups
+        return arguments
 
     def read_plain(self, arguments: Sequence[str]) -> Callable[[], int] | None:
         """Return the action of a plain command line; None: it is left to typer, with every error.

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.errors import exit_code_of_write
 from encoded_objects.base.files import whole_file
 from encoded_objects.base.foreign import DAMAGE, foreign_json
 from probe.circuit import Electronics, Noise
@@ -136,7 +137,10 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike[str]) ->
             file.write(content.encode())
     except OSError as error:
         raise CalibrationError(
-            f"cannot be written: {error.strerror}", fix="choose another folder", place=name
+            f"cannot be written: {error.strerror}",
+            fix="choose another folder",
+            exit_code=exit_code_of_write(error),
+            place=name,
         ) from error
     return digest
 

@@ -21,6 +21,7 @@ from itertools import count
 from pathlib import Path
 from typing import Final
 
+from encoded_objects.base.errors import exit_code_of_write
 from encoded_objects.base.foreign import DAMAGE, open_regular
 from probe.errors import RecordingError
 
@@ -54,7 +55,10 @@ def explain_errors(path: Path, action: str) -> Iterator[None]:
             raise damaged_error(path, action) from error
         reason = error.strerror
         fix = _FIXES.get(error.errno, "check the disk and the folder")
-        raise RecordingError(f"cannot {action} it: {reason}", fix=fix, place=path) from error
+        code = None if action in ("read", "open") else exit_code_of_write(error)
+        raise RecordingError(
+            f"cannot {action} it: {reason}", fix=fix, place=path, exit_code=code
+        ) from error
     except DAMAGE as error:
         raise damaged_error(path, action) from error
 

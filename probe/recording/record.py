@@ -174,7 +174,9 @@ class Recorder:
                 os.replace(draft, part)
         except RecordingError as error:
             fix = f"{error.fix}, then run `repair` on {part.name}"
-            raise RecordingError(error.cause, fix=fix, place=part) from error
+            raise RecordingError(
+                error.cause, fix=fix, place=part, exit_code=error.exit_code
+            ) from error
         finally:
             journal.close()
         self.files[-1] = final_name(part, self.path, number, last=last, replace=self._replace)
@@ -190,4 +192,5 @@ class Recorder:
             f"{error.cause}; the recording ends after {self.frames} frames",
             fix=fix,
             place=str(self.files[-1]),
+            exit_code=error.exit_code,
         ) from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import ipaddress
 import logging
 import os
@@ -56,6 +57,7 @@ def serve(options: BenchOptions) -> int:
             "this token can be guessed, or cannot stand in an address",
             fix="give 12 or more of letters, digits, - and _, or none: one is made",
         )
+    _check_folders(options)
     chosen = choose_sensor_type(options.sensor_type, "", None, "--sensor-type")
     sensor = chosen.with_overlay(options.overlay)
     database = _database(options.database)
@@ -75,6 +77,7 @@ def serve(options: BenchOptions) -> int:
             timeout_graceful_shutdown=1, limit_concurrency=CONNECTIONS,
             http=_IdleTimeout,
         )  # fmt: skip
+        logging.getLogger("uvicorn.error").addFilter(_is_no_bad_text)
         server = uvicorn.Server(config)
         end = server.handle_exit
 
@@ -95,6 +98,26 @@ def serve(options: BenchOptions) -> int:
         session.close()
         line.close()
     return 0
+
+
+def _check_folders(options: BenchOptions) -> None:
+    """Refuse a folder that cannot be one, and parts that are not there."""
+    folder = options.folder.absolute()
+    if not next(place for place in (folder, *folder.parents) if place.exists()).is_dir():
+        raise BenchError(
+            "a file stands where recordings would go", fix="give --folder a folder", place=folder
+        )
+    if options.parts is not None and not options.parts.is_dir():
+        raise BenchError(
+            "there is no such folder",
+            fix="give --parts the folder of the files",
+            place=options.parts,
+        )
+
+
+def _is_no_bad_text(record: logging.LogRecord) -> bool:
+    """Leave out of the log, with its traceback, that somebody sent what is no UTF-8."""
+    return not str(record.msg).startswith("Invalid UTF-8")
 
 
 def _end_by_force(session: Session) -> None:
@@ -177,17 +200,23 @@ def _ports(port: str) -> tuple[tuple[str, str], ...]:
 
 
 def _open_socket(host: str, port: int) -> socket.socket:
+    if not host:
+        raise BenchError(
+            "--host is empty", fix="give 127.0.0.1, or 0.0.0.0 to let other machines in"
+        )
     six = ":" in host
     family = socket.AF_INET6 if six else socket.AF_INET
     try:
         line = socket.create_server((host, port), family=family, backlog=128, dualstack_ipv6=six)
         line.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNREAD_MS)
         return line
-    except OSError as error:
-        raise ProbeError(
-            f"cannot listen on {host} port {port}: {os.strerror(error.errno or 0)}",
-            fix="give another --web-port; 0 takes any free one",
-        ) from error
+    except (OSError, TypeError) as error:  # TypeError: no host can have such a name
+        said, number = getattr(error, "strerror", ""), getattr(error, "errno", -1)
+        fix = "give another --web-port; 0 takes any free one"
+        if number < 0 or number == errno.EADDRNOTAVAIL:  # below 0: the name has no address
+            fix = "give --host an address of this machine: 127.0.0.1, or 0.0.0.0 for all of them"
+        cause = f"cannot listen on {host} port {port}: {(said or 'no address').partition(' (')[0]}"
+        raise ProbeError(cause, fix=fix) from error
 
 
 def _address(host: str, port: int, token: str) -> str:

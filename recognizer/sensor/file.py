@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from encoded_objects.base.errors import exit_code_of_write
 from encoded_objects.base.files import staged_file
 from encoded_objects.base.foreign import DAMAGE, foreign_json
 from recognizer.errors import SensorStateError
@@ -59,7 +60,10 @@ def write_state(state: SensorState, path: str | os.PathLike[str]) -> None:
             staged.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
     except OSError as error:
         raise SensorStateError(
-            f"cannot be written: {error.strerror}", fix="choose another folder", place=str(path)
+            f"cannot be written: {error.strerror}",
+            fix="choose another folder",
+            exit_code=exit_code_of_write(error),
+            place=str(path),
         ) from error
 
 

@@ -37,10 +37,10 @@ def served(lab):
     """Return a context manager: options -> address of a server, that has to end in order."""
 
     @contextmanager
-    def server(*options, folder=None):
+    def server(*options, folder=None, errors=None):
         words = ("--database", lab / "lab.db") if folder is None else ()
         words += ("--folder", (folder or lab) / "recordings")
-        with running(*words, *options, folder=folder) as (address, process):
+        with running(*words, *options, folder=folder, errors=errors) as (address, process):
             try:
                 yield address
             finally:

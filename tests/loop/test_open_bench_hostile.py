@@ -16,9 +16,11 @@ PATIENCE_S = 30.0
 
 
 @pytest.fixture(scope="module")
-def bench(served):
-    with served("--port", "touch:") as address:
+def bench(served, tmp_path_factory):
+    log = tmp_path_factory.mktemp("hostile") / "log"
+    with log.open("w") as errors, served("--port", "touch:", errors=errors) as address:
         yield address
+    assert log.read_text() in ("", "open-bench: ended\n")
 
 
 def test_hostile_requests_are_refused(bench, lab):
@@ -77,9 +79,12 @@ def test_the_live_line_is_for_the_page_alone(bench, origin):
 
 def test_nonsense_on_the_live_line_ends_it(bench):
     host = bench.split("/")[2]
-    for words in ("no json", json.dumps({"filter": "evil"}), "x" * 5000, b"bytes"):
+    for words, text in (
+        ("no json", None), (json.dumps({"filter": "evil"}), None), ("x" * 5000, None),
+        (b"bytes", None), (b"no \xff UTF-8", True),
+    ):  # fmt: skip
         with connect(f"ws://{host}/live", origin=f"http://{host}") as line:
-            line.send(words)
+            line.send(words, text=text)
             end_s = time.monotonic() + PATIENCE_S
             with suppress(ConnectionClosed):
                 while time.monotonic() < end_s:

@@ -37,7 +37,7 @@ try:
             recorder.append(Frame(counts, i * 4_545_454, i, wrist))
             os.write(1, b".")
 except RecordingError as error:
-    print("\\n" + str(error))
+    print("\\n" + str(error), error.exit_code)
 """
 
 
@@ -92,6 +92,7 @@ def test_a_full_disk_ends_the_recording_with_all_its_frames(tmp_path):
     handed = len(said[0])
     recording = Recording(path)
     assert f"File too large; the recording ends after {len(recording)} frames" in said[1]
+    assert said[1].endswith(" 1")
     assert len(recording) == handed + 1  # the last one is on the disk, and then it was refused
     check(recording.frames(), handed + 1)
 
@@ -101,6 +102,7 @@ def test_a_disk_that_is_full_at_once_is_refused(tmp_path):
     output, errors = process.communicate(timeout=60)
     assert (process.returncode, errors) == (0, b"")
     assert b"cannot write it: File too large; choose a file system" in output
+    assert output.endswith(b" 1\n")
     assert list(tmp_path.iterdir()) == []
 
 

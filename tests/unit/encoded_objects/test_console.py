@@ -1,6 +1,7 @@
 """A command: its process, its help page, its options, declared once for it and for Python."""
 
 import json
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -11,8 +12,9 @@ import pytest
 from typer.testing import CliRunner
 
 from encoded_objects.base import console
-from encoded_objects.base.errors import UsageError
+from encoded_objects.base.errors import UsageError, require
 from encoded_objects.base.options import Application, Argument, Json, Option, Options, command
+from encoded_objects.base.output import write, write_json
 
 PROGRAM = """
 import gc, json, os, sys
@@ -58,6 +60,60 @@ def test_plugins_that_somebody_asks_for_are_left():
     assert json.loads(done.stdout)[1] == "one"
 
 
+STREAMS = """
+import sys
+from encoded_objects.base import console
+from encoded_objects.base.options import Application, Json, command
+
+app = Application()
+
+@command(app)
+def act(as_json: Json = False):
+    print("an answer")
+    sys.stderr.write("a message\\n")
+    return {}
+
+console.main("do", lambda _: app, bare=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("result", "redirect", "code", "out", "err"),
+    [
+        ("0", "2>&-", 0, "an answer\n", ""),
+        ("0", ">&-", 0, "", "a message\n"),
+        ("open('made', 'x').fileno() < 3", "<&- >&- 2>&-", 0, "", ""),
+        ("0", ">/dev/full", 1, "", "cannot write: No space left on device"),
+        ("0", "--json >/dev/full", 1, "", "cannot write: No space left on device"),
+        ("open('gone/made', 'x')", "", 2, "an answer", "cannot write 'gone/made': No such file"),
+        ("open('/dev/full', 'w', 1).write('x\\n')", "", 1, "an answer", "cannot write: No space"),
+        ("bytearray(1 << 62)", "", 1, "an answer", "the memory is used up"),
+        ("bytearray(1 << 62)", "--json", 1, '"exit_code": 1', "a message\n"),
+    ],
+)
+def test_streams_that_are_closed_or_full(result, redirect, code, out, err, tmp_path):
+    (tmp_path / "do.py").write_text(STREAMS.format(result))
+    done = subprocess.run(
+        f"{sys.executable} do.py {redirect}", shell=True, cwd=tmp_path, capture_output=True,
+        text=True, env={"PATH": "", "PYTHONPATH": ":".join(sys.path)},
+    )  # fmt: skip
+    assert done.returncode == code, done.stderr
+    assert out in done.stdout
+    assert err in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_module_is_loaded_whole_before_an_interruption_counts(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    text = "import signal\nsignal.raise_signal(signal.SIGINT)\nwhole = 1\n"
+    (tmp_path / "slow_module.py").write_text(text)
+    with pytest.raises(KeyboardInterrupt):
+        require("slow_module", extra="cad", purpose="this")
+    assert sys.modules["slow_module"].whole
+    with pytest.raises(KeyboardInterrupt):  # as before
+        signal.raise_signal(signal.SIGINT)
+
+
 app = Application(help="Do things.", version_of="do")
 part = Application()
 app.groups["part"] = part
@@ -81,6 +137,20 @@ def three() -> int:
     return 3
 
 
+@command(app)
+def four(sort: Annotated[str, Option("Which.")] = "", as_json: Json = False) -> int:
+    """Do four."""
+    write_json({"sort": sort}) if as_json else write(sort)
+    return 0
+
+
+@command(part)
+def five(as_json: Json = False) -> int:
+    """Do five."""
+    write_json("five") if as_json else write("five")
+    return 0
+
+
 @pytest.mark.parametrize(
     "words",
     [["--help"], ["-h"], ["one", "--help"], ["part", "-h"], ["part", "two", "--help"],
@@ -92,9 +162,31 @@ def test_page_is_that_of_typer(words, capsys):
     assert capsys.readouterr().out == expected.output
 
 
+@pytest.mark.parametrize(
+    ("words", "code", "out"),
+    [
+        (["--json", "four", "--sort", "x"], 0, '"sort": "x"'),
+        (["--json", "part", "five"], 0, '"five"'),
+        (["--json", "part", "five", "--json"], 0, '"five"'),
+        (["--json", "--version"], 0, '"version"'),
+        (["--json"], 2, "no command is named"),
+        (["--json", "part"], 2, "Missing command"),
+        (["--json", "six"], 2, "No such command 'six'"),
+        (["--json", "one", "7"], 2, "No such option: --json"),
+        ([], 2, "Do things."),
+    ],
+)
+def test_json_before_a_command_is_the_commands(words, code, out, capsys):
+    assert console.run("do", lambda _: app, words) == code
+    said = capsys.readouterr()
+    assert out in said.out
+    assert said.err == ""
+    assert not words or json.loads(said.out)
+
+
 def test_errors_beside_help_are_told(capsys):
-    assert console.run("do", lambda _: app, ["four", "--help"]) == 2
-    assert "four" in capsys.readouterr().err
+    assert console.run("do", lambda _: app, ["six", "--help"]) == 2
+    assert "six" in capsys.readouterr().err
 
 
 @dataclass(frozen=True, slots=True)

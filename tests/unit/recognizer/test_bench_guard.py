@@ -214,12 +214,19 @@ def ended(capsys, *words):
         (["--token", "a;b=c, with spaces in it"], 2, "12 or more"),
         (["--port", "touch:?rate=0"], 2, "give 1 to 500"),
         (["--port", "file:none.h5"], 2, "none.h5"),
+        (["--host", ""], 2, "127.0.0.1"),
+        (["--host", "999.1.1.1"], 2, "not known\n  fix: give --host"),
+        (["--host", "192.0.2.1"], 2, "address\n  fix: give --host"),
+        (["--host", "\N{LATIN SMALL LETTER U WITH DIAERESIS}..b"], 2, "no address"),
+        (["--folder", "spec/recordings"], 2, "a file stands where"),
+        (["--parts", "spec"], 2, "no such folder\n  fix: give --parts"),
     ],
 )
 def test_what_cannot_be_met_is_refused_with_the_way_out(
     words, code, said, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "spec").touch()
     got, message = ended(capsys, *words, "--web-port", 0)
     assert (got, "Traceback" in message) == (code, False)
     assert said in message
