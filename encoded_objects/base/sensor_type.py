@@ -10,6 +10,7 @@ against rows, z away from the object; tactel (0, 0) top left. mm, N, MPa.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -277,13 +278,14 @@ def choose_sensor_type(
         cause += "and nothing tells their sensor type"
     else:
         cause += f"{found.name} has {found.rows} x {found.columns}"
-    raise SensorTypeError([Problem(cause, _fix_for(shape), file=place)])
+    fix = fix_of_type(lambda kind: kind.shape == shape)
+    raise SensorTypeError([Problem(cause, fix, file=place)])
 
 
-def _fix_for(shape: tuple[int, int]) -> str:
-    """Return the way out: the shipped types of that shape, or a file."""
+def fix_of_type(suits: Callable[[SensorType], bool]) -> str:
+    """Return the way out of images of another type: the shipped ones that suit, or a file."""
     from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 
-    alike = [name for name in shipped_names() if sensor_type_named(name).shape == shape]
+    alike = [name for name in shipped_names() if suits(sensor_type_named(name))]
     named = f"{' or '.join(alike)}, or " if alike else ""
     return f"give --sensor-type {named}a file; probe-sensor types shows how one is written"

@@ -12,11 +12,14 @@ not change holds the marker too, the one nearest to the pauses counts.
 
 from __future__ import annotations
 
+import re
 import time
+from itertools import combinations
 
 import numpy as np
 
-from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.document import Problem
+from encoded_objects.base.sensor_type import SensorType, SensorTypeError, fix_of_type
 from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.port.address import Address, Port, refuse_unknown
 from probe.port.commanded import CommandedProbe
@@ -28,6 +31,7 @@ BAUD = 2_000_000
 MARKER = b"\xaa\x55"
 PAUSE_LEAST_S = 0.5e-3  #: quiet line that counts as a pause between images
 _MARKED_IMAGES = 4  #: markers an image apart by which it is known where images begin
+_MARKS = 24  #: the last markers that are remembered while it is not known where images begin
 _PAUSES = 8  #: the last ones that are remembered
 
 
@@ -35,7 +39,7 @@ def open_flexitac(address: Address) -> Port:
     """Open a board's line.
 
     Raises PortError: the line is not there, busy or forbidden, or an option unknown;
-    SensorTypeError.
+    SensorTypeError: there is no such type, and from `read`, images of another length come.
     """
     refuse_unknown(address, ("sensor_type",))
     named = address.options.get("sensor_type", USUAL_TYPES[address.scheme])
@@ -46,7 +50,7 @@ class FlexiTacPort(CommandedProbe):
     """A line of images of a sensor as a `Port`; it answers for the board, which cannot."""
 
     def __init__(self, url: str, line: Port, sensor: SensorType) -> None:
-        ident = IdentPacket(seq=0, t_us=0, bits=10, sensors=1, settling_us=0.0, baud=BAUD,
+        ident = IdentPacket(seq=0, t_us=0, bits=8, sensors=1, settling_us=0.0, baud=BAUD,
                             name="flexitac", rows=sensor.rows, columns=sensor.columns)  # fmt: skip
         super().__init__(url, ident)
         self._line, self._shape = line, sensor.shape
@@ -63,6 +67,8 @@ class FlexiTacPort(CommandedProbe):
             data = self._line.read(max(until_s - began_s, 0.0))
             now_s = time.monotonic()
             images = self._images.feed(data, quiet_s=now_s - began_s)
+            if length := self._images.other_length:
+                raise self._refusal(length)
             if images or self._images.sure or now_s >= until_s:
                 break  # where images begin is found by pauses, so until then nothing is put off
         return b"".join(self._packets(images))
@@ -75,6 +81,13 @@ class FlexiTacPort(CommandedProbe):
     def now(self) -> tuple[int, int]:
         """Return number and time for a packet that is no frame."""
         return self._seq % 65536, self._t_us % 2**32
+
+    def _refusal(self, length: int) -> SensorTypeError:
+        rows, columns = self._shape
+        cause = f"images of {length} bytes come, "
+        cause += f"{rows} x {columns} ({rows * columns} bytes) was expected"
+        fix = fix_of_type(lambda kind: kind.rows * kind.columns == length)
+        return SensorTypeError([Problem(cause, fix, file=self.url)])
 
     def _packets(self, images: list[bytes]) -> list[bytes]:
         packets = []
@@ -100,6 +113,7 @@ class MarkedImages:
         self._step = len(MARKER) + length
         self._rest = bytearray()
         self._at = 0  # bytes that left `_rest`
+        self._marks: list[int] = []  # places of the last markers while nothing is sure
         self._paused: list[int] = []  # where in the stream the line began again after a pause
 
     def feed(self, data: bytes, *, quiet_s: float = 0.0) -> list[bytes]:
@@ -109,6 +123,8 @@ class MarkedImages:
         """
         if data and quiet_s >= PAUSE_LEAST_S:
             self._paused = [*self._paused[1 - _PAUSES :], self._at + len(self._rest)]
+        if not self.sure:
+            self._note_marks(data)
         self._rest += data
         images: list[bytes] = []
         while self.sure or self._find():
@@ -122,6 +138,24 @@ class MarkedImages:
             self._drop(len(MARKER))
         return images
 
+    @property
+    def other_length(self) -> int:
+        """Return the length of the images that come where it is another one; 0: not so."""
+        known = set(self._marks)
+        steps = [
+            after - before
+            for before, after in combinations(self._marks, 2)
+            if all(before + k * (after - before) in known for k in range(_MARKED_IMAGES + 1))
+        ]
+        step = min(steps, default=self._step)
+        return 0 if self._step % step == 0 else step - len(MARKER)  # a marker inside divides it
+
+    def _note_marks(self, data: bytes) -> None:
+        held = bytes(self._rest[-1:]) + data
+        first = self._at + len(self._rest) + len(data) - len(held)
+        marks = [first + found.start() for found in re.finditer(MARKER, held)]
+        self._marks = [*self._marks, *marks][-_MARKS:]
+
     def _find(self) -> bool:
         """Go to where an image begins, and tell whether that is known."""
         needed = (_MARKED_IMAGES + 1) * self._step + len(MARKER)  # for a start at any place
@@ -131,7 +165,7 @@ class MarkedImages:
                 starts = [min(starts, key=self._from_pause)]
             if len(starts) == 1:
                 self._drop(starts[0])
-                self.sure = True
+                self.sure, self._marks = True, []
                 return True
             self._drop(self._step)
         return False

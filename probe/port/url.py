@@ -73,7 +73,7 @@ def address_of(url: str) -> Address:
 def typed_port(url: str, asked: str = "") -> tuple[str, SensorType | None]:
     """Return the URL that opens a port with a type of sensor, and the type if it is known.
 
-    A recording names its own; a simulated probe has the one of its option; `flexitac:` has one. The
+    A recording names its own; a simulated probe and a board have the one of their option. The
     type behind a serial line is known by its first frame alone. `asked` is that of `--sensor-type`.
     Raises PortError, RecordingError, SensorTypeError.
     """
@@ -83,7 +83,7 @@ def typed_port(url: str, asked: str = "") -> tuple[str, SensorType | None]:
 
         return url, Recording(address.target).sensor_type(asked)
     named = asked or address.options.get(_TYPE_OPTION, "") or USUAL_TYPES.get(address.scheme, "")
-    if address.scheme == "sim" and asked and _TYPE_OPTION not in address.options:
+    if address.scheme in ("sim", *USUAL_TYPES) and asked and _TYPE_OPTION not in address.options:
         joint = "&" if address.options else "" if url.endswith("?") else "?"
         url = f"{url}{joint}{_TYPE_OPTION}={asked}"
     if not named and address.scheme == "sim":

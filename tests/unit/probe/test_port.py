@@ -421,7 +421,21 @@ def test_a_board_is_read_over_a_line(images):
     assert frames[0].counts.shape == (16, 32)
     assert [frame.seq - frames[0].seq for frame in frames] == list(range(40))
     assert all(a.t_ns < b.t_ns for a, b in itertools.pairwise(frames))
-    assert (ident.name, ident.rows, ident.columns) == ("flexitac", 16, 32)
+    assert (ident.name, ident.rows, ident.columns, ident.bits) == ("flexitac", 16, 32, 8)
+
+
+def test_a_board_of_another_size_is_read_with_its_type_and_named_without(capsys):
+    with line_of(images_of(9)[:, : 12 * 32]) as device:
+        url = f"flexitac://{device}"
+        assert run(["info", url]) == 2
+        said = capsys.readouterr().err
+        assert "images of 384 bytes come, 16 x 32 (512 bytes) was expected" in said
+        assert "give --sensor-type flexitac-12x32, or" in said
+        assert run(["info", url, "--sensor-type", "flexitac-12x32", "-t", "0.2"]) == 0
+        assert "12x32, 8 bits" in capsys.readouterr().out
+    with line_of(images_of(9)) as device:
+        assert run(["info", f"flexitac://{device}", "--sensor-type", "flexitac-12x32"]) == 2
+        assert "images of 512 bytes come" in capsys.readouterr().err
 
 
 def test_it_reads_what_its_own_client_reads():
