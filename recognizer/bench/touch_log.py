@@ -196,5 +196,6 @@ def _row(record: TouchRecord) -> list[Any]:
         record.number, record.name, round(record.felt_ms), round(record.frame.t_ns * 1e-9, 4),
         record.state, answer.get("object") or "", answer.get("face") or "",
         *(place.get(key, "") for key in COLUMNS[7:12]),
-        *(answer.get(key, "") for key in COLUMNS[12:15]), int(record.frame.counts.sum()),
+        *(answer.get(key, "") for key in ("margin", "doubt", "because")),
+        int(record.frame.counts.sum()),
     ]  # fmt: skip

@@ -431,7 +431,7 @@ def test_a_board_of_another_size_is_read_with_its_type_and_named_without(capsys)
         said = capsys.readouterr().err
         assert "images of 384 bytes come, 16 x 32 (512 bytes) was expected" in said
         assert "give --sensor-type flexitac-12x32, or" in said
-        assert run(["info", url, "--sensor-type", "flexitac-12x32", "-t", "0.2"]) == 0
+        assert run(["info", url, "--sensor-type", "flexitac-12x32", "--seconds", "0.2"]) == 0
         assert "12x32, 8 bits" in capsys.readouterr().out
     with line_of(images_of(9)) as device:
         assert run(["info", f"flexitac://{device}", "--sensor-type", "flexitac-12x32"]) == 2

@@ -306,6 +306,8 @@ def test_touches_are_named_deleted_and_told_as_a_table():
     assert lines[0].startswith("touch,name,felt_ms")
     assert lines[1].startswith('1,"by hand, once",1000,0.0,answered,Cube,F1,1.5,')
     assert lines[2].endswith(f",{6 * 256}")
+    log.conclude({"reason": "not an encoded surface", "because": "at an edge"}, answered=False)
+    assert f",at an edge,{6 * 256}" in log.as_csv()  # as the page says it
     assert log.one(2)["counts"] == np.full((16, 16), 6).tolist()
     assert [frame.counts[0, 0] for frame in log.frames()] == [5, 6]
     log.delete(1)
