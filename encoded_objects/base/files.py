@@ -64,7 +64,7 @@ def file_exists_error(out: Path) -> EncodedObjectsError:
 def staged_file(out: Path, *, replace: bool = True) -> Iterator[Path]:
     """Yield a name next to `out` to write to; it becomes `out` when all went well.
 
-    Raises `OSError`, of `out`; without `replace`, `FileExistsError` if `out` has come up meanwhile.
+    Raises `OSError` and `EncodedObjectsError`, of `out`; without `replace`, `FileExistsError` if `out` has come up meanwhile.
     """
     draft = out.with_name(f".{out.stem}.{os.getpid()}-{threading.get_ident()}{out.suffix}")
     try:
@@ -73,6 +73,10 @@ def staged_file(out: Path, *, replace: bool = True) -> Iterator[Path]:
     except OSError as error:
         if str(error.filename) == str(draft):  # a message names the file that was asked for
             error.filename = str(out)
+        raise
+    except EncodedObjectsError as error:
+        if Path(error.place).name.startswith(draft.stem):  # also its parts
+            error.place = str(out)
         raise
     finally:
         draft.unlink(missing_ok=True)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.base.output import count_of
 from probe.errors import CalibrationError
 
 Image = NDArray[np.float64]
@@ -42,15 +43,14 @@ def average_frames(counts: ArrayLike, name: str = "frames") -> Average:
     `name` is that of the load, for messages. Raises CalibrationError: too few frames, or no images.
     """
     read = np.asarray(counts, dtype=np.float64)
-    if (
-        read.ndim != 3
-        or len(read) < LEAST_FRAMES
-        or not np.isfinite(read).all()
-        or (read < 0).any()
-    ):
+    if read.ndim != 3 or not np.isfinite(read).all() or (read < 0).any():
         raise CalibrationError(
-            f"{name}: shape {read.shape}, it must be (N, rows, columns) counts with "
-            f"N >= {LEAST_FRAMES}",
+            f"{name}: shape {read.shape}, it must be (N, rows, columns) counts",
+            fix="give the frames of a recording",
+        )
+    if len(read) < LEAST_FRAMES:
+        raise CalibrationError(
+            f"{name}: {count_of(len(read), 'frame')}, at least {LEAST_FRAMES} are averaged",
             fix="record the steady load for a second or more",
         )
     middle = np.median(read, axis=0)

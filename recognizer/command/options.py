@@ -154,6 +154,8 @@ class RecognizeOptions(Options):
             raise UsageError("--learn FILE reads by that file too; leave --sensor-state out")
         if self.joints_deg is not None and self.scan_method:
             raise UsageError("--joints of a scan: give a file with a line for each touch")
+        if not self.publish and (self.publish_users is not None or self.open):
+            raise UsageError("--publish-users and --open need --publish URL")
 
     @property
     def scan_method(self) -> str:

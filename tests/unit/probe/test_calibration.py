@@ -136,7 +136,9 @@ def test_loads_that_do_not_determine_the_laws_are_named():
 
 
 def test_frames_that_are_none_are_refused():
-    for bad in (np.zeros((3, 16, 16)), np.zeros((16, 16)), np.full((30, 16, 16), np.nan)):
+    with pytest.raises(CalibrationError, match="1 frame, at least 20 are averaged"):
+        average_frames(np.zeros((1, 16, 16)))
+    for bad in (np.zeros((16, 16)), np.full((30, 16, 16), np.nan)):
         with pytest.raises(CalibrationError, match="shape"):
             average_frames(bad)
     frames = np.zeros((20, 16, 16))

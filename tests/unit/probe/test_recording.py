@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from recorded import frames, pose_at, record, same
 
+from encoded_objects.base.files import staged_file
 from probe.errors import RecordingError
 from probe.frame import Frame, frame_from
 from probe.recording.guard import superblock_of
@@ -160,6 +161,17 @@ def test_two_recorders_cannot_write_one_file_and_a_closed_one_takes_no_frames(tm
     assert len(Recording(tmp_path / "touch.h5")) == 1
     with pytest.raises(RecordingError, match="is closed"):
         recorder.append(frames(1)[0])
+
+
+def test_a_draft_is_called_by_the_name_that_was_asked_for(tmp_path):
+    out = tmp_path / "touch.h5"
+    with (
+        pytest.raises(RecordingError, match="another process is writing it") as caught,
+        staged_file(out) as draft,
+        Recorder(draft),
+    ):
+        Recorder(draft)
+    assert caught.value.place == str(out)
 
 
 def test_others_files_that_are_no_recording_are_told_apart(tmp_path):

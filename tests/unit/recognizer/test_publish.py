@@ -14,6 +14,7 @@ import pytest
 
 from encoded_objects.base.errors import EncodedObjectsError
 from probe.frame import frame_from
+from recognizer.command import run
 from recognizer.command.answers import Answer
 from recognizer.command.publish import PublishSink, endpoint_of
 from recognizer.command.ros import object_message, recognition_message
@@ -263,6 +264,12 @@ def test_others_read_only_where_that_is_said(host):
         PublishSink(f"zenoh://{host}:7447")
     assert "--open" in refused.value.fix
     assert refused.value.exit_code == 2
+
+
+@pytest.mark.parametrize("option", [["--publish-users", "us.txt"], ["--open"]])
+def test_who_may_listen_is_said_of_what_is_published(option, capsys):
+    assert run(["touch.h5", *option]) == 2
+    assert "--publish-users and --open need --publish URL" in capsys.readouterr().err
 
 
 def test_an_open_publisher_says_what_it_opens(capsys):
