@@ -74,7 +74,7 @@ def show(
     from generator.database.open import open_database
     from generator.database.part_file import part_state
     from generator.database.read import read_object
-    from generator.database.transaction import read_transaction
+    from generator.database.transaction import explain_values, read_transaction
     from generator.spec.option import database_option
 
     url = database_option(database)
@@ -83,7 +83,8 @@ def show(
     with read_transaction(engine) as connection:
         held = read_object(connection, name)
     files = [part_state(engine.url, part) for part in held.parts]
-    object_report.print_object(held, files, url, sensor, as_json=as_json)
+    with explain_values(engine):  # promises rest on lengths that only a sound database has
+        object_report.print_object(held, files, url, sensor, as_json=as_json)
     return 0
 
 

@@ -80,6 +80,7 @@ def held_cells(connection: Connection, array_id: int) -> NDArray[np.int64]:
     return np.fromiter(chain.from_iterable(rows), dtype=np.int64).reshape(-1, 5)
 
 
+@of_rows
 def faces_at(
     connection: Connection, array_id: int, rows: ArrayLike, columns: ArrayLike
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -112,7 +112,7 @@ def import_objects(
     name = Path(home.database or "").name if from_file else place_of(home)
     utc = datetime.now(UTC).isoformat(timespec="seconds")
     origin = {"imported_from": name, "imported_utc": utc}
-    with _open_unchanged(home) as source_engine, read_transaction(source_engine) as source:
+    with _open_unchanged(given, home) as source_engine, read_transaction(source_engine) as source:
 
         def work(target: Connection) -> CopyReport:
             carried = copy_objects(
@@ -134,9 +134,8 @@ def import_objects(
 
 
 @contextmanager
-def _open_unchanged(home: URL) -> Iterator[Engine]:
+def _open_unchanged(url: str, home: URL) -> Iterator[Engine]:
     """Open a database that is not changed: of a file, a copy of its own."""
-    url = home.render_as_string(hide_password=False)
     if home.get_backend_name() != "sqlite":
         yield open_database(url, writable=False)
         return

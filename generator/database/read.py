@@ -7,6 +7,7 @@ database: `with read_transaction(engine) as connection: ...`.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections import defaultdict
 from collections.abc import Iterable
@@ -29,11 +30,15 @@ from generator.database.registered import (
     RegisteredStyle,
 )
 from generator.database.round_face import round_face
+from generator.database.tables import DamagedValueError
 from generator.database.transaction import of_rows, place_of
 from generator.errors import DatabaseError
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.frame import face_frame, face_polygon
 from generator.polyhedron.winged import Developable, Face, Polyhedron, WingedEdge, developable_from
+
+MOST_SYMBOLS = 127  #: of an array; readers keep labels in 8 bits
+_MOST_MM = 10_000.0  #: no symbol is larger than the largest model
 
 
 @of_rows
@@ -152,7 +157,7 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
         polyhedron=polyhedron,
         faces=_read_faces(connection, entry, polyhedron, layout, surfaces_of(spec)),
         layout=layout,
-        style=SymbolStyle(*style),
+        style=_style(*style),
         array=read_array(connection, entry.array_id),
         alphabet=glyphs,
         parts=read_parts(connection, entry.object_id),
@@ -239,9 +244,17 @@ def read_styles(connection: Connection) -> tuple[RegisteredStyle, ...]:
         .order_by(objects.object_id)
     )
     return tuple(
-        RegisteredStyle(number, name, array, alphabet, SymbolStyle(*style))
+        RegisteredStyle(number, name, array, alphabet, _style(*style))
         for number, name, array, alphabet, *style in connection.execute(query)
     )
+
+
+def _style(*lengths: float) -> SymbolStyle:
+    style = SymbolStyle(*lengths)
+    sizes, steep = (style.pitch_mm, style.stroke_mm), abs(style.draft_rad) >= math.pi / 2
+    if min(sizes) <= 0 or max(map(abs, lengths)) > _MOST_MM or steep:
+        raise DamagedValueError(f"symbols of {style}")
+    return style
 
 
 @of_rows
@@ -250,6 +263,10 @@ def read_array(connection: Connection, array_id: int) -> RegisteredArray:
     row = connection.execute(
         select(tables.arrays).where(tables.arrays.c.array_id == array_id)
     ).one()
+    least = min(row.rows, row.columns, row.window_rows, row.window_columns)
+    if least < 1 or not 2 <= row.order <= MOST_SYMBOLS:
+        cause = f"an array of {row.rows} x {row.columns} cells and {row.order} symbols"
+        raise DamagedValueError(cause)
     return RegisteredArray(
         array_id=row.array_id,
         profile=row.profile,
@@ -316,6 +333,9 @@ def _read_polyhedron(connection: Connection, entry: ObjectEntry) -> Polyhedron:
         )
         for row in connection.execute(_rows_of_object(tables.edges, entry, "edge_id"))
     )
+    if (len(points), len(faces)) != (entry.number_of_vertices, entry.number_of_faces):
+        cause = f"{len(points)} vertices and {len(faces)} faces of '{entry.name}'"
+        raise DamagedValueError(cause)
     return Polyhedron(entry.object_type, read_only(points), faces, edges)
 
 

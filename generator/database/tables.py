@@ -25,18 +25,19 @@ when it is opened, by `migrations/vN.py`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
+from operator import index
 from typing import Any
 
+import sqlalchemy
 from sqlalchemy import (
-    BigInteger,
     CheckConstraint,
     Column,
     Double,
     ForeignKey,
     ForeignKeyConstraint,
     Index,
-    Integer,
     LargeBinary,
     MetaData,
     PrimaryKeyConstraint,
@@ -45,11 +46,42 @@ from sqlalchemy import (
     Text,
     UniqueConstraint,
 )
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.types import UserDefinedType
 
 from generator.alphabet.outline import SymbolStyle
 
 metadata = MetaData()
+
+_Check = Callable[[Any], Any]
+
+
+class DamagedValueError(SQLAlchemyError):
+    """A value that this tool never writes there; `of_rows` and transactions explain it."""
+
+
+def _real(value: Any) -> float:
+    if type(value) in (float, int) and -_MOST <= value <= _MOST:
+        return float(value)
+    raise DamagedValueError(f"{value!r:.40} in a column of lengths and angles")
+
+
+_MOST = 1e9  #: mm2; models are up to 10 m
+
+
+# SQLite keeps a value of any type in any column, so each is checked as it is read: `of_rows` tells
+# of the TypeError that `index` raises. A million cells are read here, which is why it is in C.
+class _Whole:
+    def result_processor(self, _dialect: object, _coltype: object) -> _Check:
+        return index
+
+
+class Integer(_Whole, sqlalchemy.Integer):
+    """A whole number, never NULL."""
+
+
+class BigInteger(_Whole, sqlalchemy.BigInteger):
+    """A whole number beyond 31 bits, never NULL."""
 
 
 class _SqliteDouble(UserDefinedType[float]):
@@ -64,6 +96,9 @@ class _SqliteDouble(UserDefinedType[float]):
 
     def get_col_spec(self, **_: Any) -> str:
         return "DOUBLE_BLOB"
+
+    def result_processor(self, _dialect: object, _coltype: object) -> _Check:
+        return _real
 
 
 REAL: Double[float] = Double().with_variant(_SqliteDouble(), "sqlite")
@@ -302,7 +337,12 @@ as_built = Table(
     "as_built",
     metadata,
     Column("as_built_id", Integer, primary_key=True),
-    Column("object_id", ForeignKey("objects.object_id", ondelete="CASCADE"), index=True),
+    Column(
+        "object_id",
+        sqlalchemy.Integer,  # NULL, too
+        ForeignKey("objects.object_id", ondelete="CASCADE"),
+        index=True,
+    ),
     Column("part", Text),  #: name in `parts`
     *required(Text, "printer", "material"),
     Column("scale_x", REAL, nullable=False),  #: measured length / drawn length

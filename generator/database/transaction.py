@@ -97,14 +97,21 @@ def of_rows(
 
     @wraps(read)
     def reader(connection: Connection, /, *given: Given.args, **named: Given.kwargs) -> Result:
-        try:
+        with explain_values(connection.engine):
             return read(connection, *given, **named)
-        except DatabaseError:
-            raise
-        except (*DAMAGE, SQLAlchemyError, GeneratorError) as error:
-            _explain(error, connection.engine)
 
     return reader
+
+
+@contextmanager
+def explain_values(engine: Engine) -> Iterator[None]:
+    """Raise what damaged values of a database lead to as a DatabaseError."""
+    try:
+        yield
+    except DatabaseError:
+        raise
+    except (*DAMAGE, SQLAlchemyError, GeneratorError) as error:
+        _explain(error, engine)
 
 
 def _explain(error: Exception, engine: Engine) -> NoReturn:

@@ -95,7 +95,7 @@ def encode(
         with read_transaction(engine) if engine else nullcontext() as connection:
             made, used = _dry_run(connection, plans, replace, rest)
         if trial is not None:
-            with write_transaction(open_database(f"sqlite:///{trial}")) as connection:
+            with write_transaction(open_database(str(trial))) as connection:
                 for plan, one in zip(plans, made, strict=True):
                     register(connection, object_record(plan, one.layout), replace=False)
     else:

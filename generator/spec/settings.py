@@ -134,7 +134,10 @@ def mount_block(value: Any) -> Any:
 
 
 def database_url(value: Any) -> str:
-    """Return the address of a database; `lab.db` is that of a file."""
+    """Return the address of a database: `lab.db` is `sqlite:///lab.db`.
+
+    A path with `?`, `%` or `#` stays a path, since these mean other things in an address.
+    """
     if not isinstance(value, str) or not value.strip() or not value.isprintable():
         raise refuse("a database is a file name or an address", "write, for example, lab.db")
     scheme, separator, _ = value.partition("://")
@@ -145,7 +148,7 @@ def database_url(value: Any) -> str:
                 f"'{value}' is half an address",
                 "write sqlite:///lab.db or postgresql://user@host/name",
             )
-        return f"sqlite:///{value}"
+        return value if re.search("[?%#]", value) else f"sqlite:///{value}"
     if scheme not in SCHEMES:
         raise refuse(
             f"objects cannot be kept in '{scheme}', only in sqlite or postgresql",

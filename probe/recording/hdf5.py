@@ -285,8 +285,10 @@ def _fits_exactly(values: NDArray[Any], dtype: np.dtype[Any]) -> bool:
     if np.can_cast(values.dtype, dtype):
         return True
     limits = np.iinfo(dtype)
-    if values.dtype.kind == "f" and not (values == np.floor(values)).all():
-        return False
+    if values.dtype.kind == "f":
+        values = values.astype(np.float64)  # which holds the end of every range, 16 bits do not
+        whole = (values == np.floor(values)) & (values < float(limits.max) + 1)
+        return bool((whole & (values >= limits.min)).all())
     return bool((values >= limits.min).all() and (values <= limits.max).all())
 
 

@@ -81,7 +81,7 @@ class Recording:
         first: FrameFile | None = None
         for name in _files_of(Path(self.path), self.live):
             with open_frames(name, live=self.live) as file:
-                if file.own and not file.even and not self.live:
+                if not file.even and not self.live:
                     raise RecordingError(
                         "its datasets have different lengths", fix="run `repair` on it", place=name
                     )

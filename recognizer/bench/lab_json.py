@@ -19,6 +19,7 @@ from sqlalchemy import Connection, select
 from generator.database import tables
 from generator.database.read import list_objects, read_object
 from generator.database.registered import RegisteredFace, RegisteredObject
+from generator.database.transaction import of_rows
 from probe.surface.body import symbol_triangles, triangulate
 from probe.surface.symbols import Relief, emboss
 from recognizer.touch.lab import EmbossedArray, Lab
@@ -85,6 +86,7 @@ def arrays_json(lab: Lab) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
+@of_rows
 def map_json(connection: Connection, encoding: EmbossedArray) -> dict[str, Any]:
     """Return the cells of an array that objects hold, face by face."""
     owners, labels = encoding.owners[:-1], encoding.labels[:-1]

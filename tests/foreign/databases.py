@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from foreign.case import FIXTURES, LeakError, WrongValueError, kept
-from foreign.damage import anything, damaged
+from foreign.damage import NUMBERS, anything, damaged
 
 
 @cache
@@ -42,7 +42,7 @@ def _sql(rng: random.Random, path: Path) -> None:
             columns = [row[1] for row in base.execute(f"pragma table_info({table})")]
             if not columns:
                 continue
-            column, value = rng.choice(columns), anything(rng, 2)
+            column, value = rng.choice(columns), rng.choice((anything(rng, 2), *NUMBERS, "x"))
             if isinstance(value, int) and not -(2**63) <= value < 2**63:
                 value = 2**63 - 1
             if isinstance(value, str):
@@ -100,6 +100,8 @@ def write_database(rng: random.Random, folder: Path) -> Path:
 
 def read_database(path: Path, _out: Path) -> None:
     """Read all that a command, a page and a reader of touches read of a database."""
+    from generator.command.object_report import fullness_text
+    from generator.database.lab import read_fullness
     from generator.database.open import open_database
     from generator.database.read import list_objects, read_object, read_parts
     from generator.database.transaction import read_transaction
@@ -109,6 +111,7 @@ def read_database(path: Path, _out: Path) -> None:
         for entry in list_objects(connection):
             read_object(connection, entry.name)
             read_parts(connection, entry.object_id)
+        fullness_text(read_fullness(connection))
     for array in open_lab(str(path)).arrays:
         for number in range(len(array.faces)):
             array.face(number)

@@ -11,6 +11,7 @@ import sqlite3
 import tempfile
 import zipfile
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import foreign
@@ -93,6 +94,8 @@ def _lab_where(change):
         path = Path(folder) / "lab.db"
         path.write_bytes(databases.labs()["lab"])
         with closing(sqlite3.connect(path)) as base:
+            base.execute("pragma foreign_keys = off")
+            base.execute("pragma ignore_check_constraints = on")
             base.execute(change)
             base.commit()
         return path.read_bytes()
@@ -125,6 +128,26 @@ FOUND = {
     "no vertex of a face": (
         "database", "lab.db", lambda: _lab_where("delete from faces_to_vertices"), "damaged",
     ),
+    **{
+        f"{value} in {table}.{column}": (
+            "database",
+            "lab.db",
+            partial(_lab_where, f'update or replace {table} set "{column}" = {value}'),
+            "never written",
+        )
+        for table, columns, value in (
+            ("placements", "rotation_rad x_mm y_mm", "'x'"),
+            ("objects", "pitch_mm height_mm chamfer_mm", "'x'"),
+            ("objects", "draft_rad height_mm", "1e6"),
+            ("objects", "stroke_mm", "1e999"),
+            ("arrays", "rows columns", "'x'"),
+            ("arrays", "columns", "1e999"),
+            ("arrays", "order", "-1"),
+            ("cells", "x_mm label", "'x'"),
+            ("faces", "object_id", "'x'"),
+        )
+        for column in columns.split()
+    },
     "a pose that is no JSON": (
         "import", "lab.db", lambda: _lab_where("update parts set T_object_part = '['"), "be read",
     ),

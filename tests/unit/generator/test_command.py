@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -29,6 +30,7 @@ from probe.command import run as probe_sensor
 from recognizer.bench.app import application
 from recognizer.bench.broker import Broker
 from recognizer.bench.session import Session
+from recognizer.touch.lab import open_lab
 from recognizer.validation.campaign import Campaign
 from recognizer.validation.run import prepare_run, read_record
 
@@ -126,6 +128,36 @@ def test_show_tells_missing_and_changed_files(cube, capsys):
     third.rmdir()
     make()
     assert {file["state"] for file in said(capsys, "show", "Cube")["files"]} == {"ok"}
+
+
+@pytest.mark.parametrize(
+    ("folder", "name"), [(".", "a?b.db"), (".", "l%41b.db"), ("w%41?#x", "lab.db?x=1")]
+)
+def test_a_database_is_the_file_that_is_named(folder, name, tmp_path, capsys):
+    home = tmp_path / folder
+    home.mkdir(exist_ok=True)
+    named = name if folder == "." else str(home / name)
+    spec = Path("c.yaml")
+    spec.write_text("name: Cube\nshape: {cube: 60 mm}\noutput: {formats: [stl]}\n")
+    trial = ["--dry-run", "--trial", f"t{named}" if folder == "." else f"{named}t"]
+    assert run([str(spec), "--database", named, *trial]) == 0
+    assert Path(trial[-1]).is_file()
+    assert run([str(spec), "--database", named]) == 0
+    assert f"registered in {named}" in capsys.readouterr().out.replace("\n", "")
+    assert (home / name).is_file()
+    assert len(open_lab(named).arrays[0].faces) == 6
+    assert said(capsys, "export", f"{named}.out", "--database", named)["exported"] == ["Cube"]
+    assert run(["import", f"{named}.out", "--database", f"{named}.new"]) == 0
+    made = {path.name for path in home.iterdir()} - {"c.yaml", "out", "w%41?#x"}
+    assert made == {name, f"{name}.out", f"{name}.new", Path(trial[-1]).name}
+
+
+def test_an_object_of_a_pitch_that_no_face_bears_is_called_damaged(cube, capsys):
+    with closing(sqlite3.connect("lab.db")) as base:
+        base.execute("update objects set pitch_mm = 1e-9")
+        base.commit()
+    assert run(["show", "Cube"]) == 4
+    assert "never written" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("answer", "left"), [("n", 1), ("y", 0)])

@@ -181,6 +181,15 @@ def test_values_that_are_no_counts_are_refused_and_where(tmp_path, bad):
     assert len(list(Recording(path).frames(0, 256))) == 256
 
 
+@pytest.mark.parametrize("kind", [np.float16, np.float32])
+def test_counts_of_floats_are_read_without_a_warning(tmp_path, kind):
+    times = np.zeros(600, np.float32)
+    path = foreign(tmp_path / "a.h5", frames=COUNTS.astype(kind), t_ns=times)
+    read = [frame.counts for frame in Recording(path).frames()]
+    assert np.array_equal(read, COUNTS.astype(kind))
+    refused(foreign(tmp_path / "b.h5", frames=COUNTS, t_ns=times + 2.0**63), "other things than")
+
+
 def test_attributes_of_others_are_kept_and_a_user_block_does_not_matter(tmp_path):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w", userblock_size=1024) as file:
@@ -195,6 +204,7 @@ def test_attributes_of_others_are_kept_and_a_user_block_does_not_matter(tmp_path
 
 def test_others_files_stay_beside_the_repaired_one(tmp_path):
     path = foreign(tmp_path / "a.h5", frames=COUNTS, seq=np.arange(500), notes="keep me")
+    refused(path, "different lengths")
     assert repair(path).frames == 500
     with h5py.File(tmp_path / "a.damaged.h5") as file:
         assert file["notes"][()] == b"keep me"
