@@ -131,7 +131,9 @@ def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) 
             f"{what}: {error.strerror or error}", fix="check folder, space and rights"
         )
         code = exit_code_of_write(error)
-    except MemoryError:
+    except (MemoryError, ImportError) as error:
+        if isinstance(error, ImportError) and "failed to map segment" not in str(error):
+            raise
         problem = EncodedObjectsError(
             "the memory is used up", fix="end other programs, allow more, or do less at once"
         )

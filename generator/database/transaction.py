@@ -257,7 +257,12 @@ _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
         "check the disk, its space and the limit of a file's size, then run the same command again",
     ),
     (
-        ("57", "08", "53"),
+        ("57014", "53"),
+        "the server did not complete the work, what was begun is undone: {}",
+        "run the same command again, or ask the server's administrator",
+    ),
+    (
+        ("57", "08"),
         "the server ended the connection, what was begun is undone: {}",
         "run the same command again",
     ),

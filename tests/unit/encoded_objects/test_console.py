@@ -67,6 +67,9 @@ from encoded_objects.base.options import Application, Json, command
 
 app = Application()
 
+def fail_to_map():
+    raise ImportError("libX.so: failed to map segment from shared object")
+
 @command(app)
 def act(as_json: Json = False):
     print("an answer")
@@ -88,6 +91,7 @@ console.main("do", lambda _: app, bare=True)
         ("open('gone/made', 'x')", "", 2, "an answer", "cannot write 'gone/made': No such file"),
         ("open('/dev/full', 'w', 1).write('x\\n')", "", 1, "an answer", "cannot write: No space"),
         ("bytearray(1 << 62)", "", 1, "an answer", "the memory is used up"),
+        ("fail_to_map()", "", 1, "an answer", "the memory is used up"),
         ("bytearray(1 << 62)", "--json", 1, '"exit_code": 1', "a message\n"),
     ],
 )

@@ -215,8 +215,10 @@ def test_no_password_is_kept(cube, capsys, database_on):
         assert probe_sensor(["record", f"sim:{face}", "-o", "b.h5", "--frames", "2"]) == 0
         assert probe_sensor(["info", f"sim:{face}", "--seconds", "0.1"]) == 0
         assert probe_sensor(["simulate", f"{url}#Nope/F1"]) == 2
-        work = prepare_run(Path.cwd(), Campaign(kinds=(("face", 1.0),)), [], url, resume=False)
-        assert work.database == url
+        for again in (False, True):  # the record has no password: it is given again
+            campaign = Campaign(kinds=(("face", 1.0),))
+            work = prepare_run(Path.cwd(), campaign, [], url, resume=again)
+            assert work.database == url
         assert read_record(Path.cwd()).database == url.replace(":secret", "")
         offered, opened = asyncio.run(open_at_bench(url, face))
         assert offered["database"] == url.replace("secret", "***")

@@ -196,6 +196,17 @@ def test_a_connection_that_the_server_ends_is_no_damage(new_database, postgresql
         assert list_objects(connection) == ()
 
 
+def test_work_that_a_server_does_not_complete_is_no_damage(new_database):
+    engine = open_database(new_database("postgresql"))
+
+    def work(connection):
+        connection.execute(text("SET LOCAL statement_timeout = 1"))
+        connection.execute(text("SELECT pg_sleep(60)"))
+
+    with pytest.raises(DatabaseError, match=r"did not complete .* timeout"):
+        retry_on_conflict(engine, work)
+
+
 def test_no_room_for_a_database_is_no_damage(tmp_path):
     engine = open_database(str(tmp_path / "lab.db"))
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
