@@ -64,7 +64,8 @@ def file_exists_error(out: Path) -> EncodedObjectsError:
 def staged_file(out: Path, *, replace: bool = True) -> Iterator[Path]:
     """Yield a name next to `out` to write to; it becomes `out` when all went well.
 
-    Raises `OSError` and `EncodedObjectsError`, of `out`; without `replace`, `FileExistsError` if `out` has come up meanwhile.
+    Raises `OSError` and `EncodedObjectsError`, of `out`; without `replace`, `FileExistsError` if
+    `out` has come up meanwhile.
     """
     draft = out.with_name(f".{out.stem}.{os.getpid()}-{threading.get_ident()}{out.suffix}")
     try:
