@@ -80,6 +80,9 @@ def test_what_is_promised_is_seen_and_a_link_opens_it_again(page, own, browser):
     other = opened_to_make(browser, page.url)
     assert other.get_by_test_id("make-spec").text_content() == spec
     other.close()
+    long = opened_to_make(browser, f"{page.url.split('#')[0]}#make?shape.box={'9' * 2000}")
+    expect(long.get_by_test_id("error")).to_contain_text("not offered here: shape.box")
+    long.close()
 
 
 def test_a_refusal_has_the_command_s_words_at_its_field(page, tmp_path, capsys):

@@ -42,7 +42,7 @@ export class SpecForm {
     });
   }
 
-  /** Fill the form as a link says; returns what it says of settings that there are not. */
+  /** Fill the form as a link says; returns its settings that are not there, or whose values are too long. */
   fill(link: URLSearchParams): string[] {
     const given = [...link].filter(([, value]) => value.length < 2000);
     const kind = given.map(([path]) => /^shape\.(\w+)/.exec(path)?.[1]).find((one) => this.shapes.some(([known]) => known === one));
@@ -50,7 +50,7 @@ export class SpecForm {
     for (const field of this.fields.values()) field.value = "";
     this.choose(kind ?? this.shapes[0]![0], kind !== undefined);
     for (const [path, value] of [["name", "Part"], ["sensor_type", this.settings.sensor_type], ...given] as [string, string][]) this.set(path, value);
-    return given.filter(([path, value]) => this.fields.get(path)?.value !== value).map(([path]) => path);
+    return [...link].filter(([path, value]) => this.fields.get(path)?.value !== value).map(([path]) => path.slice(0, 60));
   }
 
   get link(): string { return `#make?${new URLSearchParams([...this.values])}`; }

@@ -64,7 +64,7 @@ export class MakeDialog {
     this.form ??= new SpecForm(element("make-form"), settings, () => this.change());
     if (link || first) {
       const unknown = this.form.fill(link ?? new URLSearchParams());
-      if (unknown.length) showError(`The link names settings that are not offered here: ${unknown.join(", ")}.`);
+      if (unknown.length) showError(`The link names settings or values that are not offered here: ${unknown.join(", ")}.`);
     }
     this.change(0);
   }

@@ -31,7 +31,7 @@ export class MapPanel {
     this.owners.clear();
     this.objects = [...new Set(map.faces.map((face) => face.object))];
     map.faces.forEach((face, n) => face.rows.forEach((row, i) => this.owners.set(`${row},${face.columns[i]}`, n)));
-    say(this.text, `${map.rows} × ${map.columns} cells, ${this.owners.size.toLocaleString("en")} taken by ${this.objects.length} objects`);
+    say(this.text, `${map.rows} × ${map.columns} cells, ${this.owners.size.toLocaleString("en")} taken by ${this.objects.length} object${this.objects.length === 1 ? "" : "s"}`);
     this.all();
   }
 
