@@ -52,7 +52,10 @@ def test_the_same_solid_again_keeps_its_cells_and_another_is_refused(tmp_path):
         encoded(tmp_path, block(31.0))
     replaced = encoded(tmp_path, block(31.0), replace=True)
     assert not replaced.reused
-    assert replaced.layout.faces[0].placement == first.layout.faces[0].placement  # freed for it
+    assert any("destroy its printed parts" in said for said in replaced.warnings)
+    assert replaced.layout.faces[0].placement != first.layout.faces[0].placement  # beside it
+    back = encoded(tmp_path, block(), replace=True)
+    assert back.layout.faces[0].placement == first.layout.faces[0].placement  # freed for others
 
 
 def test_settings_are_those_of_a_spec_and_errors_name_them(tmp_path):
