@@ -117,10 +117,13 @@ def _face_lines(reports: Sequence[FaceReport]) -> list[str]:
             answered = f"{once:.0%} answered at once, {later}"
             if face.promise.meets:
                 answered += f"{face.promise.obstacle}, "
-        shown = f"{_count(face.symbols, 'symbol')}, {answered}places can be told down to {least} mm"
-        if not face.symbols:
-            told = math.isfinite(face.smallest_mm[0])
-            shown = f"blank: places could be told from {least} mm" if told else "blank"
+        if face.symbols:
+            count = _count(face.symbols, "symbol")
+            shown = f"{count}, {answered}places can be told down to {least} mm"
+        elif math.isfinite(face.smallest_mm[0]):
+            shown = f"blank: places could be told from {least} mm"
+        else:
+            shown = "blank"
         text = f"{size} mm, {shown}"
         named.setdefault(text, []).append(face.name)
     titles = [f"{output.some_of(names)}:" for names in named.values()]
@@ -232,8 +235,7 @@ def next_step(result: Encoded) -> str:
 
 def _of_set(result: Encoded) -> str:
     files = result.to_print
-    sheets = (file for file in result.set_files if file.name.endswith("-build.html"))
-    sheet = next(sheets, None)
+    sheet = _build_sheet(result.set_files)
     steps = []
     if files:
         lies = "as it lies" if len(files) == 1 else "as they lie"
@@ -254,12 +256,16 @@ def _of_set(result: Encoded) -> str:
     return "next: " + ", then ".join(steps)
 
 
+def _build_sheet(files: Sequence[Path]) -> Path | None:
+    return next((file for file in files if file.name.endswith("-build.html")), None)
+
+
 def _first_and_last(files: Sequence[Path]) -> str:
     return files[0].name if len(files) == 1 else f"{files[0].name} ... {files[-1].name}"
 
 
 def _of_object(made: MadeObject) -> list[str]:
-    sheet = next((file for file in made.files if file.name.endswith("-build.html")), None)
+    sheet = _build_sheet(made.files)
     steps = [f"open {sheet}"] if sheet else []
     printable = [f for suffix in (".3mf", ".stl") for f in made.files if f.suffix == suffix]
     plates = _plates(printable)

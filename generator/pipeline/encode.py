@@ -194,8 +194,8 @@ def _dry_run(
         placed = next(places)
         step(f"building {plan.spec.name}", 0.5)
         parts, warnings = parts_of(plan, placed.layout)
-        warnings += (placed.gone,) if placed.gone else ()
         faces = face_reports(plan, placed.layout, smallest=True)
+        warnings += placed.warnings
         one = describe_object(plan, placed.layout, len(parts), warnings, faces)
         made.append(replace_fields(one, reused=placed.reused))
         used = placed.taken + made[-1].symbols

@@ -141,7 +141,7 @@ def _commit(made: MadeObject, placed: PlacedObject, staging: Staging) -> MadeObj
     written = tuple(file.path for file in staging.commit())
     new = {os.path.normpath(path.absolute()) for path in written}
     left = [path for path in placed.old_files if str(path) not in new and path.is_file()]
-    warnings = (*made.warnings, placed.gone) if placed.gone else made.warnings
+    warnings = (*made.warnings, *placed.warnings)
     if left:
         names = some_of([path.name for path in left])
         warnings += (f"files of what it replaces stay in {left[0].parent}: {names}",)

@@ -38,7 +38,7 @@ class PlacedObject:
     taken: int  #: cells that other objects hold
     reused: bool  #: registered before, on these cells
     replaces: bool  #: registered before from another spec, which goes
-    gone: str = ""  #: what to do with printed parts of the replaced object; empty: they stay good
+    warnings: tuple[str, ...] = ()  #: what to do with printed parts of the replaced object
     old_files: tuple[Path, ...] = ()  #: of the replaced object
     built: BuiltParts | None = None  #: its parts, where a dry build made them
 
@@ -75,19 +75,23 @@ def place_object(
         require_same_spec(connection, known, plan.meaning)
         layout = read_layout(connection, plan.spec.name)
         return PlacedObject(layout, others.used, reused=True, replaces=False)
-    layout, gone = _lay_out_at_shape(plan, others), ""
+    layout = _lay_out_at_shape(plan, others)
+    warnings: tuple[str, ...] = ()
     before = read_object(connection, known.name)
     files = tuple(part_path(connection.engine.url, part.file) for part in before.parts)
     if known.array_id == array_id and _same_places(before, plan, layout):
         layout = before.layout  # its printed parts stay good
     else:
-        gone = (
+        note = (
             f"it replaces what was registered under this name ({known.utc}), whose cells are free "
             "for others: destroy its printed parts"
         )
+        warnings = (note,)
         with suppress(LayoutError):  # beside it, so that its printed parts are not read as the new
             layout = lay_out_object(plan, everything)
-    return PlacedObject(layout, others.used, False, True, gone=gone, old_files=files)
+    return PlacedObject(
+        layout, others.used, reused=False, replaces=True, warnings=warnings, old_files=files
+    )
 
 
 def _same_places(before: RegisteredObject, plan: ObjectPlan, layout: Layout) -> bool:

@@ -333,10 +333,10 @@ def _chosen_stance(polyhedron: Polyhedron, spec: ObjectSpec) -> Stance | None:
 
 def _pitch_note(spec: ObjectSpec) -> tuple[str, ...]:
     """Return the note that symbols are coarser than usual, which a touch shows fewer of."""
+    if not spec.coarser:
+        return ()
     pitch, usual = spec.style.pitch_mm, spec.sensor.symbol_pitch_mm
-    return (
-        (f"pitch {pitch:g} mm is taken; at {usual:g} mm: {spec.coarser}",) if spec.coarser else ()
-    )
+    return (f"pitch {pitch:g} mm is taken; at {usual:g} mm: {spec.coarser}",)
 
 
 def _sensor_note(spec: ObjectSpec) -> tuple[str, ...]:
