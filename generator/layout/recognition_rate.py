@@ -158,9 +158,6 @@ class AnsweredShare:
     Logistic in the loaded share: larger sensors hang over borders, which membranes of gels bridge.
     """
 
-    tactel_mm: float  #: of the type, the larger of its pitches
-    across_mm: float  #: of the type, as `SensorType.across_mm`
-    symbol_pitch_mm: float  #: that it was measured on
     constant: float
     by_loaded: float
 
@@ -169,7 +166,7 @@ class AnsweredShare:
         return np.asarray(1 / (1 + np.exp(-(self.constant + self.by_loaded * loaded))))
 
 
-ROUND = AnsweredShare(USUAL_SENSOR.pitch_mm, USUAL_SENSOR.across_mm, 5.0, -9.1, 13.3)
+ROUND = AnsweredShare(-9.1, 13.3)
 """Of round faces: a plate that touches along a line and hangs over a rim, or over the seam of the
 symbols, is read less than on a flat face; the likeliest numbers for the same touches."""
 
@@ -308,19 +305,18 @@ def like_measured(sensor: SensorType) -> str:
 
     Itself, or the one most like it in tactels to a symbol and symbols across the sensor.
     """
-    usual, tactel, across = USUAL_SENSOR, max(USUAL_SENSOR.step_mm), USUAL_SENSOR.across_mm
-    known = {usual.name: AnsweredShare(tactel, across, usual.symbol_pitch_mm, 0.0, 0.0)}
-    known |= measured_types()
-    if sensor.name in known:
+    names = (USUAL_SENSOR.name, *measured_types())
+    if sensor.name in names:
         return sensor.name
+    from encoded_objects.base.sensor_type_file import sensor_type_named  # costs start-up
 
     def unlike(name: str) -> float:
-        one, ours = known[name], sensor.symbol_pitch_mm
-        tactels = one.symbol_pitch_mm / one.tactel_mm * max(sensor.step_mm) / ours
-        symbols = one.across_mm / one.symbol_pitch_mm * ours / sensor.across_mm
-        return math.hypot(math.log(tactels), math.log(symbols))
+        one = sensor_type_named(name)
+        tactels, ours = (each.symbol_pitch_mm / max(each.step_mm) for each in (one, sensor))
+        symbols, seen = (each.across_mm / each.symbol_pitch_mm for each in (one, sensor))
+        return math.hypot(math.log(tactels / ours), math.log(symbols / seen))
 
-    return min(known, key=unlike)
+    return min(names, key=unlike)
 
 
 def answered_at_once(
@@ -343,10 +339,7 @@ def answered_at_once(
 def measured_types() -> dict[str, AnsweredShare]:
     """Return the shares of the sensor types that were measured, by name."""
     text = (resources.files("generator.layout") / "answers_of_types.json").read_text("utf-8")
-    return {
-        name: AnsweredShare(one["tactel_mm"], one["across_mm"], one["pitch_mm"], *one["logit"])
-        for name, one in json.loads(text).items()
-    }
+    return {name: AnsweredShare(*one["logit"]) for name, one in json.loads(text).items()}
 
 
 @lru_cache(maxsize=2)
