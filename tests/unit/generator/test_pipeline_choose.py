@@ -204,6 +204,7 @@ def test_auto_takes_finer_symbols_on_a_printer_that_makes_them(tmp_path):
         ("[60, 14, 14]", DENSE + "print: {printer: fdm-0.6}\n", 5.0),
         ("[60, 15, 15]", "symbols: {alphabet: dense-4, pitch: 5 mm}\n", 5.0),
         ("[60, 17, 17]", DENSE, 5.0),
+        ("[160, 14, 14]", DENSE, 5.0),  # ends of 4 % of its surface stay blank
     ):
         found = choice(tmp_path, f"name: A\nshape: {{box: {box}}}\n{settings}")
         assert found.plans[0].spec.style.pitch_mm == pitch
