@@ -75,7 +75,7 @@ def registrations(draw):
     )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=38)
+@settings(deadline=None, max_examples=30)
 @given(engine=engines, registration=registrations())
 def test_everything_comes_back_bit_for_bit(database_on, engine, registration):
     with database_on(engine) as url:

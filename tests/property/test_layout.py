@@ -129,7 +129,7 @@ def test_unfolding_keeps_areas_and_never_overlaps(solid, cuts):
 
 
 @given(solids, st.sampled_from(["faces", "net"]), st.integers(0, 10**6))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=7, deadline=None)
 def test_layouts_use_no_cell_twice_and_keep_clear_of_edges(solid, kind, seed):
     random = np.random.default_rng(seed)
     clearances = [

@@ -157,6 +157,12 @@ def test_a_failed_export_leaves_what_is_there(exported, file):
     assert [path.name for path in file.parent.iterdir()] == ["exchange.db"]
 
 
+def test_a_rehearsed_import_changes_nothing(lab_url, exported):
+    make(lab_url, "Other", profile="large", solid=cube(60.0))
+    assert import_objects(lab_url, str(exported), dry_run=True).copied == ("Cube",)
+    assert names(lab_url) == ["Other"]
+
+
 DAMAGE = {
     "a symbol": ("UPDATE cells SET label = (label + 1) % 4 WHERE position = 3", "has symbol"),
     "a cell": ('UPDATE cells SET "row" = "row" + 63 WHERE position = 3', "beyond its array"),

@@ -207,8 +207,7 @@ def test_a_read_only_place_is_refused_for_writing_alone(unprivileged):
 
 
 def test_an_older_database_that_may_not_be_written_says_what_to_do(unprivileged):
-    path = unprivileged / "lab.db"
-    shutil.copy(EARLIER / "v1.db", path)
+    path = Path(of_version(1, str(unprivileged / "lab.db")))
     path.chmod(0o444)
     unprivileged.chmod(0o555)
     with pytest.raises(DatabaseError, match="schema version 1, must be brought to 3") as caught:

@@ -7,7 +7,7 @@ from generator.array.profiles import profile
 from generator.errors import LayoutError
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout, Layout, Placement, object_code
-from generator.layout.unfold import overlap, triangles_of, unfold
+from generator.layout.unfold import overlap, split, triangles_of, unfold
 from generator.polyhedron import shapes
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
@@ -114,6 +114,12 @@ def test_solids_unfold_in_one_piece(solid):
     net = unfold(solid)
     assert sorted(net.pieces[0]) == list(range(len(solid.faces)))
     assert net.parents.count(-1) == len(net.pieces) == 1
+
+
+def test_a_piece_is_split_into_halves():
+    net = split(unfold(CUBE), 0)
+    assert sorted(map(len, net.pieces)) in ([2, 4], [3, 3])
+    assert net.parents.count(-1) == 2
 
 
 def square(x, y, side=1.0):

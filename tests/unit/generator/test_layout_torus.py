@@ -76,28 +76,6 @@ def test_placing_from_another_first_cell_is_a_shift_of_the_same(size):
         )
 
 
-KINDS = {
-    "rectangle": lambda a, b: np.ones((a, b), dtype=bool),
-    "triangle": lambda a, _: np.add.outer(np.arange(a + 1), np.arange(a + 1)) <= a,
-    "hexagon": lambda a, _: np.add.outer(*[np.abs(np.arange(a + 1) - a / 2)] * 2) <= 0.8 * a,
-    "parallelogram": lambda a, b: np.array(
-        [[row <= column < row + b for column in range(a + b)] for row in range(a)]
-    ),
-}
-
-
-def test_mixed_faces_fill_the_array():
-    """At full load at least 0.88 of the default array is used."""
-    random = np.random.default_rng(1)
-    rows, columns, masks = 63, 65, []
-    while sum(int(mask.sum()) for mask in masks) < rows * columns:
-        kind = list(KINDS)[random.integers(4)]
-        masks.append(KINDS[kind](*random.integers(3, 8, 2)))
-    spots = place_pieces(torus(rows, columns), [(mask, TURNS) for mask in masks])
-    placed = sum(mask.sum() for mask, spot in zip(masks, spots, strict=True) if spot is not None)
-    assert placed >= 0.88 * rows * columns
-
-
 def cells(row, column, height, width):
     return tuple(i.ravel() for i in np.mgrid[row : row + height, column : column + width])
 
