@@ -152,4 +152,5 @@ def read_3mf(path: Path, _out: Path) -> None:
     from generator.printed.deposit import beads_of
     from generator.printed.gcode import read_gcode
 
-    beads_of(read_gcode(path))
+    if not np.isfinite(beads_of(read_gcode(path)).width_mm).all():
+        raise WrongValueError("beads that have no width")
