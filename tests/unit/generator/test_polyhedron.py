@@ -19,10 +19,8 @@ from generator.polyhedron import (
     face_area,
     face_frame,
     face_normal,
-    face_polygon,
     flatten,
     polyhedron,
-    side_of_face,
     volume,
 )
 from generator.polyhedron.flatten import flatten_faces
@@ -115,14 +113,6 @@ def block_with_hole():
     return CUBE + inner, faces
 
 
-def test_through_hole_has_genus_one():
-    solid = polyhedron("polyhedron", *block_with_hole())
-    assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (16, 24, 10)
-    assert (solid.euler_characteristic, solid.genus) == (0, 1)
-    assert volume(solid) == pytest.approx(60**3 - 20 * 20 * 60, rel=1e-14)
-    assert len(solid.faces[0].loops) == 2
-
-
 def test_solid_given_inside_out_is_turned_and_says_so():
     solid = polyhedron("polyhedron", CUBE, [face[::-1] for face in FACES])
     assert volume(solid) == 60**3
@@ -153,61 +143,50 @@ def test_what_is_wrong_is_said(change, says):
 
 def test_holes_that_are_wrong_are_named():
     vertices, faces = block_with_hole()
+    assert polyhedron("polyhedron", vertices, faces).genus == 1
     turned = [[faces[0][0], faces[0][1][::-1]], *faces[1:]]
     assert "hole 1 runs counter-clockwise" in str(refused(vertices, turned))
     swapped = [faces[0][::-1], *faces[1:]]
     assert "hole 1 lies outside it; list the outer loop first" in str(refused(vertices, swapped))
 
 
-def test_sliver_and_flat_solids_are_refused():
-    flat = [(0, 0, 0), (60, 0, 0), (30, 1e-5, 0), (30, 0, 40)]
-    faces = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
-    assert "a line, not a face" in str(refused(flat, faces))
-    pressed = [(0, 0, 0), (60, 0, 0), (0, 60, 0), (20, 20, 1e-5)]
-    assert "the solid is flat: its volume is 0.006 mm^3" in str(refused(pressed, faces))
+FLOOR = [(3, 2, 5), (2, 1, 5), (1, 0, 5), (0, 3, 5)]
+ROOF = [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
+DENTED = [*CUBE[:4], (30, 30, 60), (30, 30, -20)]
+TETRAHEDRON = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
+#: The projective plane on six vertices: closed, every edge twice, one-sided.
+ONE_SIDED = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5), (0, 5, 1),
+             (1, 2, 4), (2, 3, 5), (3, 4, 1), (4, 5, 2), (5, 1, 3)]  # fmt: skip
 
 
-def test_two_bodies_are_refused():
-    far = [(x + 100, y, z) for x, y, z in CUBE]
-    faces = FACES + [tuple(v + 8 for v in face) for face in FACES]
-    assert "2 separate shells (they start at faces F1, F7)" in refused(CUBE + far, faces).cause
+@pytest.mark.parametrize(
+    ("vertices", "faces", "says"),
+    [
+        ([(0, 0, 0), (60, 0, 0), (30, 1e-5, 0), (30, 0, 40)], TETRAHEDRON, "a line, not a face"),
+        ([(0, 0, 0), (60, 0, 0), (0, 60, 0), (20, 20, 1e-5)], TETRAHEDRON,
+         "the solid is flat: its volume is 0.006 mm^3"),
+        ([*CUBE, *((x + 100, y, z) for x, y, z in CUBE)],
+         [*FACES, *(tuple(v + 8 for v in face) for face in FACES)],
+         "2 separate shells (they start at faces F1, F7)"),
+        # the first corner of the other cube is the last of this one
+        ([*CUBE, *((60 + x, 60 + y, 60 + z) for x, y, z in CUBE[1:])],
+         [*FACES, *(tuple(v + 7 if v else 6 for v in face) for face in FACES)],
+         "touches itself at vertex 6 (60, 60, 60)"),
+        # a dent in the floor that reaches through the roof
+        ([*DENTED[:5], (55, 30, 40)], FLOOR + ROOF, "runs through it at"),
+        (np.random.default_rng(5).uniform(0, 60, size=(6, 3)), ONE_SIDED, "no outside"),
+    ],
+    ids=["sliver", "flat", "two bodies", "touching", "cuts itself", "one-sided"],
+)  # fmt: skip
+def test_solids_that_are_none_are_refused(vertices, faces, says):
+    assert says in refused(vertices, faces).cause
 
 
-def test_bodies_that_touch_at_a_vertex_are_refused():
-    other = [(60 + x, 60 + y, 60 + z) for x, y, z in CUBE]
-    number = {0: 6, **{k: k + 7 for k in range(1, 8)}}
-    faces = FACES + [tuple(number[v] for v in face) for face in FACES]
-    assert "touches itself at vertex 6 (60, 60, 60)" in refused(CUBE + other[1:], faces).cause
-
-
-def test_solid_that_cuts_through_itself_is_refused():
-    # A block whose notch is deeper than the block is thick.
+def test_a_dent_and_a_notch_that_cuts_through():
+    assert len(polyhedron("polyhedron", DENTED, FLOOR + ROOF).faces) == 8
     profile = [(0, 0), (80, 0), (80, 40), (50, 40), (40, -20), (30, 40), (0, 40)]
     with pytest.raises(ShapeError, match="cross or touch"):
         extruded([np.array(profile, float)], 40)
-    # The same found in space alone: a spike through the opposite face.
-    pierced = [(0, 0, 0), (60, 0, 0), (60, 60, 0), (0, 60, 0), (30, 30, 40), (30, 30, 60)]
-    faces = [(0, 3, 2, 1), (0, 1, 5), (1, 2, 5), (2, 3, 5), (3, 0, 5)]
-    polyhedron(
-        "polyhedron", [*pierced[:4], pierced[5]], [tuple(min(v, 4) for v in f) for f in faces]
-    )
-    dented = [*pierced[:4], (30, 30, 60), (30, 30, -20)]
-    floor = [(3, 2, 5), (2, 1, 5), (1, 0, 5), (0, 3, 5)]
-    roof = [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
-    assert len(polyhedron("polyhedron", dented, floor + roof).faces) == 8
-    dented[5] = (55, 30, 40)
-    assert "runs through it at" in str(refused(dented, floor + roof))
-
-
-def test_moebius_band_of_faces_has_no_outside():
-    # The projective plane on six vertices: closed, every edge twice, one-sided.
-    rng = np.random.default_rng(5)
-    vertices = rng.uniform(0, 60, size=(6, 3))
-    faces = [
-        (0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5), (0, 5, 1),
-        (1, 2, 4), (2, 3, 5), (3, 4, 1), (4, 5, 2), (5, 1, 3),
-    ]  # fmt: skip
-    assert "no outside" in str(refused(vertices, faces))
 
 
 ELL = np.array([(0, 0), (80, 0), (80, 20), (20, 20), (20, 60), (0, 60)], float)
@@ -218,39 +197,6 @@ def unchecked(vertices, faces):
     named = tuple(Face(f"F{k + 1}", (face,)) for k, face in enumerate(faces))
     edges = winged_edges([face.loops for face in named])
     return Polyhedron("polyhedron", np.array(vertices, dtype=float), named, edges)
-
-
-@pytest.mark.parametrize("name", ["cube", "tetrahedron", "dodecahedron"])
-def test_frame_has_its_origin_at_the_first_vertex_and_x_along_the_first_edge(name):
-    solid = SHAPES[name](side=60)
-    for k, face in enumerate(solid.faces):
-        T = face_frame(solid, k)
-        assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0, abs=1e-14)
-        (polygon,) = face_polygon(solid, k)
-        corners = np.column_stack([polygon, np.zeros(len(polygon)), np.ones(len(polygon))])
-        assert (corners @ T.T)[:, :3] == pytest.approx(
-            solid.vertices[list(face.loops[0])], abs=1e-12
-        )
-        assert polygon[0].tolist() == [0.0, 0.0]
-        assert polygon[1] == pytest.approx([60.0, 0.0], abs=1e-12)
-        centre = solid.vertices.mean(axis=0) - T[:3, 3]
-        assert centre @ T[:3, 2] < 0  # z looks outward
-
-
-def test_l_block_angles_and_areas():
-    solid = extruded([ELL], 40)  # its face 0 is the top
-    angles = sorted(round(math.degrees(dihedral(solid, k)), 9) for k in range(len(solid.edges)))
-    assert angles == [90.0] * 17 + [270.0]
-    assert face_area(solid, 0) == pytest.approx(80 * 20 + 20 * 40)
-    points = [(10, 10), (50, 50), (20, 20), (79, 19), (10, 60), (10, 61)]
-    assert side_of_face(solid, 0, points).tolist() == [1, -1, 0, 1, 0, -1]
-
-
-def test_side_of_a_face_with_a_hole():
-    outer = [(0, 0), (60, 0), (60, 60), (0, 60)]
-    loops = [np.array(outer, float), np.array([(20, 20), (20, 40), (40, 40), (40, 20)], float)]
-    points = [(30, 30), (10, 10), (20, 30), (60, 60), (20, 20), (70, 20), (30, 20), (50, 20)]
-    assert side_of_polygon(loops, points).tolist() == [-1, 1, 0, 0, 0, -1, 0, 1]
 
 
 @pytest.mark.parametrize("alpha", [1e-15, 1e-12, 1e-9, 1e-8, 1e-4, 0.1, 1.0, 3.0])
@@ -298,84 +244,58 @@ def test_sliver_far_from_the_origin_is_exact():
     assert 100 < exact.count(1) < 200
 
 
-def rounded_dodecahedron():
-    solid = SHAPES["dodecahedron"](side=30)
-    return np.round(solid.vertices, 3), [face.loops for face in solid.faces]
+DODECAHEDRON = SHAPES["dodecahedron"](side=30)
+LOOPS = [face.loops for face in DODECAHEDRON.faces]
 
 
-def bend(vertices, faces):
-    worst = 0.0
-    for (loop,) in faces:
-        points = vertices[list(loop)] - vertices[list(loop)].mean(axis=0)
-        worst = max(worst, np.linalg.svd(points)[1][2])
-    return worst
+def bend(vertices):
+    """Return the most by which a face of the dodecahedron leaves its plane."""
+    faces = [vertices[list(loop)] - vertices[list(loop)].mean(axis=0) for (loop,) in LOOPS]
+    return max(np.linalg.svd(points)[1][2] for points in faces)
 
 
 def test_many_equations_are_solved_as_few(monkeypatch):
-    vertices, faces = rounded_dodecahedron()
-    dense, _ = flatten_faces(vertices, faces)
+    vertices = np.round(DODECAHEDRON.vertices, 3)
+    dense, _ = flatten_faces(vertices, LOOPS)
     monkeypatch.setattr(flatten, "DENSE_EQUATIONS", 10)
-    sparse, _ = flatten_faces(vertices, faces)
-    assert bend(sparse, faces) < 1e-12
+    sparse, _ = flatten_faces(vertices, LOOPS)
+    assert bend(sparse) < 1e-12
     assert sparse == pytest.approx(dense, abs=1e-9)
     assert (sparse != vertices).any()
-    monkeypatch.setattr(flatten, "DENSE_EQUATIONS", 10)
     monkeypatch.setattr(flatten, "MOST_EQUATIONS", 20)
-    assert (flatten_faces(vertices, faces)[0] == vertices).all()
+    assert (flatten_faces(vertices, LOOPS)[0] == vertices).all()
 
 
 def test_planar_enough_for_parts_stays_as_given_where_there_are_many(monkeypatch):
-    solid = SHAPES["dodecahedron"](side=30)
-    faces = [face.loops for face in solid.faces]
-    vertices = solid.vertices + 1e-10 * np.random.default_rng(3).normal(size=solid.vertices.shape)
-    assert flatten_faces(vertices, faces)[1] > 0.0
+    vertices = DODECAHEDRON.vertices + 1e-10 * np.random.default_rng(3).normal(size=(20, 3))
+    assert flatten_faces(vertices, LOOPS)[1] > 0.0
     monkeypatch.setattr(flatten, "DENSE_EQUATIONS", 10)
-    assert flatten_faces(vertices, faces)[1] == 0.0
+    assert flatten_faces(vertices, LOOPS)[1] == 0.0
 
 
-def covered(solid, distance):
-    """Normals (rounded) of covered faces -> covered area and its extent in the object frame."""
-    found = covered_parts(solid, range(len(solid.faces)), distance)
-    return {
-        tuple(np.round(face_normal(solid, face)).astype(int) + 0): (
-            -sum(signed_area(loop) for loop in loops),
-            in_object(solid, face, np.concatenate(loops)),
-        )
-        for face, loops in found.items()
-    }
+def covered(outline, distance):
+    """Return y of the normals of covered faces of a bar -> covered area, and its extent in x."""
+    solid = extruded([np.array(outline, float)], 40.0)
+    found = {}
+    for face, loops in covered_parts(solid, range(len(solid.faces)), distance).items():
+        T, points = face_frame(solid, face), np.concatenate(loops)
+        x = points @ T[0, :2] + T[0, 3]
+        area = -sum(signed_area(loop) for loop in loops)
+        found[round(face_normal(solid, face)[1])] = (area, x.min(), x.max())
+    return found
 
 
-def in_object(solid, face, points):
-    T = face_frame(solid, face)
-    moved = np.column_stack([points, 0 * points[:, 0]]) @ T[:3, :3].T + T[:3, 3]
-    return moved.min(axis=0), moved.max(axis=0)
+#: A slot of 2 mm, and an overhang that rises by 1 mm in 10 from 1 mm above the floor, at x = 20.
+SLOT = [(0, 0), (60, 0), (60, 20), (20, 20), (20, 22), (50, 22), (50, 42), (0, 42)]
+SLANTED = [(0, 0), (60, 0), (60, 20), (20, 20), (20, 21), (60, 25), (60, 40), (0, 40)]
 
 
-#: A slot of 2 mm.
-C = np.array([(0, 0), (60, 0), (60, 20), (20, 20), (20, 22), (50, 22), (50, 42), (0, 42)], float)
-
-
-@pytest.mark.parametrize("shape", ["cube", "tetrahedron", "dodecahedron"])
-def test_convex_solids_cover_nothing(shape):
-    assert covered(SHAPES[shape](side=40), 1000.0) == {}
-
-
-def test_walls_of_a_slot_cover_each_other_where_both_are():
-    found = covered(extruded([C], 40.0), 2.8)
-    assert sorted(found) == [(0, -1, 0), (0, 1, 0)]
-    for area, (low, high) in found.values():
-        assert area == pytest.approx(30 * 40)
-        assert (low[0], high[0]) == pytest.approx((20, 50))
-
-
-def test_a_neighbour_across_a_reflex_edge_is_no_cover():
-    assert covered(extruded([ELL], 40.0), 1000.0) == {}
-
-
-def test_a_slanted_overhang_covers_as_far_as_it_is_near():
-    # Its lower side rises by 1 mm in 10 from 1 mm above the floor, at x = 20.
-    slanted = [(0, 0), (60, 0), (60, 20), (20, 20), (20, 21), (60, 25), (60, 40), (0, 40)]
-    found = covered(extruded([np.array(slanted, float)], 40.0), 3.0)
-    area, (low, high) = found[0, 1, 0]
-    assert (low[0], high[0]) == pytest.approx((20, 40))
-    assert area == pytest.approx(20 * 40)
+def test_faces_cover_each_other_as_far_as_they_are_near():
+    for shape in ("cube", "tetrahedron", "dodecahedron"):
+        assert covered_parts(SHAPES[shape](side=40), range(4), 1000.0) == {}
+    assert covered(ELL, 1000.0) == {}  # a neighbour across a reflex edge is no cover
+    found = covered(SLOT, 2.8)
+    assert sorted(found) == [-1, 1]
+    for wall in found.values():
+        assert wall == pytest.approx((30 * 40, 20, 50))
+    assert covered(SLANTED, 3.0)[1] == pytest.approx((20 * 40, 20, 40))

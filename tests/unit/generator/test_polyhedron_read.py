@@ -89,17 +89,63 @@ def test_obj_with_non_convex_polygons_negative_numbers_and_textures(written):
     assert (len(solid.faces), volume(solid)) == (8, pytest.approx(2400 * 40))
 
 
-def test_slivers_and_points_on_edges_vanish(written):
-    # A cube whose front has a point on its upper edge, filled on the top by a flat triangle.
+def prism(ring, height, caps):
+    """Return the triangles of a prism over a ring (x, y), its caps as triangles of the ring."""
+    found = []
+    for (a, b), (c, d) in zip(ring, ring[1:] + ring[:1], strict=True):
+        found += [
+            ((a, b, 0), (c, d, 0), (c, d, height)),
+            ((a, b, 0), (c, d, height), (a, b, height)),
+        ]
+    for cap in caps:
+        found += [[(*ring[k], height) for k in cap], [(*ring[k], 0) for k in reversed(cap)]]
+    return found
+
+
+def pointed_cube():
+    """A cube whose front has a point on its upper edge, filled on the top by a flat triangle."""
     cube = SHAPES["cube"](side=60)
-    a, b, c, d = cube.vertices[[4, 5, 6, 7]]
+    (e, f), (a, b, c, d) = cube.vertices[[0, 1]], cube.vertices[[4, 5, 6, 7]]
     m = 0.3 * a + 0.7 * b
-    front = cube.vertices[[0, 1]]
-    triangles = [t for k in (0, 2, 3, 4) for t in fan(cube.vertices[list(cube.faces[k].loops[0])])]
-    triangles += [(front[0], front[1], m), (front[1], b, m), (front[0], m, a)]
-    triangles += [(a, b, c), (a, c, d), (a, m, b)]
-    solid = read_shape(written("m.stl", triangles))
-    assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (8, 12, 6)
+    sides = [t for k in (0, 2, 3, 4) for t in fan(cube.vertices[list(cube.faces[k].loops[0])])]
+    return [*sides, (e, f, m), (f, b, m), (e, m, a), (a, b, c), (a, c, d), (a, m, b)]
+
+
+#: Between two walls that meet the top stands one 1.5 um wide, and a sliver of the top.
+SLIVER = [(0, 0), (100, 0), (100, 60), (60, 60.0015), (60, 60), (0, 60)]
+#: One side of a box has an edge that its neighbours have in two and three pieces.
+PIECES = [*prism([(0, 0), (30, 0), (30, 20), (0, 20)], 10, []),
+          ((0, 0, 10), (10, 0, 10), (0, 20, 10)), ((10, 0, 10), (18, 0, 10), (0, 20, 10)),
+          ((18, 0, 10), (30, 0, 10), (0, 20, 10)), ((30, 0, 10), (30, 20, 10), (0, 20, 10)),
+          ((15, 0, 0), (0, 0, 0), (0, 20, 0)), ((30, 0, 0), (15, 0, 0), (0, 20, 0)),
+          ((30, 0, 0), (0, 20, 0), (30, 20, 0))]  # fmt: skip
+
+
+def notched():
+    """The mouth of a notch 1.2 um wide is closed, so that its outline touches itself."""
+    ring = [(0, 0), (100, 0), (100, 20), (50, 20), (50.0006, 19.9992), (49.9994, 19.9992),
+            (50, 20), (0, 20)]  # fmt: skip
+    faces = [f"f {' '.join(str(k + 1) for k in reversed(range(8)))}", "f 9 10 11 12 13 14 15 16"]
+    faces += [f"f {k + 1} {(k + 1) % 8 + 1} {(k + 1) % 8 + 9} {k + 9}" for k in range(8)]
+    return "\n".join([f"v {x} {y} {z}" for z in (0, 30) for x, y in ring] + faces)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "faces", "mm3", "notes"),
+    [
+        ("point.stl", pointed_cube(), 6, 60**3, ()),
+        ("sliver.stl", prism(SLIVER, 40, [(0, k, k + 1) for k in range(1, 5)]), None,
+         100 * 60 * 40, None),
+        ("pieces.stl", PIECES, 6, 6000, ()),
+        ("notch.obj", notched(), 6, 100 * 20 * 30,
+         ("points nearer than 0.0023 mm were joined",)),
+    ],
+)  # fmt: skip
+def test_slivers_and_points_on_edges_vanish(written, name, content, faces, mm3, notes):
+    solid = read_shape(written(name, content))
+    assert volume(solid) == pytest.approx(mm3, rel=1e-4 if faces is None else 1e-6)
+    if faces is not None:
+        assert (len(solid.faces), solid.notes) == (faces, notes)
 
 
 CUBE = triangles_of(SHAPES["cube"](side=60))
@@ -113,9 +159,14 @@ CUBE = triangles_of(SHAPES["cube"](side=60))
         ([CUBE[0][::-1], *CUBE[1:]], "disagree about outside"),
         ([*CUBE[:2], *(t[::-1] for t in CUBE[:2])], "it is flat"),
         ([np.zeros((3, 3))] * 4, "smaller than a rounding"),
+        (PIECES[:-1], "not closed"),
+        # a notch whose tip cuts through the back of the bar
+        (prism([(0, 0), (60, 0), (60, 60), (30, -5), (0, 60)], 40,
+               [(0, 1, 3), (1, 2, 3), (0, 3, 4)]),
+         "face F1: the edge between vertices 4 and 6 runs through it"),
     ],
-    ids=["open", "doubled", "turned", "flat", "dot"],
-)
+    ids=["open", "doubled", "turned", "flat", "dot", "pieces", "through"],
+)  # fmt: skip
 def test_broken_meshes_are_told_apart(written, triangles, says):
     error = refused(written("broken.stl", triangles))
     assert says in error.cause
@@ -141,44 +192,13 @@ def test_bodies_are_counted_and_described(written):
     assert ", 2 smaller; one" in refused(written("6.stl", six)).cause
 
 
-def prism(ring, height, caps):
-    """Return the triangles of a prism over a ring (x, y), its caps as triangles of the ring."""
-    found = []
-    for (a, b), (c, d) in zip(ring, ring[1:] + ring[:1], strict=True):
-        found += [
-            ((a, b, 0), (c, d, 0), (c, d, height)),
-            ((a, b, 0), (c, d, height), (a, b, height)),
-        ]
-    for cap in caps:
-        found += [[(*ring[k], height) for k in cap], [(*ring[k], 0) for k in reversed(cap)]]
-    return found
-
-
-def test_a_notch_of_a_rounding_is_welded_and_it_is_said(written):
-    """The mouth of a notch 1.2 um wide is closed, so that its outline touches itself."""
-    ring = [(0, 0), (100, 0), (100, 20), (50, 20), (50.0006, 19.9992), (49.9994, 19.9992),
-            (50, 20), (0, 20)]  # fmt: skip
-    faces = [f"f {' '.join(str(k + 1) for k in reversed(range(8)))}", "f 9 10 11 12 13 14 15 16"]
-    faces += [f"f {k + 1} {(k + 1) % 8 + 1} {(k + 1) % 8 + 9} {k + 9}" for k in range(8)]
-    points = [f"v {x} {y} {z}" for z in (0, 30) for x, y in ring]
-    solid = read_shape(written("notch.obj", "\n".join(points + faces)))
-    assert len(solid.faces) == 6
-    assert volume(solid) == pytest.approx(100 * 20 * 30, rel=1e-6)
-    assert solid.notes == ("points nearer than 0.0023 mm were joined",)
-
-
-def test_slivers_of_a_wall_do_not_join_the_top(written):
-    """Between two walls that meet the top stands one 1.5 um wide, and a sliver of the top."""
-    ring = [(0, 0), (100, 0), (100, 60), (60, 60.0015), (60, 60), (0, 60)]
-    found = prism(ring, 40, [(0, k, k + 1) for k in range(1, 5)])
-    solid = read_shape(written("w.stl", found))
-    assert volume(solid) == pytest.approx(100 * 60 * 40, rel=1e-4)
-
-
-def test_obj_in_utf_16_is_read_and_other_bytes_are_named(written):
+def test_marks_of_an_encoding_are_read_and_other_bytes_named(written):
     for encoding in ("utf-16", "utf-8-sig"):
         solid = read_shape(written("t.obj", TETRAHEDRON.encode(encoding)))
         assert volume(solid) == pytest.approx(60**3 / 6)
+    text = (SHAPES_FOLDER / "l_bracket_ascii.stl").read_bytes()
+    marked = read_shape(written("m.stl", b"\xef\xbb\xbf" + text))  # no binary one
+    assert np.array_equal(marked.vertices, read_shape(written("plain.stl", text)).vertices)
     error = refused(written("t.obj", TETRAHEDRON.encode("utf-16-le")))
     assert (error.cause, error.fix[:15]) == (
         "it is no plain text: byte 1 is zero",
@@ -187,30 +207,20 @@ def test_obj_in_utf_16_is_read_and_other_bytes_are_named(written):
 
 
 def sphere(rows, columns, radius=30.0):
-    theta, phi = np.pi * np.arange(rows + 1) / rows, 2 * np.pi * np.arange(columns) / columns
-    p = np.array([[(radius * np.sin(t) * np.cos(f), radius * np.sin(t) * np.sin(f),
-                    radius * np.cos(t)) for f in phi] for t in theta])  # fmt: skip
-    return [
-        t
-        for i in range(rows)
-        for j in range(columns)
-        for k in [(j + 1) % columns]
-        for t in ((p[i, j], p[i + 1, j], p[i + 1, k]), (p[i, j], p[i + 1, k], p[i, k]))
-    ]
+    turn = np.pi * np.arange(rows + 1) / rows
+    return lathe(*zip(radius * np.sin(turn), -radius * np.cos(turn), strict=True), sides=columns)
 
 
-def test_a_sphere_stays_blank(written):
-    solid = read_shape(written("s.stl", sphere(24, 48)))
+def test_a_sphere_stays_blank_and_too_many_faces_are_counted(written, monkeypatch):
+    path = written("s.stl", sphere(24, 48))
+    solid = read_shape(path)
     assert len(solid.blank) == len(solid.faces) == 1152
     assert {face.name.partition(".")[0] for face in solid.faces} == {"F1"}
     assert "1 curved region stays blank, 1152 of 1152 facets: F1 about (0, 0, 0)" in solid.notes[-1]
-
-
-def test_too_many_faces_are_counted_not_called_curved(written, monkeypatch):
     monkeypatch.setattr(merge, "MOST_FACETS", 1000)
-    error = refused(written("s.stl", sphere(24, 48)))
-    assert error.cause.startswith("1152 planar faces, the smallest of ")
-    assert error.cause.endswith(" mm^2; 1000 are allowed")
+    cause = refused(path).cause  # and they are not called curved
+    assert cause.startswith("1152 planar faces, the smallest of ")
+    assert cause.endswith(" mm^2; 1000 are allowed")
 
 
 def rounded_bar(steps, across=10):
@@ -313,19 +323,6 @@ def test_a_wall_with_a_hole_is_round_beside_the_hole(written):
     assert all(43 <= len(one.facets) < 48 for one in solid.surfaces)
 
 
-def test_corners_on_other_edges_are_joined(written):
-    """One side of a box has an edge that its neighbours have in two and three pieces."""
-    found = prism([(0, 0), (30, 0), (30, 20), (0, 20)], 10, [])
-    found += [((0, 0, 10), (10, 0, 10), (0, 20, 10)), ((10, 0, 10), (18, 0, 10), (0, 20, 10)),
-              ((18, 0, 10), (30, 0, 10), (0, 20, 10)), ((30, 0, 10), (30, 20, 10), (0, 20, 10)),
-              ((15, 0, 0), (0, 0, 0), (0, 20, 0)), ((30, 0, 0), (15, 0, 0), (0, 20, 0)),
-              ((30, 0, 0), (0, 20, 0), (30, 20, 0))]  # fmt: skip
-    solid = read_shape(written("t.stl", found))
-    assert (len(solid.faces), volume(solid)) == (6, pytest.approx(6000.0))
-    gap = refused(written("g.stl", found[:-1]))
-    assert "not closed" in gap.cause
-
-
 def test_step_without_the_kernel_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "OCP", None)  # as if it were not installed
     error = refused(SHAPES_FOLDER / "cube_with_hole.step")
@@ -379,23 +376,8 @@ def test_bad_files_give_place_cause_and_way_out(tmp_path, written, name, content
     assert error.fix
 
 
-def test_a_mark_of_bytes_order_before_an_ascii_stl_is_no_binary_one(written):
-    text = (SHAPES_FOLDER / "l_bracket_ascii.stl").read_bytes()
-    marked = read_shape(written("marked.stl", b"\xef\xbb\xbf" + text))
-    assert np.array_equal(marked.vertices, read_shape(written("plain.stl", text)).vertices)
-
-
 def test_missing_and_large_files(tmp_path, monkeypatch):
     (tmp_path / "folder.stl").mkdir()
     assert "directory" in refused(tmp_path / "folder.stl").cause
     monkeypatch.setattr("generator.polyhedron.read.LARGEST_BYTES", 100)
     assert "are allowed" in refused(SHAPES_FOLDER / "l_bracket.stl").cause
-
-
-def test_faces_of_a_file_are_named_with_the_file(written):
-    # A notch whose tip cuts through the back of the bar.
-    ring = [(0, 0), (60, 0), (60, 60), (30, -5), (0, 60)]
-    found = prism(ring, 40, [(0, 1, 3), (1, 2, 3), (0, 3, 4)])
-    error = refused(written("c.stl", found))
-    assert error.place.endswith("c.stl")
-    assert "face F1: the edge between vertices 4 and 6 runs through it" in error.cause
