@@ -1,9 +1,8 @@
-"""What files hold as text, packages as zipfile reads them, plates, and names of faces."""
+"""What files hold as numbers, packages as zipfile reads them, and plates."""
 
 from __future__ import annotations
 
 import io
-import re
 import zipfile
 from itertools import combinations
 
@@ -14,15 +13,13 @@ from hypothesis import strategies as st
 
 from generator.errors import WriteError
 from generator.export import threemf as package_module
-from generator.export.bed import Plate, Size, arrange_plates
+from generator.export.bed import arrange_plates
 from generator.export.fixed_text import (
     decimal_numbers,
     decimal_width,
     number_lines,
 )
-from generator.export.lettering import HALF_HEIGHT, Label, place_labels
 from generator.export.robot.crate import Attribute, Prim, crate_chunks
-from generator.export.step.entities import step_string
 from generator.export.threemf import deflate_text, zip_package
 
 lengths = st.floats(-1e6, 1e6, allow_nan=False)
@@ -30,7 +27,7 @@ lengths = st.floats(-1e6, 1e6, allow_nan=False)
 
 @given(st.lists(lengths, min_size=1, max_size=20), st.integers(1, 10))
 @example([0.0, -0.0, -0.04, 12.5, -12.5, 999.96, -0.5], 1)
-def test_decimals_are_the_rounded_number(values: list[float], places: int) -> None:
+def test_decimals_are_the_rounded_number(values, places):
     width = decimal_width(max(map(abs, values)), places)
     rows = decimal_numbers(np.array(values), width, places)
     assert rows.shape == (len(values), width)
@@ -42,22 +39,8 @@ def test_decimals_are_the_rounded_number(values: list[float], places: int) -> No
         assert "-0." not in text or scaled < 0
 
 
-@given(st.text(max_size=30))
-def test_step_strings_read_back(text: str) -> None:
-    """Part 21, 6.4.3: doubled quotes and backslashes, hexadecimal beyond printable ASCII."""
-    written = step_string(text)
-    assert written.isascii()
-    assert written.isprintable()
-    back = re.sub(
-        r"\\X[24]\\([0-9A-F]+)\\X0\\|''|\\\\",
-        lambda found: chr(int(found[1], 16)) if found[1] else found[0][0],
-        written,
-    )
-    assert back == text
-
-
 @given(st.lists(st.tuples(*[st.floats(-1e5, 1e5, allow_nan=False)] * 3), max_size=20))
-def test_decimals_of_a_line_are_the_shortest(rows: list[tuple[float, float, float]]) -> None:
+def test_decimals_of_a_line_are_the_shortest(rows):
     text = number_lines(("<", ",", ";", ">\n"), np.array(rows).reshape(-1, 3), 3).decode()
     wanted = [[f"{value:.3f}" for value in np.round(row, 3) + 0.0] for row in rows]
     short = [[one.rstrip("0").rstrip(".") for one in row] for row in wanted]
@@ -66,7 +49,7 @@ def test_decimals_of_a_line_are_the_shortest(rows: list[tuple[float, float, floa
 
 @given(st.lists(st.lists(st.binary(max_size=300), max_size=4), min_size=1, max_size=4))
 @example([[b"head", bytes(range(256)) * 1000, b"tail"]])  # longer than its zeros are moved at once
-def test_a_package_holds_its_pieces_in_order(entries: list[list[bytes]]) -> None:
+def test_a_package_holds_its_pieces_in_order(entries):
     named = {f"e{number}": pieces for number, pieces in enumerate(entries)}
     content = zip_package({name: [deflate_text([p]) for p in ps] for name, ps in named.items()})
     with zipfile.ZipFile(io.BytesIO(content)) as file:
@@ -77,7 +60,7 @@ def test_a_package_holds_its_pieces_in_order(entries: list[list[bytes]]) -> None
             assert file.getinfo(name).date_time == (1980, 1, 1, 0, 0, 0)
 
 
-def test_a_package_that_no_zip_can_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_that_no_zip_can_hold(monkeypatch):
     monkeypatch.setattr(package_module, "_LARGEST", 5)
     zip_package({"a": [deflate_text([b"12345"])]})
     with pytest.raises(WriteError, match="exceeds 4 GiB"):
@@ -105,7 +88,8 @@ def test_whole_numbers_of_a_crate_file_as_openusd_reads_them(tmp_path):
 BED = (250.0, 210.0)
 
 
-def boxes(plate: Plate, sizes: list[Size]) -> list[tuple[float, float, float, float]]:
+def boxes(plate, sizes):
+    """Return x and y of the front left and of the back right corner of each part."""
     out = []
     for place in plate.places:
         width, depth = sizes[place.part][::-1] if place.turned else sizes[place.part]
@@ -141,14 +125,14 @@ def test_parts_keep_their_distance_on_the_bed_and_off_its_blocked_corner(sizes, 
             assert apart >= 5.0 - 1e-6
 
 
-def test_a_brim_has_room_where_it_takes_no_more_plates() -> None:
+def test_a_brim_has_room_where_it_takes_no_more_plates():
     tight, wide = (arrange_plates([(60.0, 60.0)] * 9, (side, side)) for side in (195.0, 203.0))
     assert [len(tight), len(wide)] == [1, 1]
     assert np.array(boxes(wide[0], [(60.0, 60.0)] * 9)).min() == pytest.approx(6.5)
     assert np.array(boxes(tight[0], [(60.0, 60.0)] * 9)).min() == pytest.approx(2.5)
 
 
-def test_a_part_larger_than_the_bed_lies_alone_and_says_so() -> None:
+def test_a_part_larger_than_the_bed_lies_alone_and_says_so():
     plates = arrange_plates([(50.0, 50.0), (100.0, 260.0), (50.0, 50.0)], BED)
     assert [[p.part for p in plate.places] for plate in plates] == [[0, 2], [1]]
     assert plates[0].fits
@@ -157,7 +141,7 @@ def test_a_part_larger_than_the_bed_lies_alone_and_says_so() -> None:
     assert plates[1].places[0].turned
 
 
-def test_a_group_lies_on_one_plate_where_one_can_hold_it() -> None:
+def test_a_group_lies_on_one_plate_where_one_can_hold_it():
     sizes = [(60.0, 60.0)] * 18  # six to a cube; nine fit a bed
     plates = arrange_plates(sizes, (205, 205), groups=[k // 6 for k in range(18)])
     assert [sorted(p.part for p in plate.places) for plate in plates] == [
@@ -168,21 +152,3 @@ def test_a_group_lies_on_one_plate_where_one_can_hold_it() -> None:
     assert [len(plate.places) for plate in mixed] == [9]
     split = arrange_plates(sizes[:10], (205, 205), groups=[0] * 10)
     assert [len(plate.places) for plate in split] == [9, 1]
-
-
-def test_hidden_faces_have_no_name_and_labels_do_not_overlap():
-    """400 x 400 px: a large face 0 with face 1 in front of its middle; face 2 shows 4 places."""
-    seen = np.full((100, 100), -1)
-    seen[10:90, 10:90] = 0
-    seen[40:60, 40:60] = 1
-    seen[5:7, 5:7] = 2
-    wanted = [Label(2, "", 24.0, 24.0, 20.0), Label(3, "", 200.0, 200.0, 20.0)]
-    assert place_labels(seen, 4.0, wanted) == [None, None]
-    seen = np.full((60, 60), -1)
-    for k in range(6):
-        seen[20:40, 6 * k + 10 : 6 * k + 16] = k
-    wanted = [Label(k, "", 4.0 * (6 * k + 13), 120.0, 18.0) for k in range(6)]
-    found = [place for place in place_labels(seen, 4.0, wanted) if place is not None]
-    assert len(found) >= 5
-    for one, other in combinations(found, 2):
-        assert abs(one.x - other.x) >= 36 or abs(one.y - other.y) >= 2 * HALF_HEIGHT

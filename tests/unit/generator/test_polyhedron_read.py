@@ -18,21 +18,12 @@ from generator.polyhedron.read import merge, read_shape
 SHAPES_FOLDER = Path(__file__).parents[3] / "fixtures" / "shapes"
 HEXAGON = 1.5 * 3**0.5 * 12**2
 
-TETRAHEDRON = """\
-v 0 0 0
-v 60 0 0
-v 0 60 0
-v 0 0 60
-f 1 3 2
-f 1 2 4
-f 2 3 4
-f 3 1 4
-"""
+TETRAHEDRON = "v 0 0 0\nv 60 0 0\nv 0 60 0\nv 0 0 60\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 
 
-def refused(path, scale=1.0):
+def refused(path):
     with pytest.raises(ShapeError) as caught:
-        read_shape(path, scale)
+        read_shape(path)
     return caught.value
 
 
@@ -59,20 +50,11 @@ def fan(polygon):
     return [(polygon[0], b, c) for b, c in itertools.pairwise(polygon[1:])]
 
 
-def triangles_of(solid):
-    """Triangles of a solid whose faces are convex."""
-    return [t for f in solid.faces for t in fan(solid.vertices[list(f.loops[0])])]
-
-
-def test_unit_of_a_step_file_is_honoured(written):
+def test_a_step_file_has_a_unit_and_round_faces_are_divided_as_finely_in_any_size(written):
     text = (SHAPES_FOLDER / "cube_with_hole.step").read_text()
     centimetres = written("cm.stp", text.replace("SI_UNIT(.MILLI.,", "SI_UNIT(.CENTI.,"))
-    assert volume(read_shape(centimetres)) == pytest.approx(
-        1000 * (60**3 - 60 * HEXAGON), rel=1e-12
-    )
-
-
-def test_a_scaled_round_face_is_divided_as_finely():
+    mm3 = 1000 * (60**3 - 60 * HEXAGON)
+    assert volume(read_shape(centimetres)) == pytest.approx(mm3, rel=1e-12)
     plain, large = (read_shape(SHAPES_FOLDER / "block_with_bore.step", s) for s in (1.0, 6.0))
     assert volume(large) == pytest.approx(6**3 * volume(plain), rel=1e-3)
     assert len(large.surfaces) == len(plain.surfaces)
@@ -91,23 +73,23 @@ def test_obj_with_non_convex_polygons_negative_numbers_and_textures(written):
 
 def prism(ring, height, caps):
     """Return the triangles of a prism over a ring (x, y), its caps as triangles of the ring."""
-    found = []
-    for (a, b), (c, d) in zip(ring, ring[1:] + ring[:1], strict=True):
-        found += [
-            ((a, b, 0), (c, d, 0), (c, d, height)),
-            ((a, b, 0), (c, d, height), (a, b, height)),
-        ]
-    for cap in caps:
-        found += [[(*ring[k], height) for k in cap], [(*ring[k], 0) for k in reversed(cap)]]
+    low, high = ([(x, y, z) for x, y in ring] for z in (0, height))
+    found = [[high[k] for k in cap] for cap in caps] + [[low[k] for k in cap[::-1]] for cap in caps]
+    for k in range(-1, len(ring) - 1):
+        found += [(low[k], low[k + 1], high[k + 1]), (low[k], high[k + 1], high[k])]
     return found
+
+
+SOLID = SHAPES["cube"](side=60)
+SIDES = [fan(SOLID.vertices[list(face.loops[0])]) for face in SOLID.faces]
+CUBE = [triangle for side in SIDES for triangle in side]
 
 
 def pointed_cube():
     """A cube whose front has a point on its upper edge, filled on the top by a flat triangle."""
-    cube = SHAPES["cube"](side=60)
-    (e, f), (a, b, c, d) = cube.vertices[[0, 1]], cube.vertices[[4, 5, 6, 7]]
+    e, f, _, _, a, b, c, d = SOLID.vertices
     m = 0.3 * a + 0.7 * b
-    sides = [t for k in (0, 2, 3, 4) for t in fan(cube.vertices[list(cube.faces[k].loops[0])])]
+    sides = [triangle for k in (0, 2, 3, 4) for triangle in SIDES[k]]
     return [*sides, (e, f, m), (f, b, m), (e, m, a), (a, b, c), (a, c, d), (a, m, b)]
 
 
@@ -148,9 +130,6 @@ def test_slivers_and_points_on_edges_vanish(written, name, content, faces, mm3, 
         assert (len(solid.faces), solid.notes) == (faces, notes)
 
 
-CUBE = triangles_of(SHAPES["cube"](side=60))
-
-
 @pytest.mark.parametrize(
     ("triangles", "says"),
     [
@@ -163,7 +142,7 @@ CUBE = triangles_of(SHAPES["cube"](side=60))
         # a notch whose tip cuts through the back of the bar
         (prism([(0, 0), (60, 0), (60, 60), (30, -5), (0, 60)], 40,
                [(0, 1, 3), (1, 2, 3), (0, 3, 4)]),
-         "face F1: the edge between vertices 4 and 6 runs through it"),
+         "face F8: the edge between vertices 2 and 3 runs through it"),
     ],
     ids=["open", "doubled", "turned", "flat", "dot", "pieces", "through"],
 )  # fmt: skip
@@ -175,17 +154,12 @@ def test_broken_meshes_are_told_apart(written, triangles, says):
 
 
 def test_bodies_are_counted_and_described(written):
-    cube = np.array(CUBE)
-    middle = cube.mean(axis=(0, 1))
-    small = middle + 200 + (cube - middle) / 3
-    void = (middle + (cube - middle) / 2)[:, ::-1]
-    many = np.concatenate([small, cube, void])
-    error = refused(written("3.stl", many))
-    x, y, z = middle
+    cube = np.array(CUBE) - np.mean(CUBE, axis=(0, 1))
+    void = cube[:, ::-1] / 2
+    error = refused(written("3.stl", np.concatenate([cube / 3 + 200, cube, void])))
     assert error.cause == (
-        f"3 separate bodies: 60 x 60 x 60 mm about ({x:g}, {y:g}, {z:g}), a void of 30 x 30 x 30 "
-        f"mm about ({x:g}, {y:g}, {z:g}), 20 x 20 x 20 mm about ({x + 200:g}, {y + 200:g}, "
-        f"{z + 200:g}); one solid has one"
+        "3 separate bodies: 60 x 60 x 60 mm about (0, 0, 0), a void of 30 x 30 x 30 mm about "
+        "(0, 0, 0), 20 x 20 x 20 mm about (200, 200, 200); one solid has one"
     )
     assert "boolean union" in error.fix
     six = np.concatenate([cube + 100 * k for k in range(6)])
@@ -200,10 +174,8 @@ def test_marks_of_an_encoding_are_read_and_other_bytes_named(written):
     marked = read_shape(written("m.stl", b"\xef\xbb\xbf" + text))  # no binary one
     assert np.array_equal(marked.vertices, read_shape(written("plain.stl", text)).vertices)
     error = refused(written("t.obj", TETRAHEDRON.encode("utf-16-le")))
-    assert (error.cause, error.fix[:15]) == (
-        "it is no plain text: byte 1 is zero",
-        "save it as text",
-    )
+    assert error.cause == "it is no plain text: byte 1 is zero"
+    assert error.fix.startswith("save it as text")
 
 
 def sphere(rows, columns, radius=30.0):
@@ -255,7 +227,6 @@ def lathe(*rings, sides=40, squash=1.0):
     return found
 
 
-@pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize(
     ("triangles", "walls"),
     [
@@ -271,22 +242,16 @@ def lathe(*rings, sides=40, squash=1.0):
     ],
     ids=["fine", "coarse", "cup", "shoulder", "fillet", "arc", "coarse arc"],
 )  # fmt: skip
-def test_round_walls_of_a_mesh_are_cylinders_and_cones(written, triangles, walls, turned):
-    turn = np.linalg.qr(np.random.default_rng(36).normal(size=(3, 3)))[0] if turned else np.eye(3)
+def test_round_walls_of_a_mesh_are_cylinders_and_cones(written, triangles, walls):
+    turn = np.linalg.qr(np.random.default_rng(36).normal(size=(3, 3)))[0]
     solid = read_shape(
         written("w.stl", np.array(triangles)[:, :: int(np.linalg.det(turn).round())] @ turn)
     )
-    found = [
-        (one.kind, len(one.facets), one.radius_mm, one.half_angle_rad) for one in solid.surfaces
-    ]
-    assert [one[:2] for one in found] == [one[:2] for one in walls]
-    for one, wanted in zip(found, walls, strict=True):
-        assert one[2:] == pytest.approx(wanted[2:], abs=2e-3)
-    for one in solid.surfaces:
-        flat = development(solid, one)
-        assert sum(face_area(solid, k) for k in one.facets) == pytest.approx(
-            signed_area(flat.outline), rel=1e-5
-        )
+    assert [(one.kind, len(one.facets)) for one in solid.surfaces] == [wall[:2] for wall in walls]
+    for one, wall in zip(solid.surfaces, walls, strict=True):
+        assert (one.radius_mm, one.half_angle_rad) == pytest.approx(wall[2:], abs=2e-3)
+        area = signed_area(development(solid, one).outline)
+        assert sum(face_area(solid, k) for k in one.facets) == pytest.approx(area, rel=1e-5)
         assert not set(one.facets) & set(solid.blank)
 
 
@@ -310,17 +275,14 @@ def test_a_wall_with_a_hole_is_round_beside_the_hole(written):
     """A window of three facets is cut through the wall of a tube; the others stay one wall."""
     from manifold3d import Manifold
 
-    tube = Manifold.cylinder(60, 30, 30, 48) - Manifold.cylinder(80, 25, 25, 48).translate(
-        (0, 0, 5)
-    )
-    mesh = (tube - Manifold.cube((40, 9, 20)).translate((0, -3, 20))).to_mesh()
+    bore = Manifold.cylinder(80, 25, 25, 48).translate((0, 0, 5))
+    window = Manifold.cube((40, 9, 20)).translate((0, -3, 20))
+    mesh = (Manifold.cylinder(60, 30, 30, 48) - bore - window).to_mesh()
     corners = np.asarray(mesh.vert_properties)[:, :3][np.asarray(mesh.tri_verts)]
-    solid = read_shape(written("h.stl", corners))
-    assert [(one.kind, one.closed, one.concave) for one in solid.surfaces] == [
-        ("cylinder", False, False),
-        ("cylinder", False, True),
-    ]
-    assert all(43 <= len(one.facets) < 48 for one in solid.surfaces)
+    walls = read_shape(written("h.stl", corners)).surfaces
+    assert {(one.kind, one.closed) for one in walls} == {("cylinder", False)}
+    assert sorted(one.concave for one in walls) == [False, True]
+    assert all(43 <= len(one.facets) < 48 for one in walls)
 
 
 def test_step_without_the_kernel_says_what_to_install(monkeypatch):

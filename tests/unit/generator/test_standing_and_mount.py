@@ -77,18 +77,16 @@ def test_the_models_own_way_up_is_kept_where_little_hangs_over():
 def test_a_solid_that_would_hang_over_or_fall_is_turned():
     solid = extruded(TEE)
     found = stance(solid)
-    assert not found.as_modelled
-    assert found.overhang_mm2 == 0.0
+    assert (found.as_modelled, found.overhang_mm2) == (False, 0.0)
     up = solid.vertices @ found.R_bed_object[2]
     assert up[list(solid.faces[found.face].loops[0])] == pytest.approx(up.min())
     assert np.linalg.det(found.R_bed_object) == pytest.approx(1.0)
-    octahedron = SHAPES["octahedron"](60)
-    assert not stance(octahedron).as_modelled  # it stood on a corner
-    tower = SHAPES["box"]((10.0, 40.0, 200.0))
-    assert stance(tower).contact_mm2 == pytest.approx(40 * 200)
+    # nothing stands on faces that others reach below
+    assert all(stance_on(solid, ceiling, SINE) is None for ceiling in (1, 5))
+    assert not stance(SHAPES["octahedron"](60)).as_modelled  # it stood on a corner
+    assert stance(SHAPES["box"]((10.0, 40.0, 200.0))).contact_mm2 == pytest.approx(40 * 200)
     leaning = extruded([(0, 0), (60, 80), (70, 80), (10, 0)])
     assert not stance_on(leaning, stance(leaning).face, SINE).height_mm > 70
-    assert all(stance_on(solid, ceiling, SINE) is None for ceiling in (1, 5))
 
 
 ROD = {"cylinder": {"diameter": 50, "height": 30}}
@@ -168,8 +166,7 @@ def test_what_cannot_be_is_refused_with_a_way_out(tmp_path, shape, settings, cau
 
 def area(radius):
     """Return the area of the polygon that stands for a circle of a hole."""
-    count = 4 * math.ceil(math.pi * math.sqrt(radius / 0.04) / 4)
-    count = min(max(count, 24), 240)
+    count = min(max(4 * math.ceil(math.pi * math.sqrt(radius / 0.04) / 4), 24), 240)
     return count / 2 * math.sin(2 * math.pi / count) * radius**2
 
 
@@ -187,14 +184,11 @@ def test_holes_take_what_they_should_of_the_solid():
     gone = area(6.1) * (24.0 + 6.1 / 3)
     assert volume(cylinder(60.0, 60.0)) - volume(socket) == pytest.approx(gone, rel=1e-9)
     assert [s.kind for s in socket.surfaces] == ["cylinder", "cylinder", "cone"]
-    assert not bridges(socket, np.array([0.0, 0.0, -1.0]))  # a tip needs none
-
-
-def test_ceilings_of_pockets_are_bridged_and_ledges_are_not():
-    plate = with_mount(tag((60.0, 60.0), 4.0), Mount("magnets", (8.0, 2.0)), 1)
     down = np.array([0.0, 0.0, -1.0])
+    assert not bridges(socket, down)  # a tip needs none, nor do ledges; ceilings of pockets do
+    assert not bridges(extruded(TEE, 8.0), down)
+    plate = with_mount(tag((60.0, 60.0), 4.0), Mount("magnets", (8.0, 2.0)), 1)
     assert len(bridges(plate, down)) == 4
-    assert bridges(extruded(TEE, 8.0), down) == frozenset()
 
 
 def test_screws_of_a_flange_are_on_its_circle_and_the_pin_midway():
@@ -224,21 +218,12 @@ def test_symbols_keep_clear_of_holes_and_files_read_back(tmp_path, size):
 
 
 def test_a_tag_of_one_line_is_made_and_read(tmp_path):
-    result = made(tmp_path, {"tag": "40 x 40 mm"}, formats=("stl",))
-    assert (result.symbols, bearing(tmp_path)) == (49, {"F1"})
-    assert result.objects[0].lying == "F2 down, no supports needed"
-    assert result.objects[0].warnings == ()  # its back is blank by its meaning
-    said = "of touches on its encoded side 96 % are answered at once, "
-    assert result.objects[0].promise.text.startswith(said)
-    assert set(result.objects[0].promise.shares) == {"at_once", "within_three", "encoded"}
+    made(tmp_path, {"tag": "40 x 40 mm"}, formats=("stl",))
     heights = np.unique(corners_of(tmp_path / "out/Part.stl")[:, 2].round(3))
     assert heights[:2] == pytest.approx([0.0, 0.32])  # its name, engraved in the back
-    reader = Reader(open_lab(f"{tmp_path}/lab.db"))
-    answers = [
-        reader.read(simulate(f"{tmp_path}/lab.db#Part/F1", x=x, y=20.0, force=40).counts)
-        for x in (15.0, 20.0, 25.0)
-    ]
-    assert {(one.object, one.face) for one in answers} == {("Part", "F1")}
+    touch = simulate(f"{tmp_path}/lab.db#Part/F1", x=20.0, y=20.0, force=40)
+    answer = Reader(open_lab(f"{tmp_path}/lab.db")).read(touch.counts)
+    assert (answer.object, answer.face) == ("Part", "F1")
 
 
 def test_a_mount_may_be_a_text_and_a_tag_is_as_thick_as_it_needs():
