@@ -36,8 +36,7 @@ from pathlib import Path
 
 import numpy as np
 from manifold3d import Manifold
-from reference.elements_axisymmetric import section
-from reference.elements_round import indented, washer_pad
+from reference.elements import tactels_n
 from reference.indenters import sphere
 
 from encoded_objects import encode
@@ -105,23 +104,7 @@ def reference(kind, case, surface, sensor, touch):
         return tabs(surface, sensor, touch, Tips(REFERENCE_POINTS)).forces_n
     if case not in ROUND:
         return layer(surface, sensor, touch, cells_per_tactel=24, samples=64).forces_n
-    pad = sensor.overlay
-    elastic = pad.young_mpa, pad.poisson
-    if case == "washer":
-        part = washer_pad(3.5, 7.5, pad.height_mm, *elastic, parts=28)
-    else:
-        r = np.concatenate([np.linspace(0, 12, 121), np.linspace(12, 30, 31)[1:]])
-        z = pad.height_mm * (1 - (1 - np.linspace(0, 1, 15)) ** 1.6)
-        part = section(r, z, *elastic)
-
-    def heights(r):
-        if case == "washer":  # nodes on an edge belong to the washer, whatever the last bit says
-            return np.where((r > 3.5 - 1e-9) & (r < 7.5 + 1e-9), 0.0, -np.inf)
-        return surface.heights_mm(np.stack([r, np.zeros_like(r)], axis=1))
-
-    c, s = math.cos(touch.theta_rad), math.sin(touch.theta_rad)
-    axis = (-c * touch.x_mm - s * touch.y_mm, s * touch.x_mm - c * touch.y_mm)
-    return indented(part, heights, touch.force_n).tactels_n(sensor, axis)
+    return tactels_n(case, sensor, touch)
 
 
 def measured(kind, case, surface, sensor, touches, repeat):
