@@ -2,8 +2,7 @@
 
 Mass, centre and inertia by the CAD kernel from the STEP files of the same run; frames by planes,
 corners and edges of the kernel's solids; MJCF by MuJoCo, URDF by yourdfpy, USD by OpenUSD, SDF
-by the rules of its specification. Drake, Newton and NVIDIA's validator, too large for here:
-`tests/campaigns/simulators.py`.
+by the rules of its specification.
 """
 
 from __future__ import annotations
