@@ -25,6 +25,9 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, TypeVar
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+import postgres
+
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 Row = dict[str, Any]
@@ -76,10 +79,7 @@ def databases(engine: str, *options: str) -> Iterator[dict[str, str]]:
         if engine != "postgresql":
             urls["sqlite"] = stack.enter_context(tempfile.TemporaryDirectory()) + "/lab.db"
         if engine != "sqlite":
-            command = [sys.executable, str(Path(__file__).parents[1] / "postgres.py"), *options]
-            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-            server = stack.enter_context(subprocess.Popen(command, text=True, **pipes))
-            urls["postgresql"] = server.stdout.readline().strip()
+            urls["postgresql"] = stack.enter_context(postgres.running(*options))
         yield urls
 
 
