@@ -24,11 +24,8 @@ from recognizer.as_built.touches import measure_prints
 from recognizer.as_built.verdict import AS_DESIGNED, CORRECTED, PRINT_AGAIN, judge_print
 from recognizer.errors import AsBuiltError
 from recognizer.touch.as_built import (
-    APART_SD,
     ASIDE_SD_MM,
     DESIGNED,
-    SCALE_SD,
-    SKEW_SD_RAD,
     UNUSUAL,
     PrintedFace,
     TouchScale,
@@ -197,15 +194,6 @@ def felt(excess, sigma=1e-3, expected=1e9, with_pose=(0.0, 0.0, 0.0)):
     return TouchScale(excess, np.array([*with_pose, sigma**2]), expected)
 
 
-def test_prints_that_nobody_measured_come_out_as_designed_more_or_less():
-    usual = usual_print()
-    assert (usual.scale_x, usual.scale_y, usual.skew_rad, usual.touches) == (1.0, 1.0, 0.0, 0)
-    mean, apart = np.array([0.5, 0.5, 0, 0]), np.array([1, -1, 0, 0])
-    assert apart @ usual.covariance @ apart == pytest.approx(2 * APART_SD**2 / 2)
-    assert mean @ usual.covariance @ mean == pytest.approx(SCALE_SD**2 + APART_SD**2 / 4)
-    assert usual.covariance[2, 2] == pytest.approx(SKEW_SD_RAD**2)
-
-
 def test_what_a_touch_feels_of_the_scale_moves_its_place_towards_the_middle():
     face = PrintedFace(print_with(covariance=np.diag([4e-6, 4e-6, 1e-12, 1])), np.eye(4))
     pose, none = at_rest(20.0, -10.0, 0.3), np.zeros((3, 3))
@@ -221,20 +209,6 @@ def test_what_a_touch_feels_of_the_scale_moves_its_place_towards_the_middle():
     assert covariance[0, 0] == pytest.approx(floor + 20**2 * (left + apart), rel=0.01)
     assert covariance[1, 1] == pytest.approx(floor + 10**2 * (left + apart), rel=0.01)
     assert covariance[0, 1] == pytest.approx(-20 * 10 * (left - apart), rel=0.02)
-
-
-def test_what_the_fit_expected_of_the_scale_is_taken_off():
-    """An expectation of its own as sharp as what it felt: it felt twice as much, half as surely."""
-    face = PrintedFace(print_with(covariance=np.diag([4e-6, 4e-6, 1e-12, 1])), np.eye(4))
-    pose, none = at_rest(20.0, -10.0), np.zeros((3, 3))
-    sigma = math.sqrt(0.5e-6)
-    found, covariance = face.pose(pose, none, felt(0.0015, sigma, expected=1e-3))
-    plain, expected = face.pose(pose, none, felt(0.003, 1e-3))
-    np.testing.assert_allclose(found, plain, atol=1e-9)
-    np.testing.assert_allclose(covariance, expected, rtol=1e-6)
-    # a fit that felt nothing but what it expected tells nothing
-    same, _ = face.pose(pose, none, felt(0.0015, 1e-3, expected=1e-3))
-    np.testing.assert_allclose(same, pose, atol=1e-9)
 
 
 def test_a_place_that_hangs_on_the_scale_moves_with_it():
@@ -270,12 +244,6 @@ def test_a_touch_that_shows_an_unusual_scale_widens_its_ellipse_and_stays():
         grown = covariance[0, 0] / known[0, 0]
         assert 1.0 <= grown <= wider
         assert (grown > 1.0) == (wider > 1.0)
-
-
-def test_an_answer_says_what_it_takes_the_part_for():
-    faces = (DESIGNED, usual_print(), print_with())
-    said = [PrintedFace(one, np.eye(4)).part for one in faces]
-    assert said == ["as designed", "not measured", "as built"]
 
 
 def test_a_reader_that_knows_parts_as_designed_is_surer_of_the_same_place(tmp_path):
@@ -365,15 +333,10 @@ def image_felt(reader, matrix, touch, name="Cube", seq=0):
     return TouchImage(seq, 0, 1, 100 * forces, np.zeros(4), None)
 
 
-@pytest.mark.parametrize(
-    "matrix",
-    [np.diag([0.98, 1.0]), np.diag([1.0, 1.02]), np.array([[1.0, 0.015], [0.0, 1.0]]),
-     np.diag([0.988, 0.994])],
-)  # fmt: skip
+@pytest.mark.parametrize("matrix", [np.diag([0.98, 1.0]), np.array([[1.0, 0.015], [0.0, 0.99]])])
 def test_a_touch_tells_scales_and_skew_of_the_print(reader, matrix):
-    touches = [
-        image_felt(reader, matrix, Touch(18.0, 21.5, turn, 80.0)) for turn in (0.3, 1.9, -2.2, -0.8)
-    ]
+    at = [Touch(18.0, 21.5, turn, 80.0) for turn in (0.3, 1.9, -2.2, -0.8)]
+    touches = [image_felt(reader, matrix, touch) for touch in at]
     found = np.mean([one.strain for one in measure_prints(reader, touches)], axis=0)
     E = (matrix.T @ matrix - np.eye(2)) / 2
     np.testing.assert_allclose(found, (E[0, 0], E[1, 1], E[0, 1]), atol=0.0015)

@@ -22,11 +22,12 @@ def normals(count, seed=3):
     return np.einsum("bki,bkj->bij", roots, roots)
 
 
-def asked(normal, *, hardens, away=None, noise=USUAL):
-    """Covariances of lattices whose form is what was known before."""
+def asked(normal, *, hardens, form=(0.0, 0.0, 0.0, 0.0), away=None, noise=USUAL):
+    """Covariances of lattices that all have one form."""
     count = len(normal)
     pose = np.zeros((count, 7))
     pose[:, :3] = 5.0, -9.0, 1.0  # of no importance
+    pose[:, 3:] = form
     image = SimpleNamespace(
         pressing=SimpleNamespace(hardens=hardens), shape=SHAPE, options=ReaderOptions()
     )
@@ -37,6 +38,16 @@ def asked(normal, *, hardens, away=None, noise=USUAL):
 def inverses(normal):
     """The first three unknowns of the inverse, by solving for each column."""
     return np.stack([np.linalg.solve(one, np.eye(11)[:, :3])[:3] for one in normal])
+
+
+@pytest.mark.parametrize("away", [0, 1, 2])
+def test_under_tabs_a_form_far_from_what_was_known_widens_it(away):
+    usual = (0.6, 0.4, 0.2, 0.01)
+    forms = [tuple(away * 2 * sd * (k == n) for k, sd in enumerate(usual)) for n in range(4)]
+    for form, sds in ((usual, 2), *((form, 2 * away) for form in forms)):
+        found = asked(normals(2), hardens=True, form=form)
+        times = 0.6 + 0.025 * sds**4
+        np.testing.assert_allclose(found, times * inverses(normals(2)), rtol=1e-6)
 
 
 @pytest.mark.parametrize("hardens", [True, False])

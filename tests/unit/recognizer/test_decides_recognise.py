@@ -82,14 +82,15 @@ def rival(score=-40.0):
 @pytest.fixture
 def reads(small, monkeypatch):
     """Return a function that reads a touch of which two searches find what is given."""
-    lab = small.two_faces().embossed
-    for number, name in enumerate(("F1", "F2")):
-        lab.known[number] = small.known_face("Thing", name)
+    labs = small.two_faces().embossed, small.two_faces().embossed  # rivals are of the second
+    for lab in labs:
+        for number, name in enumerate(("F1", "F2")):
+            lab.known[number] = small.known_face("Thing", name)
 
     def known(found):
         for each in found:
             fit = small.fit_of([(0, 0)], [[0.0] * 5], x_mm=each.at[0], y_mm=each.at[1])
-            each.embossed, each.fit = lab, fit
+            each.embossed, each.fit = labs[each.face], fit
         return found
 
     def read(first, second=None, doubt=1e-5, by_border=INF, signal=None, **changed):
@@ -101,16 +102,26 @@ def reads(small, monkeypatch):
             tries.append(effort)
             return searches[len(tries) - 1]
 
+        def matches(arrays, embossed, fit, hypothesis):
+            best = searches[len(tries) - 1][0]
+            assert (arrays, embossed, fit) == (READER.lab.arrays, best.embossed, best.fit)
+            assert hypothesis == best.hypothesis
+            return next(doubts)
+
+        def bits(arrays, embossed, doubt):
+            assert (arrays, embossed) == (READER.lab.arrays, labs[0])
+            return BITS
+
         def wide_unless_sure(reader, signal, answer, judged, best):
             """Ask for the second try as under a pad: `test_search_gate` has when it is asked."""
             return not judged or best.evidence.inliers < 11
 
         stubs = {
             "verify_hypotheses": search,
-            "expected_matches": lambda *_: next(doubts),
+            "expected_matches": matches,
             "expected_by_border": lambda *_: by_border,
             "may_find_more": wide_unless_sure,
-            "place_bits": lambda *_: BITS,
+            "place_bits": bits,
             "shows_strokes": lambda *_: True,
             "has_residual": lambda *_: False,
             "propose_next": lambda *_: None,
@@ -122,6 +133,7 @@ def reads(small, monkeypatch):
         assert reading.answer.seq == 7
         assert tries == [READER.options.first, READER.options.thorough][: len(tries)]
         judged = next((n for n, found in enumerate(searches) if reading.found is found), None)
+        assert reading.best is (reading.found[0] if reading.found else None)
         return reading.answer, len(tries), judged
 
     return read
@@ -150,7 +162,8 @@ def reads(small, monkeypatch):
         # what chance nearly allows is looked at again, unless much speaks for it
         ([one(), rival()], [one()], {"doubt": (1.01e-5, 1e-3)}, ("", 40.0, 1.01e-5, 2, 0)),
         ([one(), rival()], [one()], {"doubt": (1e-4, 1e-3)}, ("", 40.0, 1e-4, 2, 0)),
-        ([one(), rival()], [one()], {"doubt": (1e-4, 1.01e-3)}, (BY_CHANCE, 40.0, 1.01e-3, 2, 1)),
+        ([one(), rival()], [one(), rival()], {"doubt": (1e-4, 1.01e-3)},
+         (BY_CHANCE, 40.0, 1.01e-3, 2, 1)),
         ([one(), rival()], [one("there")], {"doubt": 1e-4}, (AMBIGUOUS, 0.0, None, 2, 1)),
         ([one(), rival()], [], {"doubt": 1e-4}, (AMBIGUOUS, 0.0, None, 2, 1)),
         ([one(log_likelihood_ratio=20.0), rival()], [], {"doubt": 1e-4}, ("", 40.0, 1e-4, 1, 0)),
