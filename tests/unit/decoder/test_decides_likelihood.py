@@ -11,7 +11,7 @@ import decoder.likelihood
 import decoder.ranking
 from decoder import Likelihood, WindowError, decode_likelihood
 from decoder.errors import MethodError
-from decoder.ranking import Joint, Places, Ranked, best_of, best_of_all, ranking_of
+from decoder.ranking import Joint, Places, best_of, ranking_of
 from decoder.window import (
     checked_labels,
     checked_scores,
@@ -314,26 +314,6 @@ def test_what_is_no_probability_and_no_turn_is_refused(options):
         Likelihood(BINARY, **options)
     Likelihood(BINARY, doubt=1.0, blank=0.0, rotations=(0, 1, 2, 3))  # the bounds
     Likelihood(BINARY, doubt=1e-12, blank=0.999, rotations=(3,))
-
-
-@pytest.mark.parametrize("number", [2, 3, 7])
-def test_joined_parts_are_as_if_all_were_ranked_at_once(number):
-    rng = np.random.default_rng(8)
-    values = [rng.normal(size=(4, size)) for size in (9, 5, 12)]
-    parts = []
-    for own in values:
-        places, chosen, rest = best_of(own.astype(np.float32), number)
-        rows = places.astype(np.uint64)
-        parts.append(Ranked(rows, rows + np.uint64(100), chosen, rest))
-    found, source = best_of_all(parts, number)
-    whole = np.sort(np.concatenate(values, axis=1), axis=1)[:, ::-1]
-    np.testing.assert_allclose(found.values, whole[:, :number], atol=1e-5)
-    np.testing.assert_allclose(found.rest, np.exp(whole - whole[:, :1]).sum(axis=1) - 1, rtol=1e-4)
-    for i in range(4):
-        for k in range(number):
-            own = values[source[i, k]][i]
-            assert own[int(found.rows[i, k])] == pytest.approx(found.values[i, k], abs=1e-5)
-            assert found.columns[i, k] == found.rows[i, k] + 100
 
 
 @pytest.mark.parametrize("places", [3, 40, 1023, 1024, 1500, 4099])

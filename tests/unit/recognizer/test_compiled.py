@@ -163,24 +163,6 @@ def test_cells_score_alike(name):
         assert one.covariance == pytest.approx(other.covariance, rel=1e-4)
 
 
-@pytest.mark.parametrize("cells", [5, 36, 300])
-def test_lattices_of_the_coarse_search_are_summed_alike_to_the_bit(cells, monkeypatch):
-    sensor, draw = SensorType(), np.random.default_rng(cells)
-    template = template_of(alphabet_named("dense-4"), STYLE, sensor)
-    monkeypatch.setattr(search, "ROTATIONS", 4)
-    monkeypatch.setattr(search, "SHIFTS", 4)
-    bank = bank_of(template, sensor)
-    none = int(bank.lookups.max())
-    bank = replace(bank, lookups=draw.integers(0, none + 1, (4, 16, cells)).astype(np.int32))
-    values, weights = draw.random((2, 16, 16)).astype(np.float32)
-    found = [
-        touch_loops.lattice_scores(bank, values, weights, template.order),
-        score_lattices(bank, values, weights, template.order).scores,
-    ]
-    assert found[0].shape == (4, 16)
-    assert found[0].tobytes() == found[1].tobytes()
-
-
 def test_lattices_score_what_their_symbols_do_tactel_by_tactel(monkeypatch):
     sensor, draw = SensorType(), np.random.default_rng(12)
     template = template_of(alphabet_named("dense-4"), STYLE, sensor)

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,14 +9,12 @@ import pytest
 import recognizer.touch.evidence
 from recognizer.touch.evidence import (
     VerifiedHypothesis,
-    null_log_likelihood,
     symbols_to_name,
     unworn_labels_at,
     weigh_cells,
 )
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.options import ReaderOptions
-from recognizer.touch.prepare import cell_share
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW
 from recognizer.touch.verdict import (
     Evidence,
@@ -133,13 +130,6 @@ def test_the_border_counts_for_a_place_that_lacks_only_symbols(changed, margin, 
     assert may_count_border(replace(GOOD, **changed), margin, LIMITS) is counts
 
 
-@pytest.mark.parametrize(("tactels", "share"), [(3.0, 1.0), (math.sqrt(8.0), 1.0), (2.0, 0.25)])
-def test_few_tactels_on_a_symbol_count_whole(tactels, share):
-    sensor = SimpleNamespace(pitch_mm=2.0)
-    styles = [SimpleNamespace(style=SimpleNamespace(pitch_mm=2 * t)) for t in (tactels, 9.0)]
-    assert cell_share(SimpleNamespace(arrays=styles), sensor) == pytest.approx(share)
-
-
 def one_cell(small, scores, seen=20.0, held=2, order=4):
     """What a cell says of a place that holds label `held` there; None: no symbol."""
     cells = {(5, 5): (0, held)} if held is not None else {(0, 0): (0, 1)}
@@ -177,13 +167,6 @@ def test_what_one_cell_says(small, scores, seen, held, truth):
     assert against == pytest.approx(truth[3])
 
 
-@pytest.mark.parametrize(("share", "agrees"), [(0.51, True), (0.49, False)])
-def test_a_cell_agrees_whose_symbol_is_likelier_than_all_else_together(small, share, agrees):
-    others = np.log(np.array([0.1, 0.2, 0.3, 0.4]) * (1 - share))
-    scores = [others[0], others[1], math.log(share), others[2], others[3]]
-    assert one_cell(small, scores - np.max(scores))[2] is agrees
-
-
 def test_labels_that_a_place_shows_where_they_are_not_worn_away(small):
     lab = small.two_faces()
     place = Hypothesis(0, 4, 4, 0, 0.0)
@@ -210,17 +193,6 @@ def test_how_many_symbols_name_one_of_so_many_cells(small, keys, order, symbols)
     held = {(r, c): (0, 0) for r in range(9) for c in range(10)}
     lab = small.Lab(dict(list(held.items())[:keys]), order=order)
     assert symbols_to_name(lab.embossed) == symbols
-
-
-def test_an_image_of_no_registered_place_shows_anything_with_the_same_probability(small):
-    lab = small.two_faces()  # 48 registered cells
-    scores = np.random.default_rng(1).normal(size=(3, 5)) * 3
-    fit = small.fit_of([(0, 0), (1, 0), (0, 1)], scores, value=-77.0)
-    mean = 1.0
-    for cell in scores:
-        mean *= sum(math.exp(one) for one in cell) / 5
-    # a place has the prior 1 / 48: in nats over one place
-    assert null_log_likelihood(lab.embossed, fit) == pytest.approx(math.log(mean * 48) - 77.0)
 
 
 def verified(small, fit, place, score=0.0, lab=None):

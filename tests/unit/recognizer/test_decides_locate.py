@@ -145,27 +145,6 @@ def test_where_no_window_is_whole_three_cells_are_tried_in_turn_as_registered_on
         assert one.score == pytest.approx(by_hand(lab, fit, (one.row, one.column, one.face)))
 
 
-@pytest.mark.parametrize("order", [2, 7])
-def test_windows_of_arrays_of_fewer_or_more_symbols(small, order):
-    labels = np.random.default_rng(31).integers(0, order, (6, 9))
-    held = {(r, c): (0, int(labels[r, c])) for r in range(6) for c in range(9)}
-    lab = small.Lab(held, order=order)
-    cells = [(i, -r) for r in range(3) for i in range(3)]
-    shown = [int(labels[1 + r, 4 + i]) for r in range(3) for i in range(3)]
-    for weak in range(9):
-        scores = small.sure_of(shown, order)
-        others = [label for label in range(order) if label != shown[weak]]
-        scores[weak, others] = -9.0
-        scores[weak, shown[weak]], scores[weak, others[0]] = -3.0, 0.0  # read wrong
-        scores[weak, order] = -8.0
-        found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))
-        assert (1, 4, 0) in where(found)
-        scores[weak, others[0]] = -9.0
-        scores[weak, shown[weak]] = 0.0
-        found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),))
-        assert (found[0].row, found[0].column) == (1, 4)
-
-
 def line(small, zeros, columns=20_000):
     """One row, most cells of it with label 1, those of `zeros` with label 0."""
     marked = set(zeros)
