@@ -114,23 +114,6 @@ def test_the_more_turns_and_places_the_more_a_blank_surface_weighs(blank):
         assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
 
 
-def test_a_symbol_is_read_wrong_once_in_twenty_times():
-    window = QUATERNARY.symbols(*np.indices((4, 4)))
-    window[1, 2] = (window[1, 2] + 1) % 4
-    window[0, 0] = -1
-    right, wrong = math.log(0.95), math.log(0.05 / 3)
-    scores = np.full((4, 4, 4), wrong)
-    np.put_along_axis(scores, np.where(window < 0, 0, window)[..., None], right, axis=-1)
-    scores[0, 0] = 0.0
-    ranked, doubt, _ = bayes(QUATERNARY, scores)
-    for found in (
-        Likelihood(QUATERNARY, doubt=1.0).decode(window),
-        decode_likelihood(QUATERNARY, window, doubt=1.0),
-    ):
-        assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
-        assert found.margins[0] == pytest.approx(-ranked[1][3], abs=1e-4)
-
-
 def test_scores_of_labels_by_hand():
     # 4 symbols, wrong with 0.4: right 0.6, each other 0.4 / 3
     found = hard_scores(np.array([[2, -1], [0, 3]]), 4, 0.4)
@@ -179,20 +162,6 @@ def test_by_default_one_wrong_answer_in_two_thousand_is_allowed(turns):
         assert refused.reason == "ambiguous"
         assert not decode(with_doubt(4.95e-4, turns), doubt=4e-4)
         assert decode(with_doubt(4.95e-4, turns), doubt=allowed.doubt)
-
-
-@pytest.mark.parametrize("turns", [(0,), ALL_TURNS])
-@pytest.mark.parametrize("blank", [0.01, 0.2, 0.4])
-def test_a_surface_without_code_is_told_where_it_is_the_likelier_one(blank, turns):
-    base = drawn(BINARY, (6, 6), 11)
-    low, high = 0.05, 20.0
-    for _ in range(26):
-        middle = (low + high) / 2
-        _, _, without = bayes(BINARY, middle * base, turns, blank=blank)
-        low, high = (low, middle) if without else (middle, high)
-    for scale, reason in ((0.99 * low, "ambiguous"), (1.01 * low, "not an encoded surface")):
-        found = Likelihood(BINARY, rotations=turns, blank=blank).decode(scale * base)[0]
-        assert found.reason == reason
 
 
 @pytest.mark.parametrize("turns", [(0,), (1,), ALL_TURNS])

@@ -24,8 +24,6 @@ from recognizer.as_built.touches import measure_prints
 from recognizer.as_built.verdict import AS_DESIGNED, CORRECTED, PRINT_AGAIN, judge_print
 from recognizer.errors import AsBuiltError
 from recognizer.touch.as_built import (
-    ASIDE_SD_MM,
-    DESIGNED,
     UNUSUAL,
     PrintedFace,
     TouchScale,
@@ -164,26 +162,6 @@ def test_a_pose_that_is_read_becomes_the_pose_on_the_print(scale_x, scale_y, ske
     np.testing.assert_allclose(T_part_face @ found, T_part_probe, atol=1e-9)
 
 
-def test_a_pose_is_as_unsure_as_the_print_where_it_is_far_from_the_middle():
-    T_part_face = np.eye(4)
-    T_part_face[:3, 3] = -30, -30, 3
-    spread = np.diag([1e-3**2, 2e-3**2, 3e-3**2, 0.1**2])
-    face = PrintedFace(print_with(covariance=spread), T_part_face)
-    pose = np.eye(4)
-    pose[:2, 3] = 30, 30  # the middle
-    own = np.diag([1e-4, 1e-4, 1e-6])
-    floor = np.diag([ASIDE_SD_MM**2] * 2 + [0])  # backlash, shifted layers
-    same, covariance = face.pose(pose, own)
-    np.testing.assert_allclose(same, pose, atol=1e-12)
-    np.testing.assert_allclose(covariance, own + floor + np.diag([0, 0, 1.5e-3**2]), atol=1e-12)
-    pose[:2, 3] = 50, 20
-    _, covariance = face.pose(pose, own)  # 20 mm along x, -10 mm along y
-    covariance -= floor
-    assert covariance[0, 0] == pytest.approx(1e-4 + 0.02**2 + 0.03**2, rel=1e-4)
-    assert covariance[1, 1] == pytest.approx(1e-4 + 0.02**2, rel=1e-4)
-    assert covariance[0, 2] == pytest.approx(0.03 * 1.5e-3, rel=1e-4)  # both of the skew
-
-
 def at_rest(x=0.0, y=0.0, turn=0.0):
     pose = np.eye(4)
     pose[:2, :2], pose[:2, 3] = turned(turn)[:2, :2], (x, y)
@@ -192,45 +170,6 @@ def at_rest(x=0.0, y=0.0, turn=0.0):
 
 def felt(excess, sigma=1e-3, expected=1e9, with_pose=(0.0, 0.0, 0.0)):
     return TouchScale(excess, np.array([*with_pose, sigma**2]), expected)
-
-
-def test_what_a_touch_feels_of_the_scale_moves_its_place_towards_the_middle():
-    face = PrintedFace(print_with(covariance=np.diag([4e-6, 4e-6, 1e-12, 1])), np.eye(4))
-    pose, none = at_rest(20.0, -10.0, 0.3), np.zeros((3, 3))
-    # the mean of both scales is known to .002 / root 2, and felt to .001
-    share = 2e-6 / (2e-6 + 1e-6)
-    found, covariance = face.pose(pose, none, felt(0.003))
-    scale = 1 - share * 0.003
-    assert found[:2, 3] == pytest.approx((20 * scale, -10 * scale), abs=2e-4)
-    np.testing.assert_allclose(found[:3, :3], pose[:3, :3], atol=1e-9)
-    # what is left of the mean, and of the difference, which no touch tells
-    left, apart = (1 - share) * 2e-6, 2e-6
-    floor = ASIDE_SD_MM**2
-    assert covariance[0, 0] == pytest.approx(floor + 20**2 * (left + apart), rel=0.01)
-    assert covariance[1, 1] == pytest.approx(floor + 10**2 * (left + apart), rel=0.01)
-    assert covariance[0, 1] == pytest.approx(-20 * 10 * (left - apart), rel=0.02)
-
-
-def test_a_place_that_hangs_on_the_scale_moves_with_it():
-    """At an edge a lattice that is felt too large is felt aside: both are one error."""
-    sure = PrintedFace(print_with(covariance=np.full((4, 4), 1e-18)), np.eye(4))
-    covariance = np.diag([4e-4, 1e-4, 1e-6])
-    touch = felt(0.004, 1e-3, with_pose=(1e-5, 0.0, 1e-7))  # 10 mm, .1 rad for each unit of scale
-    found, told = sure.pose(at_rest(0.0, 0.0), covariance, touch)
-    assert found[:2, 3] == pytest.approx((-0.04, 0.0), abs=1e-6)  # the print is as designed
-    assert math.atan2(found[1, 0], found[0, 0]) == pytest.approx(-0.0004, rel=1e-3)
-    left = covariance - np.outer((1e-5, 0, 1e-7), (1e-5, 0, 1e-7)) / 1e-6
-    floor = np.diag([ASIDE_SD_MM**2] * 2 + [0.0])
-    np.testing.assert_allclose(told, left + floor, atol=1e-9)
-
-
-def test_of_a_part_as_designed_nothing_is_allowed_for():
-    """Its scale is known to be 1: what was felt of it moves the place, and leaves no spread."""
-    T_part_face = at_rest(-30.0, 5.0)
-    own = np.diag([4e-4, 1e-4, 1e-6])
-    found, covariance = PrintedFace(DESIGNED, T_part_face).pose(at_rest(20.0, 10.0), own, felt(0.0))
-    np.testing.assert_allclose(found, at_rest(20.0, 10.0), atol=1e-9)
-    np.testing.assert_allclose(covariance, own, atol=1e-12)
 
 
 def test_a_touch_that_shows_an_unusual_scale_widens_its_ellipse_and_stays():

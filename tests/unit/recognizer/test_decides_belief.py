@@ -10,7 +10,6 @@ import recognizer.touch.evidence
 from recognizer.touch.evidence import (
     VerifiedHypothesis,
     symbols_to_name,
-    unworn_labels_at,
     weigh_cells,
 )
 from recognizer.touch.hypothesis import Hypothesis
@@ -165,24 +164,6 @@ def test_what_one_cell_says(small, scores, seen, held, truth):
     worn, seen_, agree, against = one_cell(small, scores, seen, held)
     assert (worn, seen_, agree) == truth[:3]
     assert against == pytest.approx(truth[3])
-
-
-def test_labels_that_a_place_shows_where_they_are_not_worn_away(small):
-    lab = small.two_faces()
-    place = Hypothesis(0, 4, 4, 0, 0.0)
-    cells = np.array([[(i, j) for i in range(-3, 5)] for j in range(-3, 4)])
-    worn = np.array([(0, 0), (1, -2), (0, 3)])
-    found = unworn_labels_at(lab.embossed, place, worn)(cells)
-    assert found.shape == cells.shape[:2]
-    shown = lab.shows(4, 4, 0, cells.reshape(-1, 2).tolist())
-    gone = {tuple(cell) for cell in worn.tolist()}
-    truth = [
-        -1 if label == 4 or tuple(cell) in gone else label
-        for cell, label in zip(cells.reshape(-1, 2).tolist(), shown, strict=True)
-    ]
-    assert found.ravel().tolist() == truth
-    none = unworn_labels_at(lab.embossed, place, worn[:0])(cells).ravel()
-    assert none.tolist() == [-1 if label == 4 else label for label in shown]
 
 
 @pytest.mark.parametrize(

@@ -27,25 +27,6 @@ def counted(scores, held):
     return sum(value >= own - 1e-9 for value in sums) / len(sums)
 
 
-@pytest.mark.parametrize(
-    ("scores", "chance"),
-    [
-        ([[0.0, -8, -8, -8]], 1 / 4),
-        ([[0.0, -0.1, -8, -8]], 2 / 4),  # nearer than the grain: it scores as well
-        ([[0.0, -0.3, -8, -8]], 1 / 4),
-        ([[0.0, 0.5, -8, -8]], 2 / 4),  # another one is likelier
-        ([[0.0, 0.5, 0.6, 0.7]], 1.0),
-        ([[0.0, -8, -8, -8], [0.0, 0, 0, 0]], 1 / 4),  # a cell that says nothing
-        # the likelier symbol of one cell makes up for a lesser one of the other
-        ([[0.0, 4.0, -8, -8], [0.0, -3.0, -8, -8]], 3 / 16),
-        ([[0.0, 4.0, -8, -8], [0.0, -5.0, -8, -8]], 2 / 16),
-    ],
-)
-def test_a_soft_cell_counts_as_many_symbols_as_score_as_well(scores, chance):
-    held = np.zeros(len(scores), np.int64)
-    assert chance_of_match(np.array(scores), held) == pytest.approx(chance)
-
-
 def test_without_a_symbol_everything_matches():
     assert chance_of_match(np.zeros((0, 4)), np.zeros(0, np.int64)) == 1.0
 

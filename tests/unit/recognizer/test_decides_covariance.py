@@ -1,11 +1,9 @@
 """How sure a pose is, and what a tactel costs: by hand, and by loops over all neighbours."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from reference.touch_loops import log_likelihoods
 
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.symbols.fit import covariances
@@ -127,39 +125,3 @@ def test_two_unknowns_that_the_image_does_not_tell_apart_are_wide_together():
     pair *= np.outer([1 / 2, 1 / 3], [1 / 2, 1 / 3])
     np.testing.assert_allclose(found[:2, :2], 0.6 * pair, rtol=1e-6)
     assert found[2, 2] == pytest.approx(0.6)
-
-
-def psi(response):
-    return math.log(1 + 3 * response) / math.log(4)
-
-
-def density(seen, value, slopes, press, noise, faint):
-    """Log-density of a reading, nats; a spike costs 8, readings scatter by a share of a plateau."""
-    step = 1e-6
-    response = (4**value - 1) / 3
-    own = faint * (psi(response + step) - psi(response)) / step * press / noise
-    width = math.hypot(0.8, value, *slopes, own)
-    away = (seen - value) / (width * noise / press)
-    return -min(away**2 / 2, 8.0) - math.log(width)
-
-
-@pytest.mark.parametrize("faint", [0.0, 0.03, 0.2])
-def test_every_tactel_under_every_plane(faint):
-    rng = np.random.default_rng(1)
-    b, n, q = 2, 40, 3
-    seen, press = rng.uniform(0, 1.3, (b, n)), rng.uniform(0.2, 1.0, (b, n))
-    bare = np.where(rng.random((b, n)) < 0.5, 0.0, rng.uniform(0, 0.9, (b, n)))
-    trust = rng.uniform(0, 1, n)
-    tables = np.full((b, n, q, 6), 9.0, np.float32)  # what is fitted of the form is no noise
-    tables[..., :3] = rng.normal(size=(b, n, q, 3)) * [0.5, 0.4, 0.7] + [0.5, 0.0, 0.0]
-    noise = np.array([0.12, 0.3])
-    felt = SimpleNamespace(
-        psi=seen, press=press, bare=bare, trust=trust, faint=np.full((b, n), faint)
-    )
-    found = log_likelihoods(felt, tables, noise)
-    for i, k in np.ndindex(b, n):
-        known = press[i, k], noise[i], faint
-        truth = [density(seen[i, k], each[0], each[1:3], *known) for each in tables[i, k].tolist()]
-        # beyond the edge of the face, or over it
-        truth.append(max(density(seen[i, k], at, (), *known) for at in (0.0, psi(bare[i, k]))))
-        np.testing.assert_allclose(found[i, k], trust[k] * np.array(truth), rtol=1e-4, atol=1e-4)

@@ -12,8 +12,6 @@ from recognizer.touch.hypothesis import (
     coincide,
     find_hypotheses,
     find_rivals,
-    labels_at,
-    labels_of,
     log_likelihood,
 )
 
@@ -54,20 +52,6 @@ def soft(lab, place, cells, small, seed, spread=2.0, least=-9.0):
     scores = small.sure_of(labels, least=least) + spread * rng.normal(size=(len(cells), 5))
     scores -= scores.max(axis=1, keepdims=True)
     return small.fit_of(cells, scores, rng.uniform(1.0, 30.0, len(cells)), value=-123.0)
-
-
-@pytest.mark.parametrize("dense", [False, True])
-def test_what_cells_show_at_a_place(small, dense):
-    lab = small.two_faces(dense)
-    cells = [(i, j) for i in range(-7, 8) for j in range(-7, 8)]
-    for place in ((4, 4, 0), (10, 12, 1), (0, 0, 1), (0, 0, 0), (6, 2, 0)):
-        truth = lab.shows(*place, cells)
-        assert labels_of(lab.embossed, at(*place), np.array(cells)).tolist() == truth
-    places = [at(4, 4, 0), at(10, 12, 1)]
-    shown = labels_at(lab.embossed, places)(np.array([cells, cells]))
-    for one, own in zip(places, shown.tolist(), strict=True):
-        labels = lab.shows(one.row, one.column, one.face, cells)
-        assert own == [-1 if label == 4 else label for label in labels]
 
 
 @pytest.mark.parametrize(

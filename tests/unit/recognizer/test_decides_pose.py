@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from recognizer.touch.pose import face_covariance, face_pose, felt_scale, inside_mm
+from recognizer.touch.pose import face_pose, inside_mm
 
 PITCH, HEIGHT = 7.0, 1.2
 ROWS, COLUMNS = 8, 10  # a small torus, so that a wrong way round it shows
@@ -65,23 +65,6 @@ def test_the_symbol_that_is_nearest_both_ways_tells_the_place():
     face.rows, face.columns = np.array([2 - 3, 2 - 2, 2 + 2, 2 + 3]), np.array([5, 6, 1, 6])
     face.centres_mm = np.array([[100.0, 0.0], [200.0, 0.0], [300.0, 0.0], [400.0, 0.0]])
     assert abs(face_pose(embossed, face, place, fit)[0, 3] - 300.0) < 50.0
-
-
-@pytest.mark.parametrize("rotation", [0.5, -1.3, math.pi / 2, 2.9])
-def test_errors_are_turned_as_the_place_is_that_they_are_of(rotation):
-    errors = np.random.default_rng(2).normal(size=(40, 3)) * [3.0, 0.4, 0.1]
-    errors[:, 2] += 0.05 * errors[:, 0]
-    on_face = [complex(x, y) * cmath.exp(-1j * rotation) for x, y in errors[:, :2]]
-    turned = np.array([[z.real, z.imag, t] for z, t in zip(on_face, errors[:, 2], strict=True)])
-    face = SimpleNamespace(rotation_rad=rotation)
-    found = face_covariance(face, errors.T @ errors)
-    np.testing.assert_allclose(found, turned.T @ turned, atol=1e-9)
-    fit = SimpleNamespace(nuisance=np.array([1.0, 2.0, 3.0, 0.05, 5.0]), with_scale=None)
-    assert felt_scale(face, fit, 0.02) is None
-    fit.with_scale = np.append(errors[0], 0.9)
-    scale = felt_scale(face, fit, 0.02)
-    assert (scale.excess, scale.expected) == (0.05, 0.02)
-    np.testing.assert_allclose(scale.covariance, np.append(turned[0], 0.9))
 
 
 SQUARE = [(0, 0), (10, 0), (10, 8), (0, 8)]

@@ -9,11 +9,9 @@ import pytest
 from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.signal import (
-    combine_around,
     contact_counts,
     mean_of_strongest,
     noise_of,
-    quantile,
     signal_of,
 )
 
@@ -195,30 +193,6 @@ def test_where_few_tactels_stand_out_all_of_them_are_pressed(over, even):
         image[9, 0] = spike
         found = signal_of(image).forces[9, 9]
         assert bool(found == pytest.approx(strong - lowest)) is even
-
-
-@pytest.mark.parametrize("shape", [(16, 16), (12, 32), (3, 1)])
-@pytest.mark.parametrize("reach", [0, 1, 2, 3])
-@pytest.mark.parametrize(
-    ("combine", "of"), [(np.maximum, np.max), (np.logical_or, np.any), (np.logical_and, np.all)]
-)
-def test_squares_end_at_the_rim(shape, reach, combine, of):
-    image = np.random.default_rng(4).random(shape)
-    image = image if combine is np.maximum else image > (0.9 if combine is np.logical_or else 0.1)
-    given = image.copy()
-    found = combine_around(image, reach, combine)
-    for row, column in np.ndindex(shape):
-        around = image[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) :]
-        assert found[row, column] == of(around[:, : min(reach, column) + reach + 1])
-    assert found.dtype == image.dtype
-    assert (image == given).all()
-
-
-@pytest.mark.parametrize("count", [1, 2, 25, 256])
-@pytest.mark.parametrize("share", [0.0, 0.05, 0.5, 0.6, 0.85, 1.0])
-def test_quantiles_are_numpys(count, share):
-    values = np.random.default_rng(count).random((3, count))
-    assert quantile(np.sort(values), share).tolist() == np.quantile(values, share, axis=1).tolist()
 
 
 def test_the_law_of_a_type_is_taken_off_counts_alone():

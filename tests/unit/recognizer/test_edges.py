@@ -6,18 +6,14 @@ import math
 import numpy as np
 import pytest
 
-from encoded_objects.base.sensor_type import Overlay, SensorType
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
 from recognizer.thesis.edge_fit import (
-    BLURS_MM,
-    REACH_MM,
     face_edges,
-    response_at,
-    responses,
 )
 from recognizer.thesis.edges import (
     EdgePoints,
@@ -119,19 +115,6 @@ def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
 
 
 # --- response ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", ["tab", "pad"])
-def test_response_rises_from_nothing_to_all(kind):
-    table = responses(SensorType(overlay=Overlay(kind=kind)))
-    assert len(table) == len(BLURS_MM)
-    assert (np.diff(table, axis=1) > -1e-12).all()
-    for row in table:
-        assert response_at(row, np.array([-REACH_MM - 1, REACH_MM + 1])) == pytest.approx(
-            [0, 1], abs=1e-4
-        )
-    sharp = response_at(table[0], np.array([-0.5, 0.0, 0.5]))
-    assert 0 < sharp[0] < 0.4 < sharp[1] < 0.66 < sharp[2]
 
 
 # --- simulated touches ------------------------------------------------------------------
