@@ -129,15 +129,6 @@ def test_the_border_counts_for_a_place_that_lacks_only_symbols(changed, margin, 
     assert may_count_border(replace(GOOD, **changed), margin, LIMITS) is counts
 
 
-def one_cell(small, scores, seen=20.0, held=2, order=4):
-    """What a cell says of a place that holds label `held` there; None: no symbol."""
-    cells = {(5, 5): (0, held)} if held is not None else {(0, 0): (0, 1)}
-    lab = small.Lab(cells, order=order)
-    fit = small.fit_of([(0, 0)], [scores], seen)
-    found = weigh_cells(lab.embossed, fit, Hypothesis(0, 5, 5, 0, 0.0))
-    return bool(found.worn[0]), bool(found.seen[0]), bool(found.agree[0]), float(found.against[0])
-
-
 @pytest.mark.parametrize(
     ("scores", "seen", "held", "truth"),
     [
@@ -154,16 +145,18 @@ def one_cell(small, scores, seen=20.0, held=2, order=4):
         ([-9, -9, 0, -9, 1.1e-4], 20, 2, (True, True, False, -1.1e-4)),
         # another symbol is likelier
         ([0, -9, -4.5, -9, -9], 20, 2, (False, True, False, 4.5)),
-        ([0, -9, -4.5, -9, -4.4], 20, 2, (True, True, False, 4.4)),
+        ([0, -9, -4.5, -9, -4.4], 20, 2, (True, True, False, 4.4)),  # sharing no stroke
         # no symbol is registered: what speaks against it is the likeliest one
         ([-1, -9, -2, -9, 0], 20, None, (False, True, False, -1.0)),
         ([0, -9, -2, -9, -7.5], 20, None, (False, True, False, 7.5)),
     ],
 )
 def test_what_one_cell_says(small, scores, seen, held, truth):
-    worn, seen_, agree, against = one_cell(small, scores, seen, held)
-    assert (worn, seen_, agree) == truth[:3]
-    assert against == pytest.approx(truth[3])
+    lab = small.Lab({(5, 5): (0, held)} if held is not None else {(0, 0): (0, 1)})
+    fit = small.fit_of([(0, 0)], [scores], seen)
+    found = weigh_cells(lab.embossed, fit, Hypothesis(0, 5, 5, 0, 0.0))
+    assert (found.worn[0], found.seen[0], found.agree[0]) == truth[:3]
+    assert found.against[0] == pytest.approx(truth[3])
 
 
 @pytest.mark.parametrize(
