@@ -9,56 +9,11 @@ from pathlib import Path
 from typing import Annotated
 
 import pytest
-from typer.testing import CliRunner
 
 from encoded_objects.base import console
 from encoded_objects.base.errors import UsageError, require
 from encoded_objects.base.options import Application, Argument, Json, Option, Options, command
 from encoded_objects.base.output import write, write_json
-
-PROGRAM = """
-import gc, json, os, sys
-from encoded_objects.base import console
-from encoded_objects.base.options import Application, command
-
-app = Application()
-
-class Cycle:
-    def __init__(self): self.own = self
-    def __del__(self): print("walked")
-
-@command(app)
-def act():
-    state = [gc.get_threshold()[0], os.environ["PYDANTIC_DISABLE_PLUGINS"]]
-    print(json.dumps(state))
-    Cycle()
-    return 3
-
-console.main("do", lambda _: app, [], bare=True)
-"""
-
-
-def process(program, **environment):
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True,
-        env={"PATH": "", "PYTHONPATH": ":".join(sys.path), **environment},
-    )  # fmt: skip
-    assert done.stderr == ""
-    return done
-
-
-def test_a_command_does_not_walk_through_what_stays():
-    done = process(PROGRAM)
-    assert done.returncode == 3
-    threshold, plugins = json.loads(done.stdout)  # the cycle is left to the end of the process
-    assert threshold > 10_000
-    assert plugins == "__all__"
-
-
-def test_plugins_that_somebody_asks_for_are_left():
-    done = process(PROGRAM, PYDANTIC_DISABLE_PLUGINS="one")
-    assert json.loads(done.stdout)[1] == "one"
-
 
 STREAMS = """
 import sys
@@ -80,6 +35,9 @@ console.main("do", lambda _: app, bare=True)
 """
 
 
+CLEAN = {"PATH": "", "PYTHONPATH": ":".join(sys.path)}
+
+
 @pytest.mark.parametrize(
     ("result", "redirect", "code", "out", "err"),
     [
@@ -99,7 +57,7 @@ def test_streams_that_are_closed_or_full(result, redirect, code, out, err, tmp_p
     (tmp_path / "do.py").write_text(STREAMS.format(result))
     done = subprocess.run(
         f"{sys.executable} do.py {redirect}", shell=True, cwd=tmp_path, capture_output=True,
-        text=True, env={"PATH": "", "PYTHONPATH": ":".join(sys.path)},
+        text=True, env=CLEAN,
     )  # fmt: skip
     assert done.returncode == code, done.stderr
     assert out in done.stdout
@@ -129,18 +87,6 @@ def one(number: Annotated[int, Argument("How [bold]many[/].")]) -> int:
     return number
 
 
-@command(part)
-def two(name: Annotated[str, Option("Whose.")] = "x") -> int:
-    """Do two."""
-    return len(name)
-
-
-@command(part)
-def three() -> int:
-    """Do three."""
-    return 3
-
-
 @command(app)
 def four(sort: Annotated[str, Option("Which.")] = "", as_json: Json = False) -> int:
     """Do four."""
@@ -153,17 +99,6 @@ def five(as_json: Json = False) -> int:
     """Do five."""
     write_json("five") if as_json else write("five")
     return 0
-
-
-@pytest.mark.parametrize(
-    "words",
-    [["--help"], ["-h"], ["one", "--help"], ["part", "-h"], ["part", "two", "--help"],
-     ["--json", "one", "-h"], ["part", "two", "--name", "y", "--help"]],
-)  # fmt: skip
-def test_page_is_that_of_typer(words, capsys):
-    expected = CliRunner().invoke(app.for_typer(), words, prog_name="do")
-    assert console.run("do", lambda _: app, words) == expected.exit_code == 0
-    assert capsys.readouterr().out == expected.output
 
 
 @pytest.mark.parametrize(
@@ -186,11 +121,6 @@ def test_json_before_a_command_is_the_commands(words, code, out, capsys):
     assert out in said.out
     assert said.err == ""
     assert not words or json.loads(said.out)
-
-
-def test_errors_beside_help_are_told(capsys):
-    assert console.run("do", lambda _: app, ["six", "--help"]) == 2
-    assert "six" in capsys.readouterr().err
 
 
 @dataclass(frozen=True, slots=True)
