@@ -65,7 +65,7 @@ class Engine:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredEngine:
-    """What an engine errs by and costs; `tests/bench/contact_engines.py`."""
+    """What an engine errs by and costs; `tests/bench/contact_precision.py`."""
 
     engine: str
     level: str  #: the engine and its points on a tip

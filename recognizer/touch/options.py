@@ -34,7 +34,7 @@ class ReaderOptions:
     margin: float = 10.0 - TIE_NATS  #: nats over the best other place
     margin_by_few: float = 14.0 - TIE_NATS  #: where agreeing symbols say less than 22 bits
     #: registered places that a foreign surface may match as well by chance: of 395 right answers
-    #: among 20,880 places of 5 mm it refuses 5, all at edges (`tests/campaigns/other_labs.py`)
+    #: among 20,880 places of 5 mm it refuses 5, all at edges (docs/validation)
     doubt: float = 1e-4
     rim_mm: float = 2.0  #: how far the sensor's centre may lie beyond the face
     contact_counts: float = 8.0  #: over the background by which the strongest tactels rise

@@ -2,8 +2,8 @@
 
 Counts go to the results, CPU times to the times: `counted` holds the lines, `spent` their CPU
 times, ms, in order. Contact models and engines were measured against finer references by
-`tests/bench/contact_precision.py` and `contact_engines.py`; decoders read damaged windows of the
-set's own array; readers that spend more or less read the same touches.
+`tests/bench/contact_precision.py`; decoders read damaged windows of the set's own array; readers
+that spend more or less read the same touches.
 """
 
 from __future__ import annotations

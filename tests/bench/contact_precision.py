@@ -2,6 +2,7 @@
 
     PYTHONPATH=tests python tests/bench/contact_precision.py            # the table
     PYTHONPATH=tests python tests/bench/contact_precision.py --write    # and its files
+    PYTHONPATH=tests python tests/bench/contact_precision.py --engine mujoco [--write]
 
 Five indenters at some places each. The error of an image is the norm of its deviation over
 the norm of the reference, root mean square over the places. References:
@@ -16,6 +17,10 @@ Times are CPU times with the surface, on one thread: the least of the repetition
 median over the touches; what a level makes once (influence functions) is made
 before. A level that was not measured on every indenter,
 or refuses one, is left out of what `press` picks from by itself.
+
+With `--engine` the indenters are closed bodies, the patch is a written face, and the error is what
+asking fewer than 217 points on a tip costs; beside it, how far the image lies from our own engine's
+of an elastomer as stiff.
 """
 
 from __future__ import annotations
@@ -24,23 +29,31 @@ import json
 import math
 import statistics
 import sys
+import tempfile
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from reference.elements_axisymmetric import section
-from reference.elements_round import indented, washer_pad
+from manifold3d import Manifold
+from reference.elements import tactels_n
 from reference.indenters import sphere
 
+from encoded_objects import encode
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
+from probe.contact.engines import engine_named
 from probe.contact.layer import layer
+from probe.contact.mujoco import DEEPEST_MM, STIFFER
 from probe.contact.press import LEVELS, press
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
+from probe.simulate.target import part_surface
+from probe.surface.body import body_of
 from probe.surface.face import endless_face
 from probe.surface.indenters import RaisedStrip, TiltedPlane, Washer
+from probe.surface.mesh import mesh
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
 import runner
@@ -59,8 +72,11 @@ GLYPHS = (
 STIFF = WristStiffness(1e9, 1e9)  # a level plate, as the axisymmetric references have
 BALL_MM = 30.0
 ROUND = ("washer", "sphere")
-PLACES = {"tab": 48, "pad": 3}  #: what edges under a few points make is a matter of chance
+#: What edges under a few points make is a matter of chance.
+PLACES = {"tab": 48, "pad": 3, "engine": 40}
 REFERENCE_POINTS = 817  #: on each tip; the next finer level has 61
+ENGINE_POINTS, ENGINE_REFERENCE = (7, 19, 61), 217
+DEEP_MM = 4.0  #: of the closed bodies
 
 
 def cases(rng):
@@ -88,23 +104,7 @@ def reference(kind, case, surface, sensor, touch):
         return tabs(surface, sensor, touch, Tips(REFERENCE_POINTS)).forces_n
     if case not in ROUND:
         return layer(surface, sensor, touch, cells_per_tactel=24, samples=64).forces_n
-    pad = sensor.overlay
-    elastic = pad.young_mpa, pad.poisson
-    if case == "washer":
-        part = washer_pad(3.5, 7.5, pad.height_mm, *elastic, parts=28)
-    else:
-        r = np.concatenate([np.linspace(0, 12, 121), np.linspace(12, 30, 31)[1:]])
-        z = pad.height_mm * (1 - (1 - np.linspace(0, 1, 15)) ** 1.6)
-        part = section(r, z, *elastic)
-
-    def heights(r):
-        if case == "washer":  # nodes on an edge belong to the washer, whatever the last bit says
-            return np.where((r > 3.5 - 1e-9) & (r < 7.5 + 1e-9), 0.0, -np.inf)
-        return surface.heights_mm(np.stack([r, np.zeros_like(r)], axis=1))
-
-    c, s = math.cos(touch.theta_rad), math.sin(touch.theta_rad)
-    axis = (-c * touch.x_mm - s * touch.y_mm, s * touch.x_mm - c * touch.y_mm)
-    return indented(part, heights, touch.force_n).tactels_n(sensor, axis)
+    return tactels_n(case, sensor, touch)
 
 
 def measured(kind, case, surface, sensor, touches, repeat):
@@ -123,14 +123,20 @@ def measured(kind, case, surface, sensor, touches, repeat):
         if level not in found:
             yield level, math.inf, math.nan
             continue
-        errors = [
-            np.linalg.norm((a - b)[kept]) / np.linalg.norm(b[kept])
-            for a, b in zip(found[level], wanted, strict=True)
-        ]
-        error = math.sqrt(statistics.fmean(e * e for e in errors))
+        errors = apart([a[kept] for a in found[level]], [b[kept] for b in wanted])
+        error = root_mean_square(errors)
         print(f"{kind:4}{case:8}{level:12} error {error:9.2e}, at most {max(errors):9.2e}"
               f"   {times[level]:9.2f} ms", flush=True)  # fmt: skip
         yield level, error, times[level]
+
+
+def apart(images, wanted):
+    """Return |image - wanted| / |wanted| of each."""
+    return [np.linalg.norm(a - b) / np.linalg.norm(b) for a, b in zip(images, wanted, strict=True)]
+
+
+def root_mean_square(errors):
+    return math.sqrt(statistics.fmean(e * e for e in errors))
 
 
 def timed(surface, sensor, touches, levels, repeat):
@@ -142,6 +148,77 @@ def timed(surface, sensor, touches, levels, repeat):
                 work = partial(press, surface, sensor, touch, accuracy=level)
                 times[level][number].append(runner.clocked(work)[1])
     return {level: statistics.median(map(min, each)) for level, each in times.items()}
+
+
+def bodies():
+    """Name -> closed body, force (N), wrist, as `cases` has them."""
+    low = (0, 0, -DEEP_MM)
+    ring = Manifold.cylinder(DEEP_MM, 7.5, 7.5, 256) - Manifold.cylinder(DEEP_MM, 3.5, 3.5, 256)
+    bar = Manifold.cube((2, 60, DEEP_MM)).translate((-1, -30, -DEEP_MM))
+    cap = Manifold.sphere(BALL_MM, 512).translate((0, 0, -BALL_MM))
+    cap = cap ^ Manifold.cube((60, 60, DEEP_MM), center=True).translate((0, 0, -DEEP_MM / 2))
+    corners = [(x, y, z) for x in (-30, 30) for y in (-30, 30) for z in (0, 1)]
+    plane = Manifold.hull_points([(x, y, z * DEEP_MM * 2 + 0.02 * x + 0.01 * y - 9 + z)
+                                  for x, y, z in corners])  # fmt: skip
+    return {
+        "washer": (surface_of(ring.translate(low)), 80.0, STIFF),
+        "strip": (surface_of(bar), 40.0, STIFF),
+        "sphere": (surface_of(cap), 40.0, STIFF),
+        "patch": (written_face(), 80.0, STIFF),
+        "tilt": (surface_of(plane), 60.0, WristStiffness()),
+    }
+
+
+def surface_of(body):
+    made = body.to_mesh()
+    return mesh(np.asarray(made.vert_properties, float)[:, :3][np.asarray(made.tri_verts)])
+
+
+def written_face():
+    """Return a face of a cube as its STL holds it, its middle at the origin."""
+    with tempfile.TemporaryDirectory() as folder:
+        database = f"{folder}/lab.db"
+        encode({"name": "Cube", "shape": {"cube": "90 mm"}, "profile": "one-touch"},
+               folder=folder, database=database, formats=("stl",))  # fmt: skip
+        part = next(iter(sorted(Path(folder).rglob("*-F1.stl"))))
+        scene = part_surface(part, database=database, face="F1")
+    triangles = body_of(scene.surface)
+    return mesh(triangles - (*scene.centre_mm(), triangles[:, :, 2].max()))
+
+
+def engine_lines(engine, chosen, seed, count, repeat):
+    """Return the lines of an engine, worst error and median time over the indenters."""
+    press_by, own, sensor = engine_named(engine).press, engine_named("own").press, SensorType()
+    young = STIFFER * sensor.overlay.young_mpa * DEEPEST_MM / sensor.overlay.height_mm
+    ours = replace(sensor, overlay=replace(sensor.overlay, young_mpa=young, height_mm=DEEPEST_MM))
+    found = {points: [] for points in ENGINE_POINTS}
+    for case, (surface, force_n, wrist) in bodies().items():
+        if case not in chosen and chosen != [""]:
+            continue
+        touches = list(places(np.random.default_rng([seed, 7]), count, force_n, wrist))
+        finest = Tips(ENGINE_REFERENCE)
+        wanted = [press_by(surface, sensor, touch, finest).forces_n for touch in touches]
+        others = [own(surface, ours, touch, finest).forces_n for touch in touches]
+        for points in ENGINE_POINTS:
+            images, times = [], []
+            for touch in touches:
+                work = partial(press_by, surface, sensor, touch, Tips(points))
+                made = [runner.clocked(work) for _ in range(repeat)]
+                images.append(made[-1][0].forces_n)
+                times.append(min(ms for _, ms in made))
+            error, other = (root_mean_square(apart(images, of)) for of in (wanted, others))
+            found[points].append((error, other, statistics.median(times)))
+            print(f"{case:8}{engine}-{points:<5} error {error:9.2e}, from our own {other:9.2e}"
+                  f"   {found[points][-1][-1]:7.1f} ms", flush=True)  # fmt: skip
+    table = []
+    for points, lines in found.items():
+        errors, others, ms = zip(*lines, strict=True)
+        line = {"engine": engine, "level": f"{engine}-{points}", "touches": count * len(lines),
+                "error": three(max(errors)), "from_own": three(max(others)),
+                "ms": three(statistics.median(ms))}  # fmt: skip
+        table.append(line)
+        print(json.dumps(line))
+    return table
 
 
 def draw(known, path):
@@ -186,8 +263,15 @@ def draw(known, path):
 def main():
     """Measure what is asked for; `--overlay` tab or pad, `--case` some indenters."""
     given = runner.asked(__doc__, seed=1, places=0, repeat=3, case=[""], overlay=["tab", "pad"],
-                         write=False)  # fmt: skip
+                         engine="", write=False)  # fmt: skip
     known = json.loads(TABLE.read_text())
+    if given.engine:
+        count = given.places or PLACES["engine"]
+        table = engine_lines(given.engine, given.case, given.seed, count, given.repeat)
+        kept = [line for line in known.get("engines", []) if line["engine"] != given.engine]
+        if given.write:
+            write_table(known | {"engines": kept + table})
+        return
     lines = {(p["overlay"], p["case"], p["level"]): p for p in known["cases"]}
     for kind in given.overlay:
         sensor = SensorType(overlay=Overlay(kind=kind))

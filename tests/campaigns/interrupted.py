@@ -1,21 +1,16 @@
-"""Stop `encode-object` and `validate-set` at random moments and look at what is left.
+"""Kill `encode-object` by signal 9 at random moments and look at what is left.
 
     python tests/campaigns/interrupted.py --engine both --times 100 --seed 1
-    python tests/campaigns/interrupted.py --validate SPEC.yaml --touches 2000 --shard 100 --times 10
 
-After every kill of `encode-object` by signal 9: no file under its final name differs from the one
-that an undisturbed run writes, the database (`--engine`: a SQLite file, a PostgreSQL server, both)
-opens, holds no cell twice, and knows the object with all its rows or not at all; one more run makes
-the same bytes as ever. A run of `validate-set` is killed (with all its processes) or
-interrupted by Ctrl-C again and again and resumed to its end: the same bytes as without. Exit code 1
-otherwise. `tests/loop/test_validate_set.py` does it in small.
+After every kill no file under its final name differs from the one that an undisturbed run writes,
+the database (`--engine`: a SQLite file, a PostgreSQL server, both) opens, holds no cell twice, and
+knows the object with all its rows or not at all; one more run makes the same bytes as ever. Exit
+code 1 otherwise. Writers, and runs of `validate-set`, that are killed: `tests/loop`.
 """
 
 from __future__ import annotations
 
-import argparse
 import hashlib
-import os
 import random
 import signal
 import subprocess
@@ -32,7 +27,6 @@ from generator.database.transaction import read_transaction
 
 SPEC = "name: Cube\nshape: {cube: 60 mm}\noutput: {lab_key: VA11-DATE-0000-0002}\n"
 ROWS = ("vertices", "faces", "edges", "placements", "cells", "parts", "provenance")
-COMPARED = ("shards/touches/*.parquet", "trials.parquet", "results.json")
 
 
 def begin(folder: Path, url: str) -> list[str]:
@@ -116,62 +110,23 @@ def kill_encoding(root: Path, server: str, times: int, rng: random.Random) -> li
     return failures
 
 
-def stop_validation(root: Path, asked: argparse.Namespace, rng: random.Random) -> list[str]:
-    """Stop and resume a run of `validate-set`; return the files that differ from those without."""
-    mine, like = root / "mine", root / "whole"
-    work = runner.command(
-        "recognizer.validation", asked.validate, "--touches", asked.touches, "--study", 0,
-        "--seed", asked.seed, "--shard", asked.shard, "-j", asked.jobs, "-o",
-    )  # fmt: skip
-    start = time.monotonic()
-    subprocess.run([*work, str(like)], check=True)
-    seconds = time.monotonic() - start
-
-    def going_on() -> list[str]:
-        return [*work, str(mine), *(["--resume"] if (mine / "asked.json").exists() else [])]
-
-    for number in range(asked.times):
-        process = subprocess.Popen(going_on(), start_new_session=True, stderr=subprocess.DEVNULL)
-        wait = rng.uniform(0.1, 1.5) * seconds / asked.times
-        how = rng.choice((signal.SIGKILL, signal.SIGINT))
-        try:
-            process.wait(wait)
-        except subprocess.TimeoutExpired:
-            if how == signal.SIGKILL:
-                os.killpg(process.pid, how)
-            else:
-                process.send_signal(how)
-        code, made = process.wait(), len(list(mine.glob(COMPARED[0])))
-        print(f"{number + 1:3d}  {how.name:8s} after {wait:6.1f} s: exit code {code:4d}, "
-              f"{made} shards", flush=True)  # fmt: skip
-    subprocess.run(going_on(), check=True)
-    whole = [path for pattern in COMPARED for path in sorted(like.glob(pattern))]
-    pairs = [(path, mine / path.relative_to(like)) for path in whole]
-    print(f"{len(whole)} files compared")
-    return [a.name for a, b in pairs if not b.exists() or a.read_bytes() != b.read_bytes()]
-
-
 def main() -> int:
     """Run as the options say."""
-    asked = runner.asked(__doc__, engine="sqlite", times=50, seed=1, validate="", touches=2000,
-                         shard=1000, jobs=2)  # fmt: skip
-    rng = random.Random(asked.seed)
-    with tempfile.TemporaryDirectory(prefix="interrupted-") as name:
-        if asked.validate:
-            failures = stop_validation(Path(name), asked, rng)
-        else:
-            failures = []
-            with runner.databases(asked.engine) as urls:
-                for engine, url in urls.items():
-                    print(engine, end=": ", flush=True)
-                    root = Path(name) / engine
-                    root.mkdir()
-                    server = "" if engine == "sqlite" else url
-                    failures += kill_encoding(root, server, asked.times, rng)
+    asked = runner.asked(__doc__, engine="sqlite", times=50, seed=1)
+    rng, failures = random.Random(asked.seed), []
+    with (
+        tempfile.TemporaryDirectory(prefix="interrupted-") as name,
+        runner.databases(asked.engine) as urls,
+    ):
+        for engine, url in urls.items():
+            print(engine, end=": ", flush=True)
+            root = Path(name) / engine
+            root.mkdir()
+            server = "" if engine == "sqlite" else url
+            failures += kill_encoding(root, server, asked.times, rng)
     print("\n  ".join([f"{len(failures)} failures", *failures]))
     return 1 if failures else 0
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where the shell ignores it
     sys.exit(main())

@@ -6,27 +6,26 @@ The robot knows its link table, encoders with play and noise, and the wrist's fo
 presses over the table until something is higher than that, reads, goes where `next` says, and gives
 object and pose in its base.
 
-    python tests/campaigns/robot_world.py --trials 1 --pictures strip.png
+    python tests/campaigns/robot_world.py --trials 67 --seed 2 --more 5
 
-Images are of our own sensor model on the written faces; `docs/examples/mujoco_arm.py` has MuJoCo's.
-Pictures need OpenGL without a screen (MUJOCO_GL=egl or osmesa).
+A line of JSON for each of three objects a trial, then errors in the base by touches. With `--more`
+each is touched so often again, anywhere on its face, and the poses are fused. Images are of our own
+sensor model on the written faces; `docs/examples/mujoco_arm.py` has MuJoCo's.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
-from PIL import Image, ImageDraw
+import runner
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 from encoded_objects import Reader, Scan, encode, open_lab
 from probe.arm import Arm, SensorPose, inverse
@@ -44,11 +43,11 @@ from probe.wrist import (
     plate_to_sensor,
     stiffness,
 )
-from recognizer.touch.robot import carried_pose, object_pose
+from recognizer.touch.robot import ObjectPose, carried_pose, fuse_poses, object_pose
+from recognizer.validation.statistics import clopper_pearson
 from recognizer.validation.touch_plan import written_surface
 
 Array = np.ndarray
-Shown = Callable[[Any, Array, Any], None] | None
 Found = tuple[Any, SensorPose | None, int]
 OBJECTS = {"Cube": "{cube: 60 mm}", "Box": "{box: 70 x 55 x 45 mm}",
            "Prism": "{prism: {sides: 6, side: 36 mm, height: 50 mm}}"}  # fmt: skip
@@ -63,20 +62,7 @@ ON = "table/"  # before the names of what lies there
 HELD_OFF_MM = 0.65  # by which the symbols hold the tips' plane off the face at this force
 SYMBOL_MM = 1.0  # height of the symbols: what collides reaches to their tops
 SEARCH_MM = [(x, y) for x in (0, 28, -28) for y in (0, 28, -28)]
-
-
-@dataclass
-class Result:
-    """What became of one object: answer and truth in the base."""
-
-    trial: int
-    object: str
-    answer: str
-    touches: int  # that were read
-    presses: int  # with those that found the table
-    position_mm: float = math.nan
-    turn_deg: float = math.nan
-    chi2: float = math.nan  # of six freedoms
+INSIDE_MM, REACH_RAD = 6.0, 1.2  # of a face's border, and turns, of further touches
 
 
 def pose(body: Any) -> Array:
@@ -158,7 +144,6 @@ class Bench:
         self.model, self.data, self.rng, self.lab = model, mujoco.MjData(model), rng, lab
         self.reader = Reader(open_lab(lab))
         self.joints = [model.joint(name).qposadr[0] for name in JOINTS]
-        self.presses = 0
         instance = sample_sensor(self.reader.sensor, rng)
         level = LEVELS["typical"]
         self.sensor = LevelSensor(self.reader.sensor, level, "mujoco", instance)
@@ -187,7 +172,6 @@ class Bench:
 
     def touch(self, at_mm: Array, turn_rad: float) -> tuple[Array, SensorPose] | None:
         """Press down at a place; returns counts, believed pose and height, or None on the table."""
-        self.presses += 1
         above = self._angles([*at_mm, 95.0], turn_rad)
         self._stand(above)
         height = 95.0
@@ -260,8 +244,7 @@ class Bench:
         return best[1:]
 
     def object_in(self, sector: float) -> str:
-        """Return what lies in a sector, where presses are counted from now on."""
-        self.presses = 0
+        """Return what lies in a sector."""
         where = {n: pose(self.data.body(ON + n))[:2, 3] for n in OBJECTS}
         return min(where, key=lambda n: abs(math.atan2(where[n][1], where[n][0]) - sector))
 
@@ -291,7 +274,7 @@ class Bench:
     def _steps(self, seconds: float) -> None:
         mujoco.mj_step(self.model, self.data, max(1, round(seconds / STEP_S)))
 
-    def find(self, sector: float, most: int = 4, shown: Shown = None) -> Found:
+    def find(self, sector: float, most: int = 4) -> Found:
         """Search a sector; returns (recognition, pose of the sensor, touches read)."""
         middle = 315.0 * np.array([math.cos(sector), math.sin(sector)])
         read = 0
@@ -307,8 +290,6 @@ class Bench:
                 counts, sensor = pressed
                 read += 1
                 found = scan.add(counts.astype(float), sensor, seq=read)
-                if shown:
-                    shown(self, counts, found)
                 if found:
                     return found, sensor, read
                 step = found.next and (found.next.dx_mm, found.next.dy_mm)
@@ -319,6 +300,24 @@ class Bench:
                 turn += math.radians(found.next.turn_deg)
         return None, None, read
 
+    def touch_again(self, found: Any, placed: ObjectPose) -> ObjectPose | None:
+        """Touch the face at another place, by what is believed of the object."""
+        region = surface(self.lab, found.object, found.face).region
+        at = self.rng.uniform(*region.box_mm)[None]
+        if not region.contains(at)[0] or region.distance_mm(at)[0] < INSIDE_MM:
+            return None
+        T_object_face = found.T_object_probe @ np.linalg.inv(found.T_face_probe)
+        spot = placed.T_robot_object @ T_object_face @ [*at[0], 0.0, 1.0]
+        try:
+            pressed = self.touch(spot[:2], self.rng.uniform(-REACH_RAD, REACH_RAD))
+        except PoseError:  # the arm cannot stand so
+            return None
+        if pressed is None:
+            return None
+        counts, sensor = pressed
+        again = self.reader.read(counts.astype(float))
+        return object_pose(again, sensor) if again.object == found.object else None
+
 
 def error_of(T: Array, truth: Array) -> Array:
     """Return (6,) truth less answer: mm and rad, base axes."""
@@ -326,95 +325,68 @@ def error_of(T: Array, truth: Array) -> Array:
     return np.array([*(truth[:3, 3] - T[:3, 3]), *turn])
 
 
-def compare(
-    trial: int, name: str, bench: Bench, found: Any, sensor: SensorPose | None, read: int
-) -> Result:
-    """Return an answer with the simulator's truth."""
-    result = Result(trial, name, found.object if found else "", read, bench.presses)
-    if not found or sensor is None or found.object not in OBJECTS:
-        return result
-    placed = object_pose(found, sensor)
-    assert placed is not None
-    off = error_of(placed.T_robot_object, pose(bench.data.body(ON + found.object)))
-    result.position_mm = np.linalg.norm(off[:3])
-    result.turn_deg = math.degrees(np.linalg.norm(off[3:]))
-    result.chi2 = float(off @ np.linalg.solve(placed.covariance, off))
-    return result
+def work_on(bench: Bench, trial: int, sector: float, more: int) -> runner.Row:
+    """Find the object of a sector, touch it again; answer and errors by the number of touches."""
+    name = bench.object_in(sector)
+    found, sensor, read = bench.find(sector)
+    row = {"trial": trial, "object": name, "answer": found.object if found else "",
+           "touches": read, "fused": []}  # fmt: skip
+    placed = object_pose(found, sensor) if found and sensor is not None else None
+    if placed is None or found.object != name:
+        return row
+    poses = [placed]
+    for _ in range(20 * more):
+        if len(poses) <= more and (again := bench.touch_again(found, placed)) is not None:
+            poses.append(again)
+    for number in range(1, 1 + len(poses)):
+        fused = fuse_poses(poses[:number])
+        off = error_of(fused.pose.T_robot_object, pose(bench.data.body(ON + name)))
+        far = float(off @ np.linalg.solve(fused.pose.covariance, off))
+        row["fused"].append({"off": off.tolist(), "chi2": far, "moved": bool(fused.moved)})
+    return row
 
 
-class Film:
-    """A strip of pictures: the bench, what the tactels feel, and what is said of it."""
-
-    def __init__(self) -> None:
-        self.pictures: list[Image.Image] = []
-
-    def __call__(self, bench: Bench, counts: Array, found: Any) -> None:
-        """Take a picture of a touch with contact."""
-        if not counts.any():
-            return
-        with mujoco.Renderer(bench.model, 360, 480) as renderer:
-            options = mujoco.MjvOption()
-            options.geomgroup[3] = 0  # not what is hit
-            renderer.update_scene(bench.data, "film", options)
-            picture = Image.fromarray(renderer.render())
-        grey = (counts / counts.max() * 255).astype(np.uint8)
-        picture.paste(Image.fromarray(grey).resize((128, 128), Image.Resampling.NEAREST), (8, 8))
-        said = f"{found.object}/{found.face}" if found else found.reason
-        if not found and found.next is not None:
-            said += f"; next: {found.next.dx_mm:.0f}, {found.next.dy_mm:.0f} mm"
-        draw = ImageDraw.Draw(picture)
-        draw.rectangle((0, 334, 480, 360), fill=(255, 255, 255))
-        draw.text((8, 337), said, fill=(20, 30, 45), font_size=17)
-        self.pictures.append(picture)
-
-    def save(self, path: Path, most: int = 4) -> None:
-        """Write the first pictures side by side."""
-        some = self.pictures[:most]
-        strip = Image.new("RGB", (480 * len(some), 360))
-        for number, picture in enumerate(some):
-            strip.paste(picture, (480 * number, 0))
-        strip.quantize(128).save(path)
+def tabulate(rows: list[runner.Row]) -> None:
+    """Print what became of the objects, and errors by number of touches."""
+    right = sum(row["answer"] == row["object"] for row in rows)
+    wrong = sum(row["answer"] not in ("", row["object"]) for row in rows)
+    print(f"{len(rows)} objects: {right} right, {wrong} wrong")
+    runner.table(("touches", "poses", "rms x, y mm", "z mm", "turn deg", "inside the 95 %",
+                  "taken for moved"))  # fmt: skip
+    for number in range(max(len(row["fused"]) for row in rows)):
+        some = [row["fused"][number] for row in rows if len(row["fused"]) > number]
+        rms = np.sqrt(np.mean([np.square(one["off"]) for one in some], axis=0))
+        hits = sum(one["chi2"] < chi2.ppf(0.95, 6) for one in some)
+        low, high = clopper_pearson(hits, len(some))
+        inside = f"{hits} of {len(some)} ({100 * low:.0f}-{100 * high:.0f} %)"
+        moved = sum(one["moved"] for one in some)
+        sizes = (f"{value:.3f}" for value in (np.hypot(*rms[:2]), rms[2], np.degrees(rms[5])))
+        runner.row(number + 1, len(some), *sizes, inside, moved)
 
 
 def make(folder: Path) -> tuple[mujoco.MjModel, str]:
     """Encode the objects into a lab; return the world and the lab's URL."""
     for name, shape in OBJECTS.items():
-        spec = folder / f"{name}.yaml"
-        spec.write_text(f"name: {name}\nshape: {shape}\noutput: {{lab_key: {KEY}}}\n"
-                        "robot: {collision: body}\n")  # fmt: skip
-        encode(
-            spec, database=str(folder / "bench.db"), folder=folder / name, formats=("stl", "mjcf")
-        )
-    return load(folder)
-
-
-def load(folder: Path) -> tuple[mujoco.MjModel, str]:
-    """Return the world of what was encoded; and the lab's URL."""
+        spec = f"name: {name}\nshape: {shape}\noutput: {{lab_key: {KEY}}}\n"
+        encode(spec + "robot: {collision: body}\n", database=str(folder / "bench.db"),
+               folder=folder / name, formats=("stl", "mjcf"))  # fmt: skip
     return build(folder), f"sqlite:///{folder / 'bench.db'}"
 
 
-def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Result]:
+def main() -> None:
     """Lay out, search and read; three objects a trial."""
-    (model, lab), results = make(folder), []
-    for trial in range(trials):
-        bench = Bench(model, lab, np.random.default_rng([seed, trial]))
+    asked = runner.asked(__doc__, trials=1, seed=1, more=0, folder="robot_world")
+    folder, rows = Path(asked.folder), []
+    folder.mkdir(exist_ok=True)
+    model, lab = make(folder)
+    for trial in range(asked.trials):
+        bench = Bench(model, lab, np.random.default_rng([asked.seed, trial]))
         bench.lay_out()
         for sector in SECTORS:
-            name = bench.object_in(sector)
-            results.append(compare(trial, name, bench, *bench.find(sector, shown=shown)))
-            print(json.dumps(results[-1].__dict__), flush=True)
-    return results
+            rows.append(work_on(bench, trial, sector, asked.more))
+            print(json.dumps(rows[-1]), flush=True)
+    tabulate(rows)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", type=int, default=1)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--folder", type=Path, default=Path("robot_world"))
-    parser.add_argument("--pictures", type=Path)
-    given = parser.parse_args()
-    given.folder.mkdir(exist_ok=True)
-    film = Film() if given.pictures else None
-    run(given.trials, given.seed, given.folder, film)
-    if film:
-        film.save(given.pictures)
+    main()

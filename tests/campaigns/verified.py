@@ -1,23 +1,23 @@
-"""Read back, by independent programs, what is made of fixtures and random polyhedra.
+"""Make fixtures and random polyhedra with `--verify`, and read them back by more programs.
 
-    pip install lib3mf
     python tests/campaigns/verified.py --convex 300 --other 50 --seed 1 -j 2 -o verified.jsonl
     python tests/campaigns/verified.py --symbols 30 --seed 7 -o symbols   # by slices
 
-Random shapes are made as panels, every second one as a whole body too. STEP is read by the CAD
-kernel (one valid solid, volume against the closed form), STL by pymeshlab (closed, two-manifold, no
-triangle cuts another), both 3MF of each plate by the library of the 3MF Consortium in strict mode;
-a GLB is welded by equal coordinates (no edge open or shared by more than two triangles); panels are
-put together by `T_object_part` and may neither overlap nor come nearer than the gap. Refused shapes
-are counted with their reason. With `--symbols` written STL panels of so many shapes are cut at half
-the height of their symbols: an outline stands where the layout says, and is held against others of
-the same label by area, length and centroid in its own axes. Exit code 1 when a file fails.
+Random shapes are made as panels, every second one as a whole body too. `--verify` reads STEP by the
+CAD kernel and STL by pymeshlab, and puts panels together. All 3MF are read by the library of the
+3MF Consortium in strict mode (`pip install lib3mf`); a GLB is welded by equal coordinates (no edge
+open or shared by more than two triangles). Refused shapes are counted with their reason. With
+`--symbols` written STL panels of so many shapes are cut at half the height of their symbols: an
+outline stands where the layout says, and is held against others of the same label by area, length
+and centroid in its own axes. Exit code 1 when a file fails, or a refusal lacks place, cause or way
+out.
 """
 
 from __future__ import annotations
 
 import json
-import struct
+import resource
+import subprocess
 import sys
 import tempfile
 from collections import Counter
@@ -28,21 +28,20 @@ import runner
 from manifold3d import Manifold, Mesh
 
 from generator.errors import GeneratorError
-from generator.export.bambu import project_3mf
-from generator.export.check import PanelFile, verify_fit, verify_step, verify_stl
-from generator.export.meshes import glb_bytes, stl_chunks
-from generator.export.step import step_chunks
-from generator.export.threemf import print_files
-from generator.pipeline.files import parts_of, settings_of
+from generator.export.meshes import stl_chunks
+from generator.pipeline.files import parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
-from generator.solid import prove_closed, triangles
-from generator.spec import ObjectSpec, read_specs
+from generator.solid import triangles
+from generator.spec import read_specs
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from random_shapes import random_convex, random_nonconvex
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
+LIMIT_S = 600  #: of processor time, for one spec
+PATIENCE = 10  #: times that by the clock: for a busy machine
+UNVERIFIED = "do not print it"  #: in the way out of a part that failed verification
 SAME = 0.02  #: mm, mm2: outlines of one label differ by less
 APART = 0.05  #: outlines of two labels differ by more
 NEAR = 0.45  #: of the pitch: from where it should stand
@@ -62,94 +61,87 @@ def random_spec(kind: str, seed: int, number: int, folder: Path, parts: str = "p
     return path
 
 
-def checked(path: Path) -> runner.Row:
-    """Return what became of every object of a spec file."""
-    try:
-        return {"objects": [outcome(spec) for spec in read_specs([path])]}
-    except GeneratorError as error:
-        return {"objects": [{"name": path.stem, "refused": error.cause}]}
-
-
-def outcome(spec: ObjectSpec) -> runner.Row:
-    """Make one object and read it back."""
-    row: runner.Row = {"name": spec.name}
-    try:
-        plan = plan_object(spec)
-        layout = lay_out_object(plan, NO_CELLS)
-        parts, _ = parts_of(plan, layout)
-    except GeneratorError as error:
-        return row | {"refused": error.cause}
-    row |= {"parts": len(parts), "symbols": sum(len(face.labels) for face in layout.faces)}
-    errors, panels = [(0.0, 0.0)], []
-    meshes = [triangles(part) for part in parts]
+def made(spec: Path) -> runner.Row:
+    """Make the objects of a spec, verify them, and read their files again."""
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+        command = runner.command("generator", spec, "-o", "out", "--database", "lab.db", "--json",
+                                 "--verify", "--format", "step,stl,3mf,glb")  # fmt: skip
         try:
-            for part, mesh in zip(parts, meshes, strict=True):
-                step, stl = folder / "part.step", folder / f"{part.name}.stl"
-                panels.append(PanelFile(part.name, stl, part.T_object_part))
-                prove_closed(part)
-                step.write_bytes(b"".join(step_chunks(part)))
-                stl.write_bytes(b"".join(stl_chunks(mesh)))
-                read = verify_step(part, step), verify_stl(part, stl)
-                errors.append((abs(read[0].volume_error), abs(read[1].volume_error)))
-            fit = verify_fit(panels, spec.gap_mm) if len(panels) > 1 else None
-        except GeneratorError as error:
-            return row | {"failed": str(error)}
-        faults = mesh_faults(glb_bytes(spec.name, parts, meshes))
-        if any(faults):
-            return row | {"failed": f"GLB: flat, doubled, open: {faults}"}
-        settings = settings_of(plan, layout)
-        plates = print_files(spec.name, parts, plan.printer.bed_mm, settings)
-        contents = [one for plate in plates for one in (plate.content, plate.prusaslicer)]
-        contents += [project_3mf(spec.name, plates)] if settings else []
-        for content in contents:
-            if said := model_faults(content, folder):
-                return row | {"failed": f"3MF: {said[0]}"}
-    row["step_error"], row["mesh_error"] = map(max, zip(*errors, strict=True))
-    if fit is not None:
-        row |= {"panels": len(parts), "overlap_mm3": fit.overlap_mm3, "gap_mm": fit.gap_mm}
-    return row
+            done = subprocess.run(command, cwd=name, capture_output=True, text=True,
+                                  preexec_fn=limited, timeout=PATIENCE * LIMIT_S)  # fmt: skip
+        except subprocess.TimeoutExpired:
+            return {"name": spec.stem, "failed": f"not done in {PATIENCE * LIMIT_S} s"}
+        if done.returncode not in (0, 2):
+            said = (done.stderr.strip().splitlines() or ["killed"])[-1]
+            return {"name": spec.stem, "failed": f"exit code {done.returncode}: {said}"}
+        answer = json.loads(done.stdout)
+        if done.returncode:
+            return {"name": spec.stem} | refusal(answer["error"])
+        faults = [fault for file in sorted(Path(name).rglob("*.*"))
+                  for fault in faults_of(file)]  # fmt: skip
+    made = answer["objects"]
+    row = {"name": spec.stem, "objects": len(made)}
+    row |= {key: sum(one[key] for one in made) for key in ("parts", "symbols", "places")}
+    row["fits"] = [one["fit"] for one in made if one["fit"]]
+    return row | ({"failed": "; ".join(faults)} if faults else {})
 
 
-def mesh_faults(glb: bytes) -> tuple[int, int, int]:
-    """Return flat triangles, edges used twice in one direction, and open edges of a GLB."""
-    (length,) = struct.unpack_from("<I", glb, 12)
-    described, data = json.loads(glb[20 : 20 + length]), glb[28 + length :]
-
-    def values(number: int, kind: str) -> np.ndarray:
-        accessor = described["accessors"][number]
-        begin = described["bufferViews"][accessor["bufferView"]]["byteOffset"]
-        return np.frombuffer(data, kind, accessor["count"] * (3 if kind == "<f4" else 1), begin)
-
-    points, corners, first = [], [], 0
-    for mesh in described["meshes"]:
-        for primitive in mesh["primitives"]:
-            own = values(primitive["attributes"]["POSITION"], "<f4").reshape(-1, 3)
-            corners.append(values(primitive["indices"], "<u4").reshape(-1, 3) + first)
-        points.append(own)
-        first += len(own)
-    unique, number = np.unique(np.concatenate(points), axis=0, return_inverse=True)
-    faces = number.ravel()[np.concatenate(corners)].astype(np.int64)
-    flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
-    start, end = faces[~flat].ravel(), np.roll(faces[~flat], -1, axis=1).ravel()
-    there, back = start * len(unique) + end, end * len(unique) + start
-    return int(flat.sum()), len(there) - len(np.unique(there)), int((~np.isin(there, back)).sum())
+def limited() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S))
 
 
-def model_faults(content: bytes, folder: Path) -> list[str]:
-    """Return what lib3mf says against a 3MF in strict mode."""
+def refusal(error: runner.Row) -> runner.Row:
+    """Return the cause of a refusal, a failure where it lacks something."""
+    problems = error.get("problems") or [error]
+    unsaid = not all(one["place"] and one["cause"] and one["fix"] for one in problems)
+    faulty = unsaid or UNVERIFIED in problems[0]["fix"]
+    return {"failed" if faulty else "refused": problems[0]["cause"]}
+
+
+def faults_of(file: Path) -> list[str]:
+    """Return what lib3mf says against a 3MF in strict mode, or what is open in a welded GLB."""
+    if file.suffix == ".glb":
+        import trimesh
+
+        whole = trimesh.load(file).to_mesh()
+        whole.merge_vertices(merge_tex=True, merge_norm=True)
+        edges = Counter(map(tuple, whole.edges.tolist()))
+        odd = sum(count > 1 or (b, a) not in edges for (a, b), count in edges.items())
+        return [f"{file.name}: {odd} edges open or doubled"] if odd else []
+    if file.suffix != ".3mf":
+        return []
     import lib3mf
 
-    path = folder / "plate.3mf"
-    path.write_bytes(content)
     reader = lib3mf.get_wrapper().CreateModel().QueryReader("3mf")
     reader.SetStrictModeActive(True)
     try:
-        reader.ReadFromFile(str(path))
+        reader.ReadFromFile(str(file))
     except lib3mf.ELib3MFException as error:
-        return [str(error)]
-    return [str(reader.GetWarning(k)) for k in range(reader.GetWarningCount())]
+        return [f"{file.name}: {error}"]
+    return [f"{file.name}: {reader.GetWarning(k)}" for k in range(reader.GetWarningCount())]
+
+
+def summarise(rows: list[runner.Row]) -> int:
+    """Print what became of the specs; 1 where one failed."""
+    made = [row for row in rows if "objects" in row and "failed" not in row]
+    failed = [row for row in rows if "failed" in row]
+    causes = ("".join(c for c in row["refused"] if not c.isdigit()) for row in rows
+              if "refused" in row)  # fmt: skip
+    refused = Counter(" ".join(cause.split()[:7]) for cause in causes)
+    count = {key: sum(row[key] for row in made) for key in ("objects", "parts", "symbols")}
+    print(f"{len(rows)} specs: {len(made)} made and verified ({count['objects']} objects, "
+          f"{count['parts']} parts, {count['symbols']} symbols), {len(failed)} failed, "
+          f"{sum(refused.values())} refused")  # fmt: skip
+    fits = [fit for row in made for fit in row["fits"]]
+    gaps = [fit["gap_mm"] for fit in fits if fit["gap_mm"] is not None]
+    print(f"{len(fits)} objects of panels put together: overlap "
+          f"{sum(fit['overlap_mm3'] for fit in fits):.6f} mm3, smallest gap "
+          f"{min(gaps, default=np.inf):.6f} mm")  # fmt: skip
+    for reason, number in refused.most_common():
+        print(f"  refused {number}: {reason} ...")
+    for row in failed:
+        print(f"  FAILED {row['name']}: {row['failed']}")
+    return int(bool(failed))
 
 
 def solid_of(stl: bytes) -> Manifold:
@@ -244,26 +236,7 @@ def main() -> int:
                 paths.append(random_spec(kind, asked.seed, number, Path(name)))
                 if number % 2:
                     paths.append(random_spec(kind, asked.seed, number, Path(name), "whole"))
-        rows = runner.resume(asked.output, paths, checked, asked.jobs)
-    objects = [one for row in rows for one in row["objects"]]
-    made = [one for one in objects if "step_error" in one]
-    failed = [one for one in objects if "failed" in one]
-    refused = Counter(" ".join(o["refused"].split()[:7]) for o in objects if "refused" in o)
-    print(f"{len(objects)} objects: {len(made)} made and verified "
-          f"({sum(o['parts'] for o in made)} parts, {sum(o['symbols'] for o in made)} symbols), "
-          f"{len(failed)} failed, {sum(refused.values())} refused")  # fmt: skip
-    step, mesh = (max((o[key] for o in made), default=0) for key in ("step_error", "mesh_error"))
-    print(f"largest relative volume error: STEP {step:.1e}, STL {mesh:.1e}")
-    fitted = [o for o in made if "panels" in o]
-    gaps = [o["gap_mm"] for o in fitted if o["gap_mm"] is not None]
-    print(f"{len(fitted)} objects of {sum(o['panels'] for o in fitted)} panels put together: "
-          f"overlap {sum(o['overlap_mm3'] for o in fitted):.6f} mm3, smallest gap "
-          f"{min(gaps, default=np.inf):.6f} mm")  # fmt: skip
-    for reason, count in refused.most_common():
-        print(f"  refused {count}: {reason} ...")
-    for one in failed:
-        print(f"  FAILED {one['name']}: {one['failed']}")
-    return 1 if failed else 0
+        return summarise(runner.resume(asked.output, paths, made, asked.jobs))
 
 
 if __name__ == "__main__":

@@ -26,84 +26,18 @@ import tempfile
 import time
 import traceback
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import chdir, contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from encoded_objects.base.errors import EncodedObjectsError
-from foreign.case import (
-    MOST_BYTES,
-    READ,
-    REFUSED,
-    ROOM,
-    SECRET,
-    HangError,
-    Kind,
-    LeakError,
-    LeftError,
-    Outcome,
-    WrongValueError,
-    kept,
-)
+from foreign import databases, lines, models, page, recordings, texts
+from foreign.case import READ, REFUSED, ROOM, SECRET, FaultError, HangError, Kind, Outcome, kept
 from foreign.damage import no_file
-from foreign.databases import labs, read_database, read_exchange, write_database
-from foreign.lines import read_line, read_packets, read_url, write_line, write_packets, write_url
-from foreign.models import (
-    _shape_writer,
-    load_kernel,
-    read_3mf,
-    read_model,
-    read_model_in_fork,
-    write_3mf,
-)
-from foreign.page import read_request, write_request
-from foreign.recordings import (
-    arrays,
-    mcap_file,
-    read_array,
-    read_mcap,
-    read_recording,
-    recorded_files,
-    write_array,
-    write_mcap,
-    write_recording,
-)
-from foreign.texts import (
-    read_by_command,
-    read_calibration,
-    read_printer,
-    read_sensor_type,
-    read_spec,
-    read_state,
-    state_text,
-    write_calibration,
-    write_printer,
-    write_sensor_type,
-    write_spec,
-    write_state,
-)
 
 KINDS: dict[str, Kind] = {
-    "recording": Kind(write_recording, read_recording, sound=(recorded_files,)),
-    "array": Kind(write_array, read_array, most_bytes=2 * MOST_BYTES, sound=(arrays,)),
-    "mcap": Kind(write_mcap, read_mcap, sound=(mcap_file,)),
-    "calibration": Kind(write_calibration, read_calibration),
-    "state": Kind(write_state, read_state, sound=(state_text,)),
-    "sensor type": Kind(write_sensor_type, read_sensor_type),
-    "printer": Kind(write_printer, read_printer),
-    "spec": Kind(write_spec, read_spec),
-    "command": Kind(write_spec, read_by_command, (1, 2, 4), longest_s=30.0),
-    "stl": Kind(_shape_writer(".stl"), read_model),
-    "obj": Kind(_shape_writer(".obj"), read_model),
-    "step": Kind(_shape_writer(".step"), read_model_in_fork, sound=(load_kernel,)),
-    "3mf": Kind(write_3mf, read_3mf),
-    "database": Kind(write_database, read_database, (4, 2), sound=(labs,)),
-    "import": Kind(write_database, read_exchange, (4,), sound=(labs,)),
-    "packets": Kind(write_packets, read_packets, file=False),
-    "line": Kind(write_line, read_line, file=False),
-    "port": Kind(write_url, read_url, (2, 3, 4), file=False, placed=False, sound=(recorded_files,)),
-    "page": Kind(write_request, read_request, file=False, sound=(labs, recorded_files, state_text)),
+    name: kind
+    for module in (recordings, texts, models, databases, lines, page)
+    for name, kind in module.KINDS.items()
 }
 
 
@@ -124,45 +58,36 @@ def attempt(name: str, number: int, root: Path) -> Outcome:
     """
     kind, rng = KINDS[name], random.Random(f"{name} {number}")
     box, spare = root / "box", root / ("bench-tmp" if name == "page" else "tmp")
-    given_folder, out = box / "in", box / "out"
-    for folder in (given_folder, out, spare):
+    for folder in (box / "in", box / "out", spare):
+        if folder.name != "bench-tmp":
+            shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True, exist_ok=True)
-        if name != "page" or folder != spare:
-            _clear(folder)
     secret = root / "secret.txt"
     secret.write_bytes(SECRET)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the libraries that write
-        given = kind.write(rng, given_folder)
+        given = kind.write(rng, box / "in")
     path = given[0] if isinstance(given, tuple) else given
     if kind.file and rng.random() < 0.02:
         no_file(rng, path)
-    before = _names(root)
+    before, start = _names(root), time.monotonic()
     tempfile.tempdir = str(spare)
-    here = Path.cwd()
-    os.chdir(box)
-    start, megabytes = time.monotonic(), 0.0
+    what, detail = READ, ""
     try:
-        with _watched(kind.longest_s) as took, warnings.catch_warnings():
+        with chdir(box), _watched(kind.longest_s) as took, warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            kind.read(given, out)
-        what, detail = READ, ""
+            kind.read(given, box / "out")
     except EncodedObjectsError as error:
         what, detail = _refusal(error, kind, path)
+    except FaultError as error:
+        what, detail = error.args
     except HangError as error:
         what, detail = "hang", _where(error)
     except MemoryError as error:
         what, detail = "memory", _where(error)
-    except LeakError as error:
-        what, detail = "leak", str(error)
-    except LeftError as error:
-        what, detail = "left outside", f"of what was refused: {error}"
-    except WrongValueError as error:
-        what, detail = "wrong value", str(error)
     except Exception as error:  # noqa: BLE001  (which is what is looked for)
         what, detail = "traceback", _where(error)
     finally:
-        os.chdir(here)
         tempfile.tempdir = None
     seconds, megabytes = time.monotonic() - start, took[0]
     if what in (READ, REFUSED):
@@ -178,7 +103,7 @@ def attempt(name: str, number: int, root: Path) -> Outcome:
     return Outcome(what, detail, seconds, megabytes)
 
 
-def _refusal(error: EncodedObjectsError, kind: Kind, path: Any) -> tuple[str, str]:
+def _refusal(error, kind, path):
     """Return what a refusal is worth: its place, way out and exit code."""
     said = f"{type(error).__name__}: {error.cause[:60]}"
     if error.exit_code not in kind.codes:
@@ -195,7 +120,7 @@ def _refusal(error: EncodedObjectsError, kind: Kind, path: Any) -> tuple[str, st
     return REFUSED, said
 
 
-def _where(error: BaseException) -> str:
+def _where(error):
     """Return the error and the last places of our packages that it went through."""
     ours = [f"{Path(frame.filename).name}:{frame.lineno}"
             for frame in traceback.extract_tb(error.__traceback__)
@@ -204,16 +129,7 @@ def _where(error: BaseException) -> str:
     return f"{type(error).__name__}: {str(error)[:60]!r} at {' < '.join(ours[:-4:-1])}"
 
 
-def _clear(folder: Path) -> None:
-    """Empty a folder."""
-    for entry in os.scandir(folder):
-        if entry.is_dir(follow_symlinks=False):
-            shutil.rmtree(entry.path)
-        else:
-            os.unlink(entry.path)
-
-
-def _names(root: Path) -> set[str]:
+def _names(root):
     """Return all names below the root but what a reader may make: its output, its session."""
     found = set()
     for folder, folders, files in os.walk(root):
@@ -227,11 +143,11 @@ def _names(root: Path) -> set[str]:
 
 
 @contextmanager
-def _watched(longest_s: float) -> Iterator[list[float]]:
+def _watched(longest_s):
     """Bound time and memory; yields a list of the megabytes that were taken at most."""
     took = [0.0]
 
-    def late(*_: object) -> None:
+    def late(*_):
         raise HangError(f"longer than {longest_s:g} s")
 
     with suppress(OSError):
@@ -250,8 +166,6 @@ def _watched(longest_s: float) -> Iterator[list[float]]:
         took[0] = max(0.0, (_status("VmHWM") - base) / 2**20)
 
 
-def _status(name: str) -> int:
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith(f"{name}:"):
-            return int(line.split()[1]) << 10
-    return 0
+def _status(name):
+    status = Path("/proc/self/status").read_text()
+    return int(status.partition(f"{name}:")[2].split()[0]) << 10

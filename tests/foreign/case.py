@@ -1,4 +1,8 @@
-"""What a kind of foreign input is, what may become of a case, and the sound things."""
+"""What a kind of foreign input is, what may become of a case, and the sound things.
+
+"leak": bytes of another file were read, or something may lead there; "left outside": files of what
+was refused, or in other folders; "wrong value": something was read that was never written.
+"""
 
 from __future__ import annotations
 
@@ -26,20 +30,12 @@ FAULTS = ("traceback", "wrong code", "no place", "hang", "memory", "left outside
           "wrong value", "died")  # fmt: skip
 
 
-class WrongValueError(AssertionError):
-    """Something was read without a word that was never written."""
-
-
-class LeftError(AssertionError):
-    """Files of what was refused."""
-
-
-class LeakError(AssertionError):
-    """Bytes of another file were read, or something may lead there."""
+class FaultError(Exception):
+    """What may not become of a case, one of `FAULTS`, and where."""
 
 
 class HangError(BaseException):
-    """A case took longer than `LONGEST_S`."""
+    """A case took longer than it may."""
 
 
 @dataclass(frozen=True)

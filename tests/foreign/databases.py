@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-import random
 import sqlite3
 from contextlib import closing, suppress
 from functools import cache
-from pathlib import Path
 
-from foreign.case import FIXTURES, LeakError, WrongValueError, kept
+from foreign.case import FIXTURES, FaultError, Kind, kept
 from foreign.damage import NUMBERS, anything, damaged
 
 
 @cache
-def labs() -> dict[str, bytes]:
+def labs():
     """Return databases: a lab of a cube and a tag, and those of earlier versions."""
     from encoded_objects import encode
 
@@ -31,7 +29,7 @@ def labs() -> dict[str, bytes]:
     return made
 
 
-def _sql(rng: random.Random, path: Path) -> None:
+def _sql(rng, path):
     """Change a database as no writer of ours would."""
     with closing(sqlite3.connect(path)) as base:
         base.execute("PRAGMA foreign_keys = OFF")
@@ -83,8 +81,7 @@ def _sql(rng: random.Random, path: Path) -> None:
         base.commit()
 
 
-def write_database(rng: random.Random, folder: Path) -> Path:
-    """Write a damaged database."""
+def write_database(rng, folder):
     path = folder / "lab.db"
     content = labs()[rng.choice(("lab", "lab", "lab", "v1", "v2"))]
     if rng.random() < 0.5:
@@ -98,8 +95,7 @@ def write_database(rng: random.Random, folder: Path) -> Path:
     return path
 
 
-def read_database(path: Path, _out: Path) -> None:
-    """Read all that a command, a page and a reader of touches read of a database."""
+def read_database(path, _out):
     from generator.command.object_report import fullness_text
     from generator.database.lab import read_fullness
     from generator.database.open import open_database
@@ -117,7 +113,7 @@ def read_database(path: Path, _out: Path) -> None:
             array.face(number)
 
 
-def read_exchange(path: Path, out: Path) -> None:
+def read_exchange(path, out):
     """Import a database into a new one; its names and parts must be as a spec's are."""
     from generator.database.exchange import import_objects
     from generator.database.open import open_database, part_path
@@ -134,12 +130,20 @@ def read_exchange(path: Path, out: Path) -> None:
             try:
                 object_name(entry.name)
             except ValueError as bad:
-                raise WrongValueError(f"an object called {entry.name[:40]!r}") from bad
+                raise FaultError("wrong value", f"an object called {entry.name[:40]!r}") from bad
             try:
                 read_object(connection, entry.name)
                 read_parts(connection, entry.object_id)
             except (ValueError, TypeError, LookupError, DatabaseError) as bad:
-                raise WrongValueError(f"what was imported cannot be read: {bad!r:.60}") from bad
+                raise FaultError(
+                    "wrong value", f"what was imported cannot be read: {bad!r:.60}"
+                ) from bad
             for part in read_parts(connection, entry.object_id):
                 if not part_path(engine.url, part.file).is_relative_to(path.parent):
-                    raise LeakError("a part outside the folder of the file")
+                    raise FaultError("leak", "a part outside the folder of the file")
+
+
+KINDS = {
+    "database": Kind(write_database, read_database, (4, 2), sound=(labs,)),
+    "import": Kind(write_database, read_exchange, (4,), sound=(labs,)),
+}

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import random
 import struct
 from binascii import crc_hqx
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 from cobs import cobs
 
-from foreign.case import GOOD, WrongValueError, kept
+from foreign.case import GOOD, FaultError, Kind, kept
 from foreign.damage import WORDS, damaged, no_file
 from foreign.models import shapes
 from foreign.recordings import recorded_files
 
 
-def _packet(rng: random.Random, number: int) -> bytes:
-    """Return a packet with a right check sum whose fields may be anything."""
+def _packet(rng, number):
     from probe.protocol import FramePacket, IdentPacket, StatisticsPacket, encode
 
     frame = kept()[1][number % GOOD]
@@ -49,7 +46,7 @@ def _packet(rng: random.Random, number: int) -> bytes:
     return cobs.encode(payload + struct.pack("<H", crc_hqx(payload, 0xFFFF))) + b"\0"
 
 
-def write_packets(rng: random.Random, _folder: Path) -> tuple[list[bytes], set[int]]:
+def write_packets(rng, _folder):
     """Return pieces of a stream with damage, and the numbers of frames that may come of it."""
     stream = [_packet(rng, number) for number in range(rng.choice((3, 12, 40)))]
     for _ in range(rng.choice((0, 1, 3))):
@@ -71,7 +68,7 @@ def write_packets(rng: random.Random, _folder: Path) -> tuple[list[bytes], set[i
     return pieces, set()
 
 
-def read_packets(given: tuple[list[bytes], set[int]], _out: Path) -> None:
+def read_packets(given, _out):
     """Receive a stream; what is handed on is what was sent, pixel for pixel."""
     from probe.client.receiver import Receiver
 
@@ -85,29 +82,28 @@ def read_packets(given: tuple[list[bytes], set[int]], _out: Path) -> None:
             if frame.counts.shape == (16, 16) and frame.counts.max() > 0:
                 true = kept()[1][frame.seq % 65536 % GOOD]
                 if not (frame.counts == true.counts).all() and frame.counts.max() < 1023:
-                    raise WrongValueError("a frame that was not sent")
+                    raise FaultError("wrong value", "a frame that was not sent")
     receiver.statistics()
 
 
-def write_line(rng: random.Random, _folder: Path) -> list[bytes]:
+def write_line(rng, _folder):
     """Return what a board says that has no check sums: images between markers."""
     images = [b"\xaa\x55" + one.counts.astype(np.uint8).tobytes() * 2 for one in kept()[1][:20]]
     whole = damaged(rng, b"".join(images) * rng.choice((1, 2)))
     return [whole[at : at + 700] for at in range(0, len(whole), 700)]
 
 
-def read_line(pieces: list[bytes], _out: Path) -> None:
-    """Find images between markers."""
+def read_line(pieces, _out):
     from probe.port.flexitac import MarkedImages
 
     images = MarkedImages(512)
     for number, piece in enumerate(pieces):
         for image in images.feed(piece, quiet_s=0.001 * (number % 2)):
             if len(image) != 512:
-                raise WrongValueError("an image of another length")
+                raise FaultError("wrong value", "an image of another length")
 
 
-def write_url(rng: random.Random, folder: Path) -> str:
+def write_url(rng, folder):
     """Return the URL of a port that cannot be meant, or hardly."""
     (folder / "a.h5").write_bytes(recorded_files()["ours"])
     (folder / "m.stl").write_bytes(shapes(".stl")[0])
@@ -134,7 +130,7 @@ def write_url(rng: random.Random, folder: Path) -> str:
     return f"{scheme}:{stroke}{target}{query.format(name, value)}"
 
 
-def read_url(url: str, _out: Path) -> None:
+def read_url(url, _out):
     """Open a port and read a little."""
     from probe.port.url import open_port, typed_port
 
@@ -146,3 +142,10 @@ def read_url(url: str, _out: Path) -> None:
                 port.read(0.01)
     finally:
         port.close()
+
+
+KINDS = {
+    "packets": Kind(write_packets, read_packets, file=False),
+    "line": Kind(write_line, read_line, file=False),
+    "port": Kind(write_url, read_url, (2, 3, 4), file=False, placed=False, sound=(recorded_files,)),
+}

@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import io
 import os
-import random
 import signal
 import struct
 import zipfile
-from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
-from foreign.case import BOMBS_MB, FIXTURES, TESTS, WrongValueError
+from foreign.case import BOMBS_MB, FIXTURES, TESTS, FaultError, Kind
 from foreign.damage import EXTREMES, bomb, damaged, damaged_text, numbers_changed
 
 
 @cache
-def shapes(suffix: str) -> tuple[bytes, ...]:
+def shapes(suffix):
     """Return the models of the fixtures with this suffix."""
     return tuple(f.read_bytes() for f in sorted((FIXTURES / "shapes").glob(f"*{suffix}")))
 
 
-def _triangles(rng: random.Random) -> bytes:
+def _triangles(rng):
     content = bytearray(shapes(".stl")[0])
     count = (len(content) - 84) // 50
     for _ in range(rng.choice((1, 1, 3, count))):
@@ -37,7 +34,7 @@ def _triangles(rng: random.Random) -> bytes:
     return bytes(content)
 
 
-def _shape_writer(suffix: str) -> Callable[[random.Random, Path], Path]:
+def _shape_writer(suffix):
     splices = {
         ".stl": ("facet", "vertex 1 2", "endsolid", "\0", "solid", "nan"),
         ".obj": ("f 1 2 3\n", "f -1 -2 -3\n", "f 1/1/1 2//2 99\n", "v 1 2 nan\n", "v 1e999 0 0\n",
@@ -46,7 +43,7 @@ def _shape_writer(suffix: str) -> Callable[[random.Random, Path], Path]:
                   "CARTESIAN_POINT('',(1E999,0.,0.))", "ADVANCED_FACE('',(),#1,.T.)"),
     }[suffix]  # fmt: skip
 
-    def write(rng: random.Random, folder: Path) -> Path:
+    def write(rng, folder):
         path = folder / f"m{suffix}"
         content = rng.choice(shapes(suffix))
         do = rng.random()
@@ -64,25 +61,23 @@ def _shape_writer(suffix: str) -> Callable[[random.Random, Path], Path]:
     return write
 
 
-def read_model(path: Path, _out: Path) -> None:
-    """Read a polyhedron."""
+def read_model(path, _out):
     from generator.polyhedron.read import read_shape
 
     solid = read_shape(path)
     if not (np.isfinite(solid.vertices).all() and len(solid.faces) >= 4):
-        raise WrongValueError("a solid that is none")
+        raise FaultError("wrong value", "a solid that is none")
 
 
-def load_kernel() -> None:
+def load_kernel():
     """Load the CAD kernel, before limits and forks."""
     import OCP.STEPControl  # noqa: F401
 
 
-def read_model_in_fork(path: Path, out: Path) -> None:
-    """Read a STEP model with the kernel in a fork of this process, which has it loaded."""
+def read_model_in_fork(path, out):
     from generator.polyhedron.read import kernel, step
 
-    def run(_module: str, arguments: list[str], **_: object) -> tuple[int, bytes]:
+    def run(_module, arguments, **_):
         child = os.fork()
         if child == 0:
             code = 1
@@ -112,13 +107,12 @@ def read_model_in_fork(path: Path, out: Path) -> None:
 
 
 @cache
-def gcodes() -> tuple[str, ...]:
-    """Return G-code of several slicers."""
+def gcodes():
     folder = TESTS / "unit" / "generator" / "gcode"
     return tuple(file.read_text() for file in sorted(folder.glob("*.gcode")))
 
 
-def write_3mf(rng: random.Random, folder: Path) -> Path:
+def write_3mf(rng, folder):
     """Write damaged G-code, mostly as the plate in a 3MF."""
     path = folder / "p.gcode.3mf"
     do = rng.random()
@@ -147,9 +141,17 @@ def write_3mf(rng: random.Random, folder: Path) -> Path:
     return path
 
 
-def read_3mf(path: Path, _out: Path) -> None:
+def read_3mf(path, _out):
     """Read the moves of a plate, and lay its beads."""
     from generator.printed.deposit import beads_of
     from generator.printed.gcode import read_gcode
 
     beads_of(read_gcode(path))
+
+
+KINDS = {
+    "stl": Kind(_shape_writer(".stl"), read_model),
+    "obj": Kind(_shape_writer(".obj"), read_model),
+    "step": Kind(_shape_writer(".step"), read_model_in_fork, sound=(load_kernel,)),
+    "3mf": Kind(write_3mf, read_3mf),
+}

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from encoded_objects.base.errors import EncodedObjectsError
-from foreign.case import FIXTURES, LONGEST_S, SECRET, LeakError, kept
+from foreign.case import FIXTURES, LONGEST_S, SECRET, FaultError, Kind, kept
 from foreign.damage import WORDS, anything, mutated, written_json
 from foreign.databases import labs
 from foreign.recordings import recorded_files, write_recording
@@ -22,7 +22,7 @@ from foreign.texts import state_text
 class Page:
     """The application of a session behind its guard, asked without a server."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder):
         from encoded_objects.base.sensor_type import SensorType
         from recognizer.bench.app import application
         from recognizer.bench.broker import Broker
@@ -53,7 +53,7 @@ class Page:
         self._life = app.router.lifespan_context(app)
         self._loop.run_until_complete(self._life.__aenter__())
 
-    def ask(self, scope: dict[str, Any], bodies: list[Any]) -> list[dict[str, Any]]:
+    def ask(self, scope, bodies):
         """Return the messages of the answer."""
         sent: list[dict[str, Any]] = []
         kind = scope["type"]
@@ -74,7 +74,7 @@ class Page:
         self._loop.run_until_complete(asyncio.wait_for(self._app(scope, receive, send), LONGEST_S))
         return sent
 
-    def close(self) -> None:
+    def close(self):
         """End the session."""
         self._loop.run_until_complete(self._life.__aexit__(None, None, None))
         self._loop.close()
@@ -100,7 +100,7 @@ NAMES = ("Cube", "Box", "a.h5", "link.h5", "..%2fsecret.txt", "../../secret.txt"
          "index.html", "recordings%5ca.h5", "//etc/passwd", "con", "C:%5cx.h5")  # fmt: skip
 
 
-def write_request(rng: random.Random, _folder: Path) -> dict[str, Any]:
+def write_request(rng, _folder):
     """Return a request that the page would not make: method, address, headers, bodies."""
     made: dict[str, Any] = {"seed": rng.randrange(2**32), "kind": "http"}
     headers = {"host": "127.0.0.1:8080"}
@@ -141,7 +141,7 @@ def write_request(rng: random.Random, _folder: Path) -> dict[str, Any]:
 PAGE: list[Page] = []
 
 
-def read_request(made: dict[str, Any], out: Path) -> None:
+def read_request(made, out):
     """Ask the page; no answer is an error of the server, none holds what is not meant to be."""
     if not PAGE:
         folder = out.parent.parent / "bench"
@@ -192,7 +192,7 @@ def read_request(made: dict[str, Any], out: Path) -> None:
     sent = page.ask(scope, bodies)
     held = b"".join(m.get("body", b"") or b"" for m in sent)
     if b"kept to itself" in held or held.startswith((b"SQLite format", b"root:")):
-        raise LeakError(f"{method} {path[:60]}")
+        raise FaultError("leak", f"{method} {path[:60]}")
     status = [m["status"] for m in sent if m["type"] == "http.response.start"]
     if not status and (made["live"] or made["gone"]):
         return
@@ -203,3 +203,8 @@ def read_request(made: dict[str, Any], out: Path) -> None:
         with suppress(ValueError):
             said = json.loads(said)
         raise EncodedObjectsError(str(said)[:80], fix="-", place=path)
+
+
+KINDS = {
+    "page": Kind(write_request, read_request, file=False, sound=(labs, recorded_files, state_text))
+}

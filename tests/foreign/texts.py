@@ -5,73 +5,58 @@ from __future__ import annotations
 import io
 import json
 import os
-import random
 from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import yaml
 
 from encoded_objects.base.errors import EncodedObjectsError
-from foreign.case import FIXTURES, LeftError, WrongValueError, kept
+from foreign.case import FIXTURES, FaultError, Kind, kept
 from foreign.damage import damaged, damaged_text, mutated, written_json, written_yaml
 from foreign.models import shapes
 
 
-def write_calibration(rng: random.Random, folder: Path) -> Path:
-    """Write a damaged calibration."""
-    text = (FIXTURES / "recordings" / "calibration.json").read_text()
-    path = folder / "c.json"
-    path.write_bytes(
-        damaged_text(rng, text, ("[", "]", "{", "null,", '"', "NaN", "-"))
-        if rng.random() < 0.3
-        else written_json(rng, mutated(rng, json.loads(text)))
-    )
-    return path
+@cache
+def calibration_text():
+    return (FIXTURES / "recordings" / "calibration.json").read_text()
 
 
 @cache
-def _true_calibration() -> str:
-    document = json.loads((FIXTURES / "recordings" / "calibration.json").read_text())
-    return str(document["sha256"])
-
-
-def read_calibration(path: Path, _out: Path) -> None:
-    """Read a calibration, whose sha256 is in it."""
-    from probe.calibration.file import calibration_hash
-    from probe.calibration.file import read_calibration as read
-
-    if calibration_hash(read(path)) != _true_calibration():
-        raise WrongValueError("a calibration that was changed")
-
-
-@cache
-def state_text() -> str:
+def state_text():
     """Return the state of a sensor that was learned."""
-    from recognizer.sensor.file import write_state as write
+    from recognizer.sensor.file import write_state
     from recognizer.touch.sensor_state import SensorState
 
     ones, flags = np.ones((16, 16)), np.zeros((16, 16), bool)
     pairs = np.full((16, 16, 2), 0.1)
     state = SensorState("mat 3", 40, False, flags, flags, 0 * ones, ones, ones, pairs, pairs)
-    write(state, kept()[0] / "s.json")
+    write_state(state, kept()[0] / "s.json")
     return (kept()[0] / "s.json").read_text()
 
 
-def write_state(rng: random.Random, folder: Path) -> Path:
-    """Write a damaged state of a sensor."""
-    path = folder / "s.state.json"
-    path.write_bytes(
-        damaged_text(rng, state_text(), ("[", "]", "{", "null,", '"', "NaN", "-"))
-        if rng.random() < 0.3
-        else written_json(rng, mutated(rng, json.loads(state_text())))
-    )
-    return path
+def _json_writer(name, sound):
+    def write(rng, folder):
+        path = folder / name
+        if rng.random() < 0.3:
+            content = damaged_text(rng, sound(), ("[", "]", "{", "null,", '"', "NaN", "-"))
+        else:
+            content = written_json(rng, mutated(rng, json.loads(sound())))
+        path.write_bytes(content)
+        return path
+
+    return write
 
 
-def read_state(path: Path, _out: Path) -> None:
-    """Read a state, and say it as commands do."""
+def read_calibration(path, _out):
+    from probe.calibration.file import calibration_hash
+    from probe.calibration.file import read_calibration as read
+
+    if calibration_hash(read(path)) != json.loads(calibration_text())["sha256"]:
+        raise FaultError("wrong value", "a calibration that was changed")
+
+
+def read_state(path, _out):
     from recognizer.sensor.file import read_state as read
     from recognizer.sensor.file import state_words
 
@@ -81,74 +66,78 @@ def read_state(path: Path, _out: Path) -> None:
 YAML_SPLICES = ("{", "}", "[", "]", ":", "- ", "\t", "\n", "'", '"', "#", "&a ", "*a", "!!int ",
                 "|", "? ", "---\n", "...\n", "%YAML 1.2\n", "\x00", "\x85", "<<: ", "\u2028", "\r",
                 "objects:", "{{{{{{", "file: c.yaml")  # fmt: skip
+MINE = """like: prusa-mini
+name: mine
+nozzle: 0.6 mm
+bed: 180 x 180 mm
+stroke: 1 mm
+gap: 1 mm
+height: 0.6 mm
+edge: 1 mm
+overhang: 45 deg
+"""
 
 
 @cache
-def texts(what: str) -> tuple[str, ...]:
-    """Return sound files of people: `spec`, `printer`, `sensor`."""
-    if what == "spec":
-        return tuple(file.read_text() for file in sorted(FIXTURES.glob("**/*.yaml")))
-    if what == "printer":
-        limits = "stroke: 1 mm\ngap: 1 mm\nheight: 0.6 mm\nedge: 1 mm\noverhang: 45 deg\n"
-        mine = f"like: prusa-mini\nname: mine\nnozzle: 0.6 mm\nbed: 180 x 180 mm\n{limits}"
-        return (mine, "file: other.yaml\n")
+def spec_texts():
+    return tuple(file.read_text() for file in sorted(FIXTURES.glob("**/*.yaml")))
+
+
+@cache
+def sensor_texts():
     from encoded_objects.base.sensor_type_file import shipped_names, shipped_text
 
     return tuple(shipped_text(name) for name in shipped_names())
 
 
-def _yaml_file(rng: random.Random, what: str) -> bytes:
-    text = rng.choice(texts(what))
+def _yaml_file(rng, texts):
+    text = rng.choice(texts)
     if rng.random() < 0.4:
         return damaged_text(rng, text, YAML_SPLICES)
     return written_yaml(rng, mutated(rng, yaml.safe_load(text)))
 
 
-def write_sensor_type(rng: random.Random, folder: Path) -> Path:
-    """Write a damaged sensor type."""
+def write_sensor_type(rng, folder):
     path = folder / f"mine-{rng.randrange(10**9)}.yaml"  # types are kept by their names
-    path.write_bytes(_yaml_file(rng, "sensor"))
+    path.write_bytes(_yaml_file(rng, sensor_texts()))
     return path
 
 
-def read_sensor_type(path: Path, _out: Path) -> None:
-    """Read a sensor type."""
+def read_sensor_type(path, _out):
     from encoded_objects.base.sensor_type_file import sensor_type_named
 
     sensor = sensor_type_named(str(path))
     if not 0 < sensor.rows * sensor.columns <= 255 * 255:
-        raise WrongValueError(f"a matrix of {sensor.shape}")
+        raise FaultError("wrong value", f"a matrix of {sensor.shape}")
 
 
-def write_printer(rng: random.Random, folder: Path) -> Path:
+def write_printer(rng, folder):
     """Write a spec whose printer stands in a damaged file, which may name itself."""
     path = folder / "printer.yaml"
-    do = rng.random()
-    if do < 0.1:
+    if rng.random() < 0.1:
         named = rng.choice(("printer.yaml", "./printer.yaml", "other.yaml", "..", "/dev/zero"))
         path.write_text(f"file: {named}\n")
         (folder / "other.yaml").write_text("file: printer.yaml\n")
     else:
-        path.write_bytes(_yaml_file(rng, "printer"))
+        path.write_bytes(_yaml_file(rng, (MINE, "file: other.yaml\n")))
     spec = "name: Cube\nshape: {cube: 60 mm}\nprint: {printer: {file: printer.yaml}}\n"
     (folder / "c.yaml").write_text(spec)
     return path
 
 
-def read_printer(path: Path, _out: Path) -> None:
+def read_printer(path, _out):
     """Read the spec next to a printer's file."""
     from generator.spec import read_specs
 
     (spec,) = read_specs([path.parent / "c.yaml"])
     if not (spec.printer.layer_mm > 0 and min(spec.printer.bed_mm) > 0):
-        raise WrongValueError(str(spec.printer))
+        raise FaultError("wrong value", str(spec.printer))
 
 
-def write_spec(rng: random.Random, folder: Path) -> Path:
-    """Write a damaged spec, or set of specs, which may name itself, others and models."""
+def write_spec(rng, folder):
     path = folder / "c.yaml"
     do = rng.random()
-    path.write_bytes(_yaml_file(rng, "spec"))
+    path.write_bytes(_yaml_file(rng, spec_texts()))
     if do < 0.15:
         entries = [rng.choice(("c.yaml", "a.yaml", "b.yaml", "..", "../secret.txt", "fifo.yaml",
                                "/dev/zero", "x" * 300 + ".yaml", {"name": "A", "shape": "b.stl"},
@@ -168,7 +157,7 @@ def write_spec(rng: random.Random, folder: Path) -> Path:
     return path
 
 
-def read_spec(path: Path, _out: Path) -> None:
+def read_spec(path, _out):
     """Read specs; what is wrong has places in the files, causes and ways out."""
     from generator.spec import SpecError, read_specs
 
@@ -176,19 +165,19 @@ def read_spec(path: Path, _out: Path) -> None:
         specs = read_specs([path])
     except SpecError as error:
         for problem in error.problems:
-            mark = problem.mark
-            lines = len(mark.source.lines) if mark else 0
-            if not (problem.cause and problem.fix and problem.place) or (
-                mark and not (1 <= mark.line <= lines + 1 and mark.column >= 1)
-            ):
-                raise WrongValueError(f"a problem without a place: {problem.cause[:60]}") from error
+            mark, told = problem.mark, problem.cause and problem.fix and problem.place
+            if mark:
+                told = told and 1 <= mark.line <= len(mark.source.lines) + 1 and mark.column >= 1
+            if not told:
+                cause = f"a problem without a place: {problem.cause[:60]}"
+                raise FaultError("wrong value", cause) from error
         raise
     for spec in specs:
         if not 0 < spec.style.pitch_mm < 1e4:
-            raise WrongValueError(f"a pitch of {spec.style.pitch_mm}")
+            raise FaultError("wrong value", f"a pitch of {spec.style.pitch_mm}")
 
 
-def read_by_command(path: Path, out: Path) -> None:
+def read_by_command(path, out):
     """Encode a spec by the whole command; what is refused leaves nothing."""
     from generator.command import run
 
@@ -198,10 +187,19 @@ def read_by_command(path: Path, out: Path) -> None:
         code = run([str(path), "--format", "stl"])
     if code == 0:
         return
-    error = EncodedObjectsError(said.getvalue(), fix="-", place=path.name)
+    fix = "-" if all(word in said.getvalue() for word in ("error: ", "fix: ")) else ""
+    error = EncodedObjectsError(said.getvalue(), fix=fix, place=path.name)
     error.exit_code = code
-    if not all(word in said.getvalue() for word in ("error: ", "fix: ")):
-        error.fix = ""
     if code == 2 and any(out.iterdir()):
-        raise LeftError(", ".join(one.name for one in out.iterdir()))
+        raise FaultError("left outside", ", ".join(one.name for one in out.iterdir()))
     raise error
+
+
+KINDS = {
+    "calibration": Kind(_json_writer("c.json", calibration_text), read_calibration),
+    "state": Kind(_json_writer("s.state.json", state_text), read_state, sound=(state_text,)),
+    "sensor type": Kind(write_sensor_type, read_sensor_type),
+    "printer": Kind(write_printer, read_printer),
+    "spec": Kind(write_spec, read_spec),
+    "command": Kind(write_spec, read_by_command, (1, 2, 4), longest_s=30.0),
+}

@@ -74,33 +74,24 @@ def test_table_5_3_is_complete_and_its_fields_hold():
             assert "".join(map(str, field.digits[label][::-1])) == digits
 
 
-@pytest.mark.parametrize("entry", GOLDEN["appendix4_q2"], ids=lambda e: f"n={e['n']}")
-def test_appendix_4_binary(entry):
-    sequence = Sequence(field_of_order(2), on_file(2, entry["n"], "appendix 4"))
-    assert list(sequence.polynomial) == entry["poly"]
-    assert list(sequence.initial) == entry["init"]
+APPENDIX_4 = [
+    *((2, entry, dict.fromkeys(entry["lags"], 1)) for entry in GOLDEN["appendix4_q2"]),
+    *((3, entry, entry["lag_coef"]) for entry in GOLDEN["appendix4_q3"]),
+    *((4, entry, entry["lags_coef_labels"]) for entry in GOLDEN["appendix4_q4"]),
+]
+
+
+@pytest.mark.parametrize(("order", "entry", "lags"), APPENDIX_4)
+def test_appendix_4(order, entry, lags):
+    field, n = field_of_order(order), entry["n"]
+    h = on_file(2, n, "appendix 4") if order == 2 else primitive_polynomial(order, n)
+    sequence = Sequence(field, h)
+    assert list(sequence.polynomial) == entry.get("poly", list(sequence.polynomial))
+    assert list(sequence.initial) == entry.get("init", list(sequence.initial))
     s = sequence.symbols(range(200))
-    for t in range(entry["n"], 200):
-        assert s[t] == sum(s[t - lag] for lag in entry["lags"]) % 2
-
-
-@pytest.mark.parametrize("entry", GOLDEN["appendix4_q3"], ids=lambda e: f"n={e['n']}")
-def test_appendix_4_ternary(entry):
-    sequence = Sequence(field_of_order(3), primitive_polynomial(3, entry["n"]))
-    s = sequence.symbols(range(200))
-    for t in range(entry["n"], 200):
-        assert s[t] == sum(c * s[t - int(lag)] for lag, c in entry["lag_coef"].items()) % 3
-
-
-@pytest.mark.parametrize("entry", GOLDEN["appendix4_q4"], ids=lambda e: f"n={e['n']}")
-def test_appendix_4_quaternary(entry):
-    field = field_of_order(4)
-    sequence = Sequence(field, primitive_polynomial(4, entry["n"]))
-    assert list(sequence.polynomial) == entry["poly"]
-    s = sequence.symbols(range(200))
-    for t in range(entry["n"], 200):
+    for t in range(n, 200):
         total = 0
-        for lag, label in entry["lags_coef_labels"].items():
+        for lag, label in lags.items():
             total = field.addition[total, field.multiplication[label, s[t - int(lag)]]]
         assert s[t] == total
 

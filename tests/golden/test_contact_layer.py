@@ -5,7 +5,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from reference.elements_round import indented, washer_pad
+from reference.elements import ELEMENTS, tactels_n
 from reference.indenters import paraboloid
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
@@ -161,26 +161,18 @@ def test_thin_incompressible_layer_under_a_paraboloid(ratio, excess, cells):
     assert -found.z_mm == pytest.approx(10.0**2 / (4 * bend), rel=3e-3)
 
 
-@pytest.fixture(scope="module")
-def washer():
-    part = washer_pad(3.5, 7.5, 2.0, 1.0, 0.4999, parts=24)
-    flat = lambda r: np.where((r > 3.5 - 1e-9) & (r < 7.5 + 1e-9), 0.0, -np.inf)  # noqa: E731
-    return indented(part, flat, 80.0)
-
-
 @pytest.mark.parametrize(
     ("cells", "samples", "tactels", "depth"),
     [(2, 16, 1e-2, 6e-3), (4, 16, 5e-3, 4e-3), (4, 64, 2e-3, 2e-3), (8, 16, 1.2e-3, 2e-3)],
 )
-def test_washer_of_figure_4_10(washer, cells, samples, tactels, depth):
+def test_washer_of_figure_4_10(cells, samples, tactels, depth):
     sensor, kept, approaches = pad(), np.s_[1:-1, 1:-1], []
     for x, y, theta in ((0, 0, 0), (0.31, -0.17, 0.4), (-0.7, 0.55, 1.1), (0.5, 0.6, 2.0)):
         touch = Touch(x, y, theta, 80.0, wrist=HELD)
-        c, s = math.cos(theta), math.sin(theta)
-        truth = washer.tactels_n(sensor, (-c * x - s * y, s * x - c * y))[kept]
+        truth = tactels_n("washer", sensor, touch)[kept]
         found = layer(Washer(), sensor, touch, cells_per_tactel=cells, samples=samples)
         error = np.linalg.norm(found.forces_n[kept] - truth) / np.linalg.norm(truth)
-        approaches.append(-found.z_mm / washer.depth_mm - 1)
+        approaches.append(-found.z_mm / ELEMENTS["washer"]["depth_mm"] - 1)
         assert error <= tactels
         assert abs(approaches[-1]) <= depth
     assert abs(np.mean(approaches)) <= max(depth / 2, 2e-3)

@@ -2,8 +2,7 @@
 
 Mass, centre and inertia by the CAD kernel from the STEP files of the same run; frames by planes,
 corners and edges of the kernel's solids; MJCF by MuJoCo, URDF by yourdfpy, USD by OpenUSD, SDF
-by the rules of its specification. Drake, Newton and NVIDIA's validator, too large for here:
-`tests/campaigns/simulators.py`.
+by the rules of its specification.
 """
 
 from __future__ import annotations
@@ -96,32 +95,17 @@ def test_frames_of_faces_are_those_of_the_database(part):
 
 def test_frames_lie_in_planes_of_the_kernel(part):
     """The frame's z is the outward normal of a plane of a solid that holds its origin."""
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.GeomAbs import GeomAbs_SurfaceType
-    from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
+    from build123d import GeomType, Solid
 
     planes = []
     for shape, T in part.solids:
-        explorer = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
-        while explorer.More():
-            face = TopoDS.Face_s(explorer.Current())
-            surface = BRepAdaptor_Surface(face)
-            if surface.GetType() == GeomAbs_SurfaceType.GeomAbs_Plane:
-                plane = surface.Plane()
-                axis, at = plane.Axis().Direction(), plane.Location()
-                normal = np.array([axis.X(), axis.Y(), axis.Z()])
-                if (face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED) == plane.Direct():
-                    normal = -normal
-                normal = T[:3, :3] @ normal
-                planes.append((*normal, normal @ (T @ (at.X(), at.Y(), at.Z(), 1))[:3]))
-            explorer.Next()
-    planes = np.array(planes)
+        for face in Solid(shape).faces().filter_by(GeomType.PLANE):
+            normal = T[:3, :3] @ tuple(face.normal_at())
+            planes.append((*normal, normal @ (T @ (*face.center(), 1))[:3]))
     flat = {name: T for name, T in part.faces.items() if part.kind != "round" or name != "F2"}
     for name, T in flat.items():
         wanted = np.append(T[:3, 2], T[:3, 2] @ T[:3, 3])
-        assert np.abs(planes - wanted).max(axis=1).min() < 1e-6, name
+        assert np.abs(np.array(planes) - wanted).max(axis=1).min() < 1e-6, name
 
 
 def test_what_simulators_feel_is_one_closed_mesh_of_what_is_printed(part):
@@ -215,16 +199,6 @@ def test_sdf_keeps_to_its_specification(part):
     assert faults((part.folder / "Part.sdf").read_bytes()) == []
 
 
-def test_urdf_and_sdf_tell_drake_which_side_is_rigid(part):
-    from xml.etree import ElementTree
-
-    rigid = "{http://drake.mit.edu}proximity_properties/{http://drake.mit.edu}rigid_hydroelastic"
-    for suffix in (".urdf", ".sdf"):
-        [collider] = ElementTree.parse(part.folder / f"Part{suffix}").getroot().iter("collision")
-        assert collider.find(rigid) is not None
-        assert b"<drake:rigid_hydroelastic" in (part.folder / f"Part{suffix}").read_bytes()
-
-
 def test_usd_passes_the_validators_of_openusd(part):
     from pxr import Usd, UsdValidation
 
@@ -299,24 +273,6 @@ def test_another_file_than_was_meant_is_refused(tmp_path, monkeypatch):
     with pytest.raises(SolidError, match=r"'Part.xml' has a mass of 1\.\d+ kg where 0\."):
         make(tmp_path, TEXTS["panels"], verify=True)
     assert not (tmp_path / "out").exists()
-
-
-def test_where_nothing_is_felt_the_convex_pieces_collide(tmp_path):
-    from pxr import Usd, UsdPhysics
-
-    make(tmp_path, TEXTS["whole"].replace("g/cm3", "g/cm3, collision: body"))
-    files = {path.name for path in (tmp_path / "out").glob("*.obj")}
-    pieces = {f"Part-collision-{number}.obj" for number in range(1, 7)}
-    assert files == pieces | {"Part-visual-body.obj", "Part-visual-symbols.obj"}
-    for suffix in (".xml", ".urdf", ".sdf"):
-        text = (tmp_path / "out" / f"Part{suffix}").read_text()
-        assert all(name in text for name in pieces)
-        assert "drake:" not in text
-        assert "touch" not in text
-    stage = Usd.Stage.Open(str(tmp_path / "out" / "Part.usdc"))
-    colliders = stage.GetPrimAtPath("/Part/collision").GetChildren()
-    told = [UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr().Get() for prim in colliders]
-    assert told == ["convexHull"] * 6
 
 
 def test_symbols_as_convex_pieces_are_no_more(tmp_path):

@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,76 +15,67 @@ from reference.cube_panels import cube_panels
 
 from generator.export.meshes import stl_chunks
 from generator.export.threemf import print_files
-from generator.pipeline import encode
 from generator.solid.measure import volume
-from generator.solid.part import Part
 from generator.solid.triangulate import triangles
-from generator.spec.read import read_specs
 
 
 @pytest.fixture(scope="module")
-def slicer() -> str:
+def slicer():
+    """Return a function that runs PrusaSlicer."""
     found = shutil.which("prusa-slicer")
     if found is None:
         pytest.fail("prusa-slicer is missing: apt-get install prusa-slicer (Debian package)")
-    return found
+
+    def run(*words):
+        command = [found, *map(str, words)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+
+    return run
 
 
 @pytest.fixture(scope="module")
-def parts() -> tuple[Part, ...]:
+def told(slicer):
+    """Return a function: a file -> what `--info` says, one dict for each object."""
+
+    def told(path):
+        blocks = re.split(r"^\[[^\]]*\]$", slicer("--info", path).stdout, flags=re.MULTILINE)[1:]
+        found = [dict(re.findall(r"^(\w+) = +(\S+)$", one, flags=re.MULTILINE)) for one in blocks]
+        assert {values["manifold"] for values in found} == {"yes"}
+        return found
+
+    return told
+
+
+@pytest.fixture(scope="module")
+def parts():
     return cube_panels(40.0)
 
 
-def run(*command: str) -> str:
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    return done.stdout
+def test_stl_needs_no_repair(told, parts, tmp_path):
+    path = tmp_path / "part.stl"
+    path.write_bytes(b"".join(stl_chunks(triangles(parts[0]))))
+    (found,) = told(path)
+    assert found["number_of_parts"] == "1"
+    assert not {"open_edges", "facets_reversed", "degenerate_facets"} & set(found)
+    assert float(found["volume"]) == pytest.approx(volume(parts[0]), rel=1e-5)
 
 
-def info(text: str) -> list[dict[str, str]]:
-    """Return the values that `--info` prints, one dict for each object."""
-    blocks = re.split(r"^\[[^\]]*\]$", text, flags=re.MULTILINE)[1:]
-    pairs = [re.findall(r"^(\w+) = +(\S+)$", block, flags=re.MULTILINE) for block in blocks]
-    return [dict(found) for found in pairs]
-
-
-def test_stl_is_manifold_and_needs_no_repair(
-    slicer: str, parts: tuple[Part, ...], tmp_path: Path
-) -> None:
-    for part in parts:
-        path = tmp_path / f"{part.name}.stl"
-        path.write_bytes(b"".join(stl_chunks(triangles(part))))
-        (found,) = info(run(slicer, "--info", str(path)))
-        assert found["manifold"] == "yes"
-        assert found["number_of_parts"] == "1"
-        assert not {"open_edges", "facets_reversed", "degenerate_facets"} & set(found)
-        assert float(found["volume"]) == pytest.approx(volume(part), rel=1e-5)
-
-
-def test_3mf_components_are_read_as_body_and_symbols(
-    slicer: str, parts: tuple[Part, ...], tmp_path: Path
-) -> None:
+def test_3mf_components_are_read_as_body_and_symbols(told, parts, tmp_path):
     path = tmp_path / "components.3mf"
     path.write_bytes(print_files("Cube", parts, (250.0, 210.0))[0].content)
-    found = info(run(slicer, "--info", str(path)))
-    assert len(found) == 2 * len(parts)
-    assert {values["manifold"] for values in found} == {"yes"}
+    found = told(path)
     for part, body, symbols in zip(parts, found[::2], found[1::2], strict=True):
         together = float(body["volume"]) + float(symbols["volume"])
         assert together == pytest.approx(volume(part), rel=1e-5)
         assert float(symbols["min_z"]) == pytest.approx(float(body["max_z"]))
 
 
-def test_3mf_volumes_are_sliced_with_the_symbols_on_their_panels(
-    slicer: str, parts: tuple[Part, ...], tmp_path: Path
-) -> None:
+def test_3mf_volumes_are_sliced_with_the_symbols_on_their_panels(slicer, told, parts, tmp_path):
     path, gcode = tmp_path / "volumes.3mf", tmp_path / "volumes.gcode"
-    path.write_bytes(print_files("Cube", parts[:2], (250.0, 210.0))[0].prusaslicer)
-    found = info(run(slicer, "--info", str(path)))
-    assert len(found) == 2
-    assert {values["manifold"] for values in found} == {"yes"}
-    settings = ("--layer-height", "0.2", "--first-layer-height", "0.2", "--bed-shape",
-                "0x0,250x0,250x210,0x210", "--skirts", "0")  # fmt: skip
-    run(slicer, "--export-gcode", *settings, "-o", str(gcode), str(path))
+    path.write_bytes(print_files("Cube", parts[:1], (250.0, 210.0))[0].prusaslicer)
+    assert len(told(path)) == 1
+    slicer("--export-gcode", "--layer-height", 0.2, "--first-layer-height", 0.2, "--bed-shape",
+           "0x0,250x0,250x210,0x210", "--skirts", 0, "-o", gcode, path)  # fmt: skip
     low, high = {}, {}
     z = 0.0
     for line in gcode.read_text().splitlines():
@@ -99,17 +89,3 @@ def test_3mf_volumes_are_sliced_with_the_symbols_on_their_panels(
     assert (low[4.0] > low[3.0]).all()
     assert (high[4.0] < high[3.0]).all()
     assert (high[4.0] - low[4.0] > 0.8 * (high[3.0] - low[3.0])).all()
-
-
-def test_a_body_that_needs_no_supports_gets_none(slicer: str, tmp_path: Path) -> None:
-    spec = tmp_path / "a.yaml"
-    shape = "{cone: {diameter: 36 mm, top_diameter: 30 mm, height: 16 mm}}"
-    spec.write_text(f"name: A\nshape: {shape}\n")
-    url = f"sqlite:///{tmp_path}/l.db"
-    made = encode(read_specs([spec]), folder=tmp_path, database=url, formats=("3mf",), jobs=1)
-    assert "no supports needed" in str(made.objects[0].lying)
-    project, gcode = tmp_path / "A-prusaslicer.3mf", tmp_path / "a.gcode"
-    run(slicer, "--export-gcode", "--dont-arrange", "-o", str(gcode), str(project))
-    kinds = set(re.findall(r"^;TYPE:(.*)$", gcode.read_text(), flags=re.MULTILINE))
-    assert "External perimeter" in kinds
-    assert not {kind for kind in kinds if kind.startswith("Support")}

@@ -4,12 +4,10 @@ import os
 import pty
 import time
 import tty
-from binascii import crc_hqx
 from itertools import islice
 
 import numpy as np
 import pytest
-from cobs import cobs
 from reference.emulated_probe import emulated_probe
 
 from probe.client import Client
@@ -151,24 +149,6 @@ def test_a_slow_consumer_loses_the_oldest_and_knows(probe):
         assert [f.seq for f in late] == list(range(late[0].seq, late[0].seq + 5))
         assert statistics.overruns >= late[0].seq - first.seq - 1
         assert (statistics.lost, statistics.failed) == (0, 0)
-
-
-def test_the_wrong_baud_rate_is_told(probe):
-    with (
-        Client(f"serial://{probe.device}?baud=500000", answer_s=1.5) as client,
-        pytest.raises(PortError, match="try another baud rate"),
-    ):
-        until(client, lambda f: True)
-
-
-def test_a_firmware_of_another_version_is_told(line):
-    master, url = line
-    payload = b"I\x03" + bytes(26)
-    block = cobs.encode(payload + crc_hqx(payload, 0xFFFF).to_bytes(2, "little"))
-    with Client(url, answer_s=0.3) as client:
-        os.write(master, b"\0" + (block + b"\0") * 2)
-        with pytest.raises(PortError, match=r"another version of the protocol.*; flash"):
-            until(client, lambda f: True)
 
 
 def test_a_silent_device_is_told_and_gets_its_commands(line):

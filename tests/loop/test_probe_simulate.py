@@ -26,6 +26,7 @@ objects:
 - {name: Cube, shape: {cube: 40 mm}}
 - {name: Whole, shape: {cube: 40 mm}, print: {parts: whole}}
 - {name: Ball, shape: {dodecahedron: 30 mm}, print: {parts: whole}}
+- {name: Can, shape: {cylinder: {diameter: 60 mm, height: 40 mm}}}
 - name: Step
   shape:
     polyhedron:
@@ -112,7 +113,7 @@ def test_file_alone_is_touched_as_it_lies(lab):
 @pytest.mark.parametrize(
     ("target", "match"),
     [
-        ("{db}#", "4 objects, none is named"),
+        ("{db}#", "5 objects, none is named"),
         ("{other}@{db}", "its STL parts"),
     ],
 )
@@ -180,15 +181,10 @@ def test_a_scan_carries_the_poses_that_the_robot_believes(lab, tmp_path, kind):
     assert block.wrist.mean(axis=1) == pytest.approx([middle] * 6, abs=8)
 
 
-def test_a_round_face_is_scanned_from_all_around(tmp_path):
-    spec = "objects: [{name: Can, shape: {cylinder: {diameter: 90 mm, height: 40 mm}}}]"
-    (tmp_path / "set.yaml").write_text(spec)
-    target = f"{tmp_path / 'lab.db'}"
-    encode(read_specs([tmp_path / "set.yaml"]), folder=tmp_path / "out",
-           database=f"sqlite:///{target}", formats=("stl",))  # fmt: skip
-    truth = tmp_path / "a.json"
+def test_a_round_face_is_scanned_from_all_around(lab, tmp_path):
+    target, truth = f"{lab / 'lab.db'}", tmp_path / "a.json"
     (face,) = (face for face in registered_object(target, "Can").faces if face.round is not None)
-    words = ["simulate", f"{target}#Can/{face.name}", "--scan", "raster", "--touches", "12"]
+    words = ["simulate", f"{target}#Can/{face.name}", "--scan", "raster", "--touches", "9"]
     assert run([*words, "-o", str(tmp_path / "a.h5"), "--truth", str(truth)]) == 0
     told, poses = json.loads(truth.read_text()), Recording(tmp_path / "a.h5").block().pose
     for one, pose in zip(told["touches"], poses, strict=True):

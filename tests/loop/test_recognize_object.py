@@ -1,7 +1,11 @@
 """From a spec to an answer by the commands that people use: make, touch, recognise."""
 
 import json
+import lzma
+import math
+import queue
 import signal
+import socket
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -10,11 +14,21 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import zenoh
+from corpora.commands import DATA
 from reference.emulated_probe import emulated_port
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.command import run as encode_object
+from probe.circuit import Electronics, Noise, fsr_of, read_counts
 from probe.command import run as probe_sensor
+from probe.contact.contract import Touch
+from probe.contact.press import press
 from probe.recording.read import Recording
+from probe.surface.face import FaceSurface
+from probe.surface.polygon import polygon
 from recognizer.command import run as recognize_object
 from recognizer.sensor.file import read_state
 from recognizer.touch.robot import Seating
@@ -81,28 +95,25 @@ def test_how_the_sensor_is_mounted_is_checked_once_and_known_from_then_on(ask, a
     assert answer(*read, "--flip", "quarter") == ("unchecked", 168)  # mounted anew
 
 
-def test_touches_of_a_registered_face_are_recognised(asked):
-    for face, seed, overlay in (("F1", 3, "tab"), ("F4", 4, "pad")):
-        touched, truth_file = f"{face}.h5", f"{face}.json"
-        words = (f"lab.db#Cube/{face}", "--touches", 8, "--frames", 6, "--seed", seed, "--overlay",
-                 overlay, "-o", touched, "--truth", truth_file)  # fmt: skip
-        assert asked(probe_sensor, "simulate", *words)[0] == 0
-        code, out = asked(recognize_object, touched, "--database", "lab.db", "--json")
-        assert code == 0
-        entries = json.loads(out)
-        truth = json.loads(Path(truth_file).read_text())["touches"]
-        assert [entry["seq"] for entry in entries] == [touch["seq"] for touch in truth]
-        errors = []
-        for entry, touch in zip(entries, truth, strict=True):
-            if entry["object"] is None:
-                assert entry["reason"]
-                continue
-            assert (entry["object"], entry["face"]) == ("Cube", face)
-            found, known = np.array(entry["T_object_probe"]), np.array(touch["T_object_probe"])
-            errors.append((np.array(entry["T_face_probe"]) - touch["T_face_probe"])[:2, 3])
-            assert np.linalg.norm((found - known)[:3, 3]) < 2.0
-        assert len(errors) >= 5  # the others stand at edges, where too few symbols show
-        assert np.sqrt(np.mean(np.square(errors))) < 0.3
+def test_the_thesis_says_which_edges_a_touch_feels(asked):
+    """A cube without symbols at its edge x = 0: where the edge runs, against the truth."""
+    Path("thesis.db").write_bytes(lzma.decompress((DATA / "labs" / "thesis.db.xz").read_bytes()))
+    face = FaceSurface(None, polygon([np.array([[0.0, 0], [80, 0], [80, 80], [0, 80]])]))
+    board, fsr, rng = Electronics(noise=Noise()), fsr_of(16, 16), np.random.default_rng(4)
+    places = [(1.0, 40.0, 0.0), (3.0, 35.0, 0.5)]
+    felt = [press(face, SensorType(), Touch(*place, 70.0)).forces_n for place in places]
+    with h5py.File("edge.h5", "w") as file:
+        file["frames"] = [read_counts(force, board, fsr, None, rng)[0] for force in felt]
+    words = ("edge.h5", "--database", "thesis.db", "--method", "thesis", "--every")
+    entries = json.loads(asked(recognize_object, *words, "--json")[1])
+    for (x, _, theta), entry in zip(places, entries, strict=True):
+        (edge,) = entry["edges"]
+        normal = np.array([math.cos(theta), -math.sin(theta)])  # of the face's inside, sensor frame
+        assert abs(normal @ edge["position_mm"] + x) < max(0.25, 4 * edge["position_sd_mm"])
+        assert abs(edge["direction_deg"] + 90 + math.degrees(theta)) < 3
+        assert 0 < edge["position_sd_mm"] < 0.3
+        assert 0 < edge["direction_sd_deg"] < 2
+    assert asked(recognize_object, *words)[1].count("an edge at (") == 2
 
 
 def test_a_port_is_followed_until_it_is_interrupted(lab):
@@ -137,9 +148,6 @@ def test_a_recording_is_played_as_a_port(asked):
 
 
 def test_images_and_answers_are_kept_as_ros_messages(asked, lab):
-    from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_typestore
-
     words = ("lab.db#Cube/F2", "--touches", 3, "--frames", 6, "--seed", 5, "-o", "kept.h5")
     assert asked(probe_sensor, "simulate", *words)[0] == 0
     words = ("kept.h5", "--json", "--mcap", "kept.mcap")
@@ -147,9 +155,8 @@ def test_images_and_answers_are_kept_as_ros_messages(asked, lab):
     assert code == 0
     answers = json.loads(said)
     assert asked(recognize_object, *words)[0] == 2  # the file is there
-    with AnyReader(
-        [lab / "kept.mcap"], default_typestore=get_typestore(Stores.ROS2_HUMBLE)
-    ) as reader:
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    with AnyReader([lab / "kept.mcap"], default_typestore=types) as reader:
         seen = [
             (connection.topic, reader.deserialize(raw, connection.msgtype))
             for connection, _, raw in reader.messages()
@@ -174,12 +181,7 @@ def test_images_and_answers_are_kept_as_ros_messages(asked, lab):
 
 
 def test_what_is_followed_is_published(lab):
-    """Over zenoh, to its own client: images at the sensor's rate, and the answer of each touch."""
-    import socket
-    import time
-
-    import zenoh
-
+    """Over zenoh, to its own client: images and answers of the command."""
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         port = one.getsockname()[1]
@@ -188,25 +190,17 @@ def test_what_is_followed_is_published(lab):
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
-    config.insert_json5("connect/timeout_ms", "20000")
     config.insert_json5("scouting/multicast/enabled", "false")
+    came = {"bench/image": queue.Queue(), "bench/answer": queue.Queue()}
     with started(lab, *words) as process:
-        for line in process.stderr:
-            if line.startswith("publishing"):
-                break
+        while not process.stderr.readline().startswith("publishing"):
+            assert process.poll() is None
         with zenoh.open(config) as session:
-            images, answers = [], []
-            subscribers = (
-                session.declare_subscriber("bench/image", images.append),
-                session.declare_subscriber("bench/answer", answers.append),
-            )
-            until = time.monotonic() + SHORT_S
-            while (not answers or len(images) < 50) and time.monotonic() < until:
-                time.sleep(0.05)
-            assert subscribers
+            held = [session.declare_subscriber(key, one.put) for key, one in came.items()]
+            said = json.loads(came["bench/answer"].get(timeout=SHORT_S).payload.to_bytes())
+            assert held
+            assert came["bench/image"].get(timeout=SHORT_S)
         process.send_signal(signal.SIGINT)
         assert process.wait(SHORT_S) == 130
-    assert len(images) >= 50
-    said = json.loads(answers[0].payload.to_bytes())
     assert said["object"] == "Cube"
     assert np.hypot(said["x_mm"] - 28, said["y_mm"] - 31) < 0.5

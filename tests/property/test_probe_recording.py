@@ -23,14 +23,10 @@ def stream(seed: int, count: int, gaps: float, poses: float) -> list[Frame]:
         pose = np.eye(4)
         pose[:3, 3] = rng.normal(0, 400, 3)
         frames.append(
-            frame_from(
-                rng.integers(0, 65536, (16, 16)) * (rng.random((16, 16)) < 0.1),
-                t_ns=t,
-                seq=seq,
-                wrist=rng.integers(0, 65536, 4),
-                pose=pose if rng.random() < poses else None,
-            )
-        )
+            frame_from(rng.integers(0, 65536, (16, 16)) * (rng.random((16, 16)) < 0.1),
+                       t_ns=t, seq=seq, wrist=rng.integers(0, 65536, 4),
+                       pose=pose if rng.random() < poses else None)
+        )  # fmt: skip
     return frames
 
 

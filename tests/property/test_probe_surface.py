@@ -115,6 +115,8 @@ def test_stars_hold_the_points_that_shapely_says(seed, corners, holed, size):
     region, points = polygon(loops), random.uniform(-size, size, (500, 2))
     assert (region.contains(points) == shapely.contains_xy(shape, points)).all()
     assert region.contains(np.concatenate(loops)).all()
+    away = shapely.distance(shape.boundary, shapely.points(points))
+    assert np.abs(region.distance_mm(points) - away).max() < 1e-9 * size
     share = random.random((len(region.starts), 1))
     assert region.contains(region.starts + share * (region.ends - region.starts)).all()
 

@@ -30,7 +30,7 @@ Floats = NDArray[np.float32]
 PSI = 3.0  #: of log(1 + 3 y) / log 4
 
 # Chosen on simulated touches of the 40 objects of `docs/validation/forty.yaml` (typical noise and
-# strong mismatch; `tests/bench/recognizer_times.py`).
+# strong mismatch).
 STEP_MM = 0.05  #: grid of the tables; positions are off by 0.025 mm at most
 BULGE = 0.59  #: F(c)/F(1) = c (1 + BULGE (1 - c)) of a tip covered by the share c
 PENETRATION_MM = 0.4  #: of the plateau into the overlay, for the part of a wall that presses

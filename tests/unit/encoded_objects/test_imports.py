@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 CUBE = Path(__file__).parents[3] / "fixtures" / "cube.yaml"
+PROBE = "numpy scipy matplotlib h5py skfem skimage sqlalchemy serial generator pydantic"
 HELP = """
 numpy sqlalchemy yaml manifold3d PIL scipy shapely trimesh OCP pymeshlab matplotlib build123d
 cadquery generator.spec generator.array generator.pipeline"""
@@ -27,6 +28,14 @@ assert solid.folder.name == "mesh" """
 SETTINGS = """
 import linecache, generator.spec.settings
 assert not [name for name in linecache.cache if "generator" in name]"""
+PLATE = """
+import numpy
+from probe.command import run
+corners = numpy.array([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]], "<f4")
+facet = lambda *three: bytes(12) + corners[list(three)].tobytes() + bytes(2)
+part = bytes(80) + numpy.uint32(2).tobytes() + facet(0, 1, 2) + facet(0, 2, 3)
+open("plate.stl", "wb").write(part)
+assert run(["simulate", "plate.stl", "-o", "a.h5"]) == 0"""
 # What is run, and modules that are not loaded by it.
 PROGRAMS = {
     "public names": (
@@ -42,6 +51,12 @@ PROGRAMS = {
     "help": ("from generator.command import run; assert run(['--help']) == 0", HELP),
     "help of init": ("from generator.command import run; assert run(['init', '-h']) == 0", HELP),
     "help of list": ("from generator.command import run; assert run(['list', '-h']) == 0", HELP),
+    "help of probe": ("from probe.command import run; assert run(['--help']) == 0", PROBE),
+    "help of calibrate": (
+        "from probe.command import run; assert run(['calibrate', 'loads', '-h']) == 0",
+        PROBE,
+    ),
+    "plate": (PLATE, "sqlalchemy scipy.signal skfem"),
     "database": (
         "import generator.database.open, generator.database.read, generator.database.register",
         "sqlalchemy.orm scipy shapely OCP matplotlib trimesh pymeshlab psycopg",

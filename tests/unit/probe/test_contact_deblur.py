@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from probe.contact.contract import Touch, WristStiffness
 from probe.contact.deblur import LEAST_SHARE, blur_of, deblur, thickest_mm, transmitted_share
-from probe.contact.layer import layer
 from probe.contact.layer_influence import influence
 from probe.errors import ContactError
-from probe.surface.indenters import Washer
-
-HELD = WristStiffness(math.inf, math.inf)
 
 
 def pad(height, **more):
@@ -38,20 +33,13 @@ def test_the_blur_is_that_of_the_layer(height):
     assert blurred(sensor, force).sum() == pytest.approx(1, rel=1e-9)
 
 
-@pytest.mark.parametrize("height", [4.0, 20.0])
-def test_pads_of_4_mm_and_more_are_refused(height):
-    with pytest.raises(ContactError, match="passes") as caught:
-        deblur(np.ones((16, 16)), pad(height), noise_n=0.01)
-    assert "at most 3.75 mm" in caught.value.fix
-
-
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.4999, 0.5])
 def test_the_thickest_pad_is_where_the_refusal_begins(poisson):
     most = thickest_mm(pad(2.0, poisson=poisson))
     assert transmitted_share(pad(most, poisson=poisson)) == pytest.approx(LEAST_SHARE, rel=1e-6)
     read = np.ones((16, 16))
     deblur(read, pad(0.99 * most, poisson=poisson), noise_n=0.1)
-    with pytest.raises(ContactError, match="at most"):
+    with pytest.raises(ContactError, match=r"passes.*at most"):
         deblur(read, pad(1.01 * most, poisson=poisson), noise_n=0.1)
 
 
@@ -79,31 +67,11 @@ def test_noise_is_held_down_and_told(height):
     assert found.resolved <= {1.0: 256, 2.0: 256, 3.0: 200, 3.7: 150}[height]  # lost as pads grow
 
 
-@pytest.mark.parametrize("noise", [0.001, 0.05])
-def test_the_washer_of_figure_4_10_is_sharper(noise):
-    """Likeness to the ring's cover of each tactel, at 20 N through 2 mm."""
-    sensor, touch = pad(2.0), Touch(0.3, -0.2, 0.3, 20.0, wrist=HELD)
-    read = layer(Washer(), sensor, touch).forces_n
-    read += noise * np.random.default_rng(0).normal(size=read.shape)
-    step = (np.arange(16) + 0.5) / 16 - 0.5
-    inside = sensor.centres_mm()[:, :, None, None] + sensor.pitch_mm * np.stack(
-        np.meshgrid(step, step), axis=-1
-    )
-    heights = Washer().heights_mm(touch.on_surface(inside).reshape(-1, 2)).reshape(16, 16, -1)
-    cover = (heights == 0).mean(axis=-1)
-
-    def likeness(image):
-        return np.corrcoef(image.ravel(), cover.ravel())[0, 1]
-
-    found = deblur(read, sensor, noise_n=noise)
-    assert likeness(found.forces_n) > likeness(read) + 0.01
-    assert found.forces_n.sum() == pytest.approx(20.0, rel=0.15)
-
-
 @pytest.mark.parametrize(
     ("read", "sensor", "noise", "match"),
     [
         (np.ones((16, 16)), SensorType(), 0.01, "kind 'tab'"),
+        (np.ones((16, 16)), pad(4.0), 0.01, r"passes.*at most 3\.75 mm"),
         (np.ones((16, 15)), pad(2.0), 0.01, "shape"),
         (np.full((16, 16), np.nan), pad(2.0), 0.01, "finite"),
         (np.ones((16, 16)), pad(2.0), -1.0, "noise"),

@@ -1,11 +1,9 @@
-"""The rigid plate on tips and wrist: by hand, against an interior-point solver, and refusals."""
+"""The rigid plate on tips and wrist: by hand, where it tips, and refusals."""
 
 import math
 
-import clarabel
 import numpy as np
 import pytest
-import scipy.sparse as sp
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch, WristStiffness
@@ -14,28 +12,11 @@ from probe.contact.plate import rest
 from probe.errors import ContactError
 
 POINTS = SensorType().centres_mm().reshape(-1, 2)
-FREE, RIGID = WristStiffness(0.0, 0.0), WristStiffness(math.inf, math.inf)
 ONE = Linear(1.0)
 
 
 def load(force=80.0, *wrist, **tilts):
     return Touch(0.0, 0.0, 0.0, force, wrist=WristStiffness(*wrist), **tilts)
-
-
-def test_level_springs_share_the_force():
-    found = rest(POINTS, np.full(256, 3.0), Linear(2.0), load(51.2))
-    assert found.pose.z_mm == pytest.approx(3.0 - 51.2 / (256 * 2.0), rel=1e-12)
-    assert abs(found.pose.tilt_x_rad) + abs(found.pose.tilt_y_rad) < 1e-15
-    np.testing.assert_allclose(found.forces_n, 0.2, rtol=1e-12)
-
-
-def test_one_tip_off_the_centre_turns_the_plate_against_the_wrist():
-    at, force = np.array([[4.0, -3.0]]), 5.0
-    found = rest(at, np.zeros(1), Linear(10.0), load(force, 3000.0, 2000.0))
-    assert found.pose.tilt_x_rad == pytest.approx(force * -3.0 / 3000, rel=1e-12)
-    assert found.pose.tilt_y_rad == pytest.approx(-force * 4.0 / 2000, rel=1e-12)
-    # The tip alone is pressed by F/k; there the plate stands that much below the surface.
-    assert found.pose.heights_mm(at)[0] == pytest.approx(-force / 10, rel=1e-12)
 
 
 def test_a_stiff_arm_keeps_its_tilt_and_a_soft_one_gives_way():
@@ -59,52 +40,6 @@ def test_a_crushed_column_answers_by_its_law(force):
     assert found.forces_n[0] == pytest.approx(force, rel=1e-9)
 
 
-def test_neo_hooke_is_linear_at_small_strain_and_its_tangent_is_its_slope():
-    law = NeoHooke(0.7, 2.0)
-    at = np.array([-3.0, 1e-12, 1e-3, 0.4, 1.5, 1.999])
-    force, tangent = law(at)
-    assert force[1] == pytest.approx(0.7e-12, rel=1e-10)
-    assert tangent[1] == pytest.approx(0.7, rel=1e-10)
-    step = 1e-6 * (2.0 - at)
-    slope = (law(at + step)[0] - law(at - step)[0]) / (2 * step)
-    np.testing.assert_allclose(tangent, slope, rtol=1e-6)
-    assert (tangent > 0).all()
-
-
-def test_an_interior_point_solver_finds_the_same_rest():
-    rng = np.random.default_rng(4)
-    for _ in range(12):
-        n = int(rng.integers(3, 120))
-        points, heights = POINTS[rng.choice(256, n, replace=False)], rng.random(n)
-        k, wrist = 10 ** rng.uniform(-2, 2, n), 10 ** rng.uniform(1, 5, 2)
-        a, b = rng.uniform(-0.05, 0.05, 2)
-        touch = load(10 ** rng.uniform(-1, 2), *wrist, tilt_x_rad=a, tilt_y_rad=b)
-        pose = rest(points, heights, Linear(k), touch).pose
-        z, turn_x, turn_y = oracle(points, heights, k, touch)
-        assert pose.z_mm == pytest.approx(z, abs=1e-6)
-        assert (pose.tilt_x_rad, pose.tilt_y_rad) == pytest.approx((turn_x, turn_y), abs=1e-7)
-
-
-def oracle(points, heights, k, touch):
-    """Minimise sum k d^2/2 + wrist + F z with d >= 0, d >= h - zeta; over z, the tilts and d."""
-    n = len(k)
-    x, y = points.T
-    wrist = np.array([0.0, touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad])
-    P = sp.block_diag([sp.diags(wrist), sp.diags(k)], "csc")
-    q = np.r_[touch.force_n, -wrist[1:] * [touch.tilt_x_rad, touch.tilt_y_rad], np.zeros(n)]
-    rows = np.stack([-np.ones(n), -y, x], axis=1)
-    A = sp.vstack([sp.hstack([rows, -sp.eye(n)]), sp.hstack([np.zeros((n, 3)), -sp.eye(n)])])
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-12
-    cones = [clarabel.NonnegativeConeT(2 * n)]
-    b = np.r_[-heights, np.zeros(n)]
-    solver = clarabel.DefaultSolver(
-        sp.triu(P, format="csc"), q, sp.csc_matrix(A), b, cones, settings
-    )
-    return np.array(solver.solve().x[:3])
-
-
 @pytest.mark.parametrize(("aside", "stands"), [(0.0, True), (11.8, True), (12.0, False)])
 def test_a_free_plate_tips_where_its_centre_leaves_the_hull(aside, stands):
     points, heights = POINTS + np.array([aside, 0.0]), np.full(256, -1.0)
@@ -126,11 +61,6 @@ def test_a_free_plate_needs_the_hull_along_its_free_axes_alone():
         rest(at, np.zeros(2), ONE, load(1.0, 100.0, 0.0))
     alone = rest(np.zeros((1, 2)), np.zeros(1), ONE, load(1.0, 0.0, 0.0))
     assert alone.forces_n == pytest.approx(1.0)
-
-
-def test_far_from_the_origin_nothing_is_lost():
-    near, far = (rest(POINTS, np.full(256, z), NeoHooke(0.6, 2.0), load()) for z in (0.0, 2.0**20))
-    np.testing.assert_array_equal(far.forces_n, near.forces_n)
 
 
 @pytest.mark.parametrize(

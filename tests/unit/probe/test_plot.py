@@ -59,12 +59,3 @@ def test_a_touch_shows_surface_force_and_reading(tmp_path):
     assert near(pixels[:, :wide], MARK) > 400, "the outline of the sensor"
     for panel in (pixels[:, wide : 2 * wide], pixels[:, 2 * wide :]):
         assert near(panel, OUTLINE, 40) > 60, "the outline of the washer"
-
-
-def test_a_sensor_off_the_surface(tmp_path):
-    touch = Touch(500.0, 0.0, 0.0, 0.0)
-    nothing = np.zeros((16, 16))
-    touch_picture(Washer(), SENSOR, touch, nothing, nothing, tmp_path / "a.png")
-    pixels = pixels_of(tmp_path / "a.png")
-    assert near(pixels, OUTLINE, 20) == 0
-    assert near(pixels[:, : pixels.shape[1] // 3], MARK) > 300

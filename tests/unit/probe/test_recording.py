@@ -10,12 +10,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from recorded import frames, pose_at, record, same
+from recorded import frames, record, same
 
-from encoded_objects.base.files import staged_file
 from probe.errors import RecordingError
 from probe.frame import Frame, frame_from
-from probe.recording.guard import superblock_of
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.recording.repair import repair
@@ -44,37 +42,16 @@ def refused(path: Path, match: str) -> None:
 
 def test_the_file_is_plain_hdf5_with_its_origin(tmp_path):
     path = tmp_path / "touch.h5"
-    given = frames(70)
-    record(path, given, sensor="bench 1", calibration="ab12", attributes={"force_n": 80.0})
+    record(path, frames(70), sensor="bench 1", calibration="ab12", attributes={"force_n": 80.0})
     with h5py.File(path) as file:
         assert sorted(file) == ["frames", "seq", "t_ns", "wrist"]
         assert (file["frames"].dtype, file["frames"].shape) == (np.uint16, (70, 16, 16))
-        assert file["frames"].compression == "gzip"
-        assert (file["frames"][69] == given[69].counts).all()
         said = dict(file.attrs)
     assert said.pop("tool_version")
     assert said == {
         "format": "tactile recording", "format_version": 1, "sensor": "bench 1",
         "calibration": "ab12", "units": "counts", "piece": 1, "force_n": 80.0,
     }  # fmt: skip
-
-
-def test_the_same_frames_give_the_same_bytes(tmp_path):
-    for name in ("a.h5", "b.h5"):
-        record(tmp_path / name, frames(100, pose=pose_at(1)))
-    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
-
-
-def test_a_series_has_a_file_a_second(tmp_path):
-    recorder = record(tmp_path / "touch.h5", frames(500), roll_over_s=1.0)
-    expected = [f"touch-{number:04d}.h5" for number in range(1, 4)]
-    assert [file.name for file in recorder.files] == names(tmp_path) == expected
-    recording = Recording(tmp_path / "touch.h5")
-    assert [file.frames for file in recording.files] == [220, 220, 60]
-    assert recording.block(219, 441).seq.tolist() == list(range(219, 441))
-    only = Recording(tmp_path / "touch-0003.h5").block()
-    assert (len(only), only.seq[0]) == (60, 440)
-    assert not only.counts.flags.writeable
 
 
 def test_a_probe_whose_clock_restarts_neither_rolls_over_nor_stalls(tmp_path):
@@ -119,14 +96,6 @@ def test_a_series_is_read_while_its_next_file_is_blank(tmp_path):
     assert all(map(same, Recording(path).frames(), given))
 
 
-def test_a_slow_stream_is_flushed_by_time(tmp_path):
-    with Recorder(tmp_path / "touch.h5", flush_s=0.05) as recorder:
-        for frame in frames(12):
-            recorder.append(frame)
-        recording = Recording(tmp_path / "touch.h5", live=True)
-        assert len(recording) == 12  # 11 periods of 1/220 s are 0.05 s
-
-
 def test_a_recording_is_replaced_only_when_asked(tmp_path):
     path = tmp_path / "touch.h5"
     record(path, frames(10))
@@ -163,17 +132,6 @@ def test_two_recorders_cannot_write_one_file_and_a_closed_one_takes_no_frames(tm
         recorder.append(frames(1)[0])
 
 
-def test_a_draft_is_called_by_the_name_that_was_asked_for(tmp_path):
-    out = tmp_path / "touch.h5"
-    with (
-        pytest.raises(RecordingError, match="another process is writing it") as caught,
-        staged_file(out) as draft,
-        Recorder(draft),
-    ):
-        Recorder(draft)
-    assert caught.value.place == str(out)
-
-
 def test_others_files_that_are_no_recording_are_told_apart(tmp_path):
     refused(tmp_path, "Is a directory; this is a folder")
     refused(foreign(tmp_path / "b.h5", data=COUNTS, more=1), "/frames, but data, more; import")
@@ -191,35 +149,6 @@ def test_values_that_are_no_counts_are_refused_and_where(tmp_path, bad):
     path = foreign(tmp_path / "a.h5", frames=values)
     refused(path, "other things than counts 0 ... 65535 in frames 256 ... 511; import")
     assert len(list(Recording(path).frames(0, 256))) == 256
-
-
-@pytest.mark.parametrize("kind", [np.float16, np.float32])
-def test_counts_of_floats_are_read_without_a_warning(tmp_path, kind):
-    times = np.zeros(600, np.float32)
-    path = foreign(tmp_path / "a.h5", frames=COUNTS.astype(kind), t_ns=times)
-    read = [frame.counts for frame in Recording(path).frames()]
-    assert np.array_equal(read, COUNTS.astype(kind))
-    refused(foreign(tmp_path / "b.h5", frames=COUNTS, t_ns=times + 2.0**63), "other things than")
-
-
-def test_attributes_of_others_are_kept_and_a_user_block_does_not_matter(tmp_path):
-    path = tmp_path / "a.h5"
-    with h5py.File(path, "w", userblock_size=1024) as file:
-        file["frames"] = COUNTS
-        file.attrs.update({"sensor": np.bytes_(b"mat 3"), "piece": np.array([4]), "format": "own"})
-    recording = Recording(path)
-    assert len(recording) == 600
-    assert superblock_of(path).whole
-    assert recording.origin.sensor == "mat 3"
-    assert dict(recording.origin.more) == {"piece": 4, "format": "own"}
-
-
-def test_others_files_stay_beside_the_repaired_one(tmp_path):
-    path = foreign(tmp_path / "a.h5", frames=COUNTS, seq=np.arange(500), notes="keep me")
-    refused(path, "different lengths")
-    assert repair(path).frames == 500
-    with h5py.File(tmp_path / "a.damaged.h5") as file:
-        assert file["notes"][()] == b"keep me"
 
 
 def test_a_table_that_cannot_be_made_leaves_nothing(tmp_path):
@@ -268,37 +197,6 @@ def size_of(journal):
     """Bytes of its head and of a record."""
     length = struct.unpack_from("<I", journal.read_bytes(), 8)[0]
     return 16 + length, 2 * 30 + 8 + 16 + 128 + 4
-
-
-def check(frames, count):
-    read = list(frames)
-    assert [frame.seq for frame in read] == list(range(count))
-    for i, frame in enumerate(read):
-        assert (frame.counts == IMAGES[i]).all()
-        assert (frame.t_ns, frame.wrist.tolist()) == (i * 10**6, [1, 2, 3, i])
-        assert (frame.pose is None) == (i % 3 == 0)
-
-
-def test_it_is_read_as_it_is_under_both_names(journal):
-    for name in (journal, journal.with_name("touch.h5")):
-        recording = Recording(name)
-        check(recording.frames(), 200)
-        check(Recording(name, live=True).frames(), 200)
-        assert recording.shape == (6, 5)
-        assert recording.origin.sensor == "bench 1"
-        assert dict(recording.origin.more) == {"force_n": 80.0, "of": "a"}
-        assert [(file.path, file.poses) for file in recording.files] == [(journal, True)]
-
-
-@pytest.mark.parametrize("cut", [0, 1, 100, 215])
-def test_a_torn_record_ends_it(journal, cut):
-    start, size = size_of(journal)
-    journal.write_bytes(journal.read_bytes()[: start + 150 * size + cut])
-    check(Recording(journal).frames(), 150)
-    content = bytearray(journal.read_bytes())
-    content[-1 - cut] ^= 1  # of the last whole record
-    journal.write_bytes(content)
-    check(Recording(journal).frames(), 149)
 
 
 def test_a_damaged_record_costs_its_block(journal):

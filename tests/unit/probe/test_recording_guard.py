@@ -11,9 +11,7 @@ from recorded import frames, record
 from probe.command import run
 from probe.errors import RecordingError
 from probe.recording.guard import strings_end
-from probe.recording.hdf5 import write_hdf5
 from probe.recording.imported import import_array
-from probe.recording.layout import FrameBlock, RecordingOrigin
 from probe.recording.read import Recording
 from probe.recording.repair import repair
 
@@ -75,26 +73,6 @@ def test_commands_refuse_it(folder, words, capsys, monkeypatch):
     assert [file.name for file in folder.iterdir()] == ["a.h5"]
 
 
-def test_minutes_of_nothing_are_a_recording(tmp_path):
-    path, number = tmp_path / "a.h5", np.zeros(MANY, np.int64)
-    images = np.zeros((MANY, 16, 16), np.uint16)
-    wrist = np.zeros((MANY, 4), np.uint16)
-    write_hdf5(path, RecordingOrigin(), [FrameBlock(images, number, number, wrist, None)], path)
-    assert sum(map(len, Recording(path).blocks(30_000))) == MANY - 30_000
-    assert repair(path).changed is False
-
-
-@pytest.mark.parametrize("chunk", [64, 2048, MANY, None])
-def test_minutes_of_others_are_a_recording_however_they_are_stored(tmp_path, chunk):
-    packed = {} if chunk is None else {"chunks": (chunk, 16, 16), "compression": 9}
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        images = np.zeros((MANY, 16, 16), np.uint16)
-        images[:, 3, 4] = np.arange(MANY) % 1024
-        file.create_dataset("frames", data=images, **packed)
-    first = [block.counts[0, 3, 4] for block in Recording(tmp_path / "a.h5").blocks()]
-    assert first == [number % 1024 for number in range(0, MANY, 256)]
-
-
 def test_links_within_a_file_are_followed(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["held/images"] = IMAGES + 3
@@ -122,34 +100,32 @@ def test_images_are_of_bounded_size(tmp_path, side):
         Recording(tmp_path / "a.h5")
 
 
-@pytest.fixture
-def content(folder):
-    """Bytes of a recording, and where its first collection of strings begins."""
-    written = bytearray(record(folder / "a.h5", frames(1)).files[0].read_bytes())
-    return written, written.index(b"GCOL")
+@pytest.mark.parametrize("chunk", [64, MANY, None])
+def test_minutes_of_others_are_a_recording_however_they_are_stored(tmp_path, chunk):
+    packed = {} if chunk is None else {"chunks": (chunk, 16, 16), "compression": 9}
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        images = np.zeros((MANY, 16, 16), np.uint16)
+        images[:, 3, 4] = np.arange(MANY) % 1024
+        file.create_dataset("frames", data=images, **packed)
+    first = [block.counts[0, 3, 4] for block in Recording(tmp_path / "a.h5").blocks()]
+    assert first == [number % 1024 for number in range(0, MANY, 256)]
 
 
-@pytest.mark.parametrize("attempt", [lambda path: list(Recording(path).frames()), repair])
-def test_strings_without_end_are_damage(folder, content, attempt):
-    written, at = content
-    assert strings_end(folder / "a.h5")
-    written[at + 16 : at + 528] = bytes(512)  # a sector that was lost
-    (folder / "a.h5").write_bytes(written)
-    with pytest.raises(RecordingError, match="it is damaged: cannot read it"):
-        attempt(folder / "a.h5")
-
-
-def test_strings_behind_the_images_are_looked_at_too(folder):
-    with h5py.File(folder / "a.h5", "w") as file:
-        file["frames"] = np.zeros((8000, 16, 16), np.uint16)
+@pytest.mark.parametrize("number", [1, 8000])
+def test_strings_without_end_are_damage(folder, number):
+    path = folder / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["frames"] = np.zeros((number, 16, 16), np.uint16)
         file.attrs["sensor"] = "mat 3"
-    written = bytearray((folder / "a.h5").read_bytes())
+    written = bytearray(path.read_bytes())
+    assert strings_end(path)
     at = written.index(b"GCOL")
-    assert at > 4_000_000
-    written[at + 16 : at + 528] = bytes(512)
-    (folder / "a.h5").write_bytes(written)
-    with pytest.raises(RecordingError, match="it is damaged: cannot read it"):
-        Recording(folder / "a.h5")
+    assert (at > 4_000_000) == (number == 8000)  # behind the images
+    written[at + 16 : at + 528] = bytes(512)  # a sector that was lost
+    path.write_bytes(written)
+    for attempt in (Recording, repair):
+        with pytest.raises(RecordingError, match="it is damaged: cannot read it"):
+            attempt(path)
 
 
 def test_collections_in_one_another_are_damage(folder):
@@ -159,8 +135,9 @@ def test_collections_in_one_another_are_damage(folder):
 
 
 @pytest.mark.parametrize("length", range(0, 20, 4))
-def test_free_space_counts_its_own_head(folder, content, length):
-    written, at = content
+def test_free_space_counts_its_own_head(folder, length):
+    written = bytearray(record(folder / "a.h5", frames(1)).files[0].read_bytes())
+    at = written.index(b"GCOL")
     written[at + 16 : at + 18] = bytes(2)
     written[at + 24 : at + 32] = length.to_bytes(8, "little")
     (folder / "a.h5").write_bytes(written)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
 import json
 import os
 import zlib
@@ -12,18 +10,17 @@ import h5py
 import numpy as np
 import pytest
 from mcap_ros2.writer import Writer
-from recorded import pose_at, same
+from recorded import frames as made_frames
+from recorded import pose_at, record
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from scipy.io import savemat
 from zstandard import ZstdCompressor
 
 from probe.errors import RecordingError
-from probe.frame import frame_from
 from probe.recording.imported import import_array
 from probe.recording.mcap import export_mcap, import_mcap
 from probe.recording.read import Recording
-from probe.recording.record import Recorder
 from probe.recording.ros import DEFINITIONS, IMAGE, POSE, TOUCH_FRAME, covariance_message
 from recognizer.validation.dataset_formats import write_ftp1
 
@@ -75,18 +72,11 @@ def test_every_format_gives_the_same_frames(tmp_path, kind, axes):
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([path.name, "out.h5"])
 
 
-def test_sixteen_images_have_time_first(tmp_path):
-    np.save(tmp_path / "a.npy", COUNTS[:16])
-    made = import_array(tmp_path / "a.npy", tmp_path / "out.h5")
-    assert (made.block().counts == COUNTS[:16]).all()
-
-
 def test_values_that_are_no_numbers_are_refused(tmp_path):
-    for bad in (np.nan, np.inf):
-        values = COUNTS.astype(np.float32)
-        values[37, 1, 1] = bad
-        np.save(tmp_path / "a.npy", values)
-        refused(tmp_path / "a.npy", "no numbers, the first in image 37; ")
+    values = COUNTS.astype(np.float32)
+    values[37, 1, 1] = np.inf
+    np.save(tmp_path / "a.npy", values)
+    refused(tmp_path / "a.npy", "no numbers, the first in image 37; ")
     np.save(tmp_path / "b.npy", COUNTS * 5e-324)
     refused(tmp_path / "b.npy", "nothing above")
     np.save(tmp_path / "c.npy", np.where(COUNTS > 500, 1e308, -1e308))
@@ -96,9 +86,7 @@ def test_values_that_are_no_numbers_are_refused(tmp_path):
 FORCES = np.random.default_rng(1).gamma(0.3, 2.0, (200, 16, 16))
 
 
-@pytest.mark.parametrize(
-    "values", [FORCES, FORCES - 0.25, COUNTS.astype(np.int32) - 5, COUNTS.astype(np.int64) * 1000]
-)
+@pytest.mark.parametrize("values", [FORCES - 0.25, COUNTS.astype(np.int64) * 1000])
 def test_values_that_are_no_counts_are_scaled_and_say_so(tmp_path, values):
     np.save(tmp_path / "a.npy", values)
     recording = import_array(tmp_path / "a.npy", tmp_path / "out.h5")
@@ -120,58 +108,24 @@ def test_files_without_images_are_refused(tmp_path):
     refused(tmp_path / "b.npy", "it holds objects")
     np.save(tmp_path / "c.npy", COUNTS + 1j)
     refused(tmp_path / "c.npy", "no array of images")
-    (tmp_path / "d.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:500])
     savemat(tmp_path / "h.mat", {"images": COUNTS})
-    whole = (tmp_path / "h.mat").read_bytes()
-    (tmp_path / "h.mat").write_bytes(whole[: len(whole) // 2])
-    for name, content in (("e.mat", b"x" * 300), ("f.mat", b""), ("g.bin", b"x" * 300)):
+    for name, content in (
+        ("d.npy", (tmp_path / "a.npy").read_bytes()[:500]),
+        ("h.mat", (tmp_path / "h.mat").read_bytes()[:9000]),
+        ("e.mat", b"x" * 300),
+        ("f.mat", b""),
+        ("g.bin", b"x" * 300),
+    ):
         (tmp_path / name).write_bytes(content)
-    for name in ("d.npy", "h.mat", "e.mat", "f.mat", "g.bin"):
         refused(tmp_path / name, "damaged|no HDF5 file|empty")
 
 
-RNG = np.random.default_rng(23)
-N = 40
-
-
-@pytest.fixture
-def recording(tmp_path):
-    """Full counts, gaps in seq, a clock that restarts, poses here and there, attributes."""
-    path = tmp_path / "touch.h5"
-    more = {"overlay": "tab", "rate": 220.0, "list": [1, 2]}
-    with Recorder(path, sensor="bench 1", calibration="ab" * 32, attributes=more) as recorder:
-        for i in range(N):
-            recorder.append(
-                frame_from(
-                    RNG.integers(0, 65536, (16, 16)),
-                    t_ns=(i if i < 30 else i - 30) * 4_545_454 + 3,
-                    seq=i if i < 7 else 2**33 + i,
-                    wrist=RNG.integers(0, 1024, 4),
-                    pose=pose_at(i / 3) if i % 3 else None,
-                )
-            )
-    return Recording(path)
-
-
-def test_there_and_back_is_the_same_recording_and_the_same_file(recording, tmp_path):
-    assert export_mcap(recording, tmp_path / "a.mcap") == N
-    back = import_mcap(tmp_path / "a.mcap", tmp_path / "back.h5")
-    a, b = recording.origin, back.origin
-    assert (a.sensor, a.calibration, a.units) == (b.sensor, b.calibration, b.units)
-    plain = [{n: np.asarray(v).tolist() for n, v in one.more.items()} for one in (a, b)]
-    assert plain[0] == plain[1]
-    assert all(map(same, back.frames(), recording.frames()))
-    export_mcap(back, tmp_path / "b.mcap")
-    digests = {hashlib.sha256((tmp_path / n).read_bytes()).digest() for n in ("a.mcap", "b.mcap")}
-    assert len(digests) == 1
-
-
-def test_rosbags_reads_it(recording, tmp_path):
+def test_rosbags_reads_it(tmp_path):
     """By the message types that rosbags knows itself, ours by the definition in the file."""
-    path = tmp_path / "a.mcap"
-    export_mcap(recording, path)
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    frames = list(recording.frames())
+    path, store = tmp_path / "a.mcap", get_typestore(Stores.ROS2_HUMBLE)
+    frames = [frame for i in range(9) for frame in made_frames(1, first=i, pose=pose_at(i / 3))]
+    record(tmp_path / "touch.h5", frames)
+    export_mcap(Recording(tmp_path / "touch.h5"), path)
     with AnyReader([path], default_typestore=store) as reader:
         topics = {c.topic: c.msgtype for c in reader.connections}
         assert topics == {"/touch/image": IMAGE, "/touch/frame": TOUCH_FRAME, "/touch/pose": POSE}
@@ -183,7 +137,7 @@ def test_rosbags_reads_it(recording, tmp_path):
     rests = {message.seq for topic, message in read if topic == "/touch/frame"}
     assert rests == {frame.seq for frame in frames}
     at = sorted(message.pose.position.x for topic, message in read if topic == "/touch/pose")
-    known = sorted(frame.pose[0, 3] / 1000 for frame in frames if frame.pose is not None)
+    known = sorted(frame.pose[0, 3] / 1000 for frame in frames)
     assert at == pytest.approx(known, abs=1e-15)
 
 
@@ -232,19 +186,6 @@ def test_images_that_are_none_are_refused_and_nothing_is_left(tmp_path, options,
         import_mcap(path, tmp_path / "r.h5")
     assert caught.value.fix
     assert [p.name for p in tmp_path.iterdir()] == ["robot.mcap"]
-
-
-def test_a_file_without_images_is_refused(tmp_path):
-    stream = io.BytesIO()
-    writer = Writer(stream)
-    writer.write_message(
-        "/pose", writer.register_msgdef(POSE, DEFINITIONS[POSE]),
-        covariance_message(np.eye(4), np.eye(6), 0, "base")["pose"], log_time=0,
-    )  # fmt: skip
-    writer.finish()
-    (tmp_path / "pose.mcap").write_bytes(stream.getvalue())
-    with pytest.raises(RecordingError, match="no sensor_msgs/msg/Image in it, but geometry_msgs"):
-        import_mcap(tmp_path / "pose.mcap", tmp_path / "r.h5")
 
 
 def test_a_covariance_is_in_metres():

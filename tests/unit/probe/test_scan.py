@@ -79,21 +79,6 @@ def test_an_approach_that_fails_says_why(law, at, limits, reason, travel, force,
         assert bench.went[-1] == 0  # it is lifted
 
 
-def test_forces_and_limits_that_make_no_sense():
-    with pytest.raises(ContactError, match=r"the force at 0 mm is nan"):
-        guarded_approach(lambda travel: math.nan)
-    for guard in (
-        ApproachLimits(force_n=0.1),
-        ApproachLimits(most_n=80),
-        ApproachLimits(step_mm=0),
-        ApproachLimits(travel_mm=0.1),
-        ApproachLimits(tolerance_n=0),
-        ApproachLimits(travel_mm=math.inf),
-    ):
-        with pytest.raises(ContactError, match="contradict each other"):
-            guarded_approach(lambda travel: 0.0, guard)
-
-
 def covered(places, theta, point, half=12.7):
     c, s = math.cos(theta), math.sin(theta)
     inside = np.abs((point - places) @ [[c, -s], [s, c]]) <= half + 1e-9
@@ -114,12 +99,6 @@ def test_a_square_face():
     inside = plan.cover > 1 - 1e-9
     assert inside.sum() == 25
     assert plan.cover[0] == pytest.approx((1 - (3 * step + 12.7 - 30) / 25.4) ** 2)
-
-
-def test_a_face_smaller_than_the_sensor_is_one_touch():
-    plan = raster([[(0, 0), (20, 0), (20, 10), (0, 10)]])
-    assert plan.places_mm.tolist() == [[10, 5]]
-    assert plan.cover == pytest.approx([200 / 25.4**2])
 
 
 @pytest.mark.parametrize("theta", [0, 20])
@@ -156,20 +135,6 @@ def test_cover_is_the_area_under_the_sensor(theta):
         assert inside.mean() == pytest.approx(cover, abs=0.01)
 
 
-def test_faces_and_steps_that_are_none():
-    for loops in (
-        [],
-        [[(0, 0), (1, 1)]],
-        [[(0, 0), (1, 1), (2, 2)]],
-        [[(0, 0), (1, 0), (math.nan, 1)]],
-    ):
-        with pytest.raises(SurfaceError, match="outline"):
-            raster(loops)
-    for step in (0, 17, math.nan):
-        with pytest.raises(SurfaceError, match="tactels; take more than 0 and at most 16"):
-            raster([SQUARE], step_tactels=step)
-
-
 def test_tilts_are_those_of_the_contact_models():
     a, b = 0.02, -0.03
     about_x = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
@@ -182,14 +147,6 @@ def test_tilts_are_those_of_the_contact_models():
     for x, y in ((10, 0), (0, 10), (-7, 4)):
         height = (T @ [x, y, 0, 1])[2]
         assert height == pytest.approx(3 + a * y - b * x, abs=2e-3)
-
-
-def test_a_sensor_that_faces_elsewhere_is_refused():
-    upside_down = np.diag([1.0, -1.0, -1.0, 1.0])
-    with pytest.raises(PoseError, match="tilted by 180 degrees"):
-        touch_at(upside_down, 1)
-    with pytest.raises(PoseError, match="give T_surface_sensor"):
-        touch_at(np.eye(3), 1)
 
 
 def scan_poses():
@@ -224,10 +181,28 @@ def test_play_drags_the_joint_along():
     assert np.abs(stands[:, 2]).max() <= 0.1
 
 
-def test_a_pose_out_of_reach_is_named():
-    poses = [*scan_poses()[:3], surface_to_sensor(900, 0, 0, 100)]
-    with pytest.raises(PoseError, match=r"pose 3 of 4: .* out of reach .*nearer"):
-        follow_poses(Arm(), poses, JointErrors(), np.random.default_rng(1))
+@pytest.mark.parametrize(
+    ("call", "error", "match"),
+    [
+        (lambda: guarded_approach(lambda _: math.nan), ContactError, "the force at 0 mm is nan"),
+        *((lambda limits=limits: guarded_approach(lambda _: 0.0, ApproachLimits(**limits)),
+           ContactError, "contradict each other")
+          for limits in ({"force_n": 0.1}, {"most_n": 80}, {"step_mm": 0}, {"travel_mm": 0.1},
+                         {"tolerance_n": 0}, {"travel_mm": math.inf})),
+        *((lambda loops=loops: raster(loops), SurfaceError, "outline")
+          for loops in ([], [SQUARE[:2]], [[(0, 0), (1, 1), (2, 2)]], [[*SQUARE, (math.nan, 1)]])),
+        *((lambda step=step: raster([SQUARE], step_tactels=step), SurfaceError,
+           "tactels; take more than 0 and at most 16") for step in (0, 17, math.nan)),
+        (lambda: touch_at(np.diag([1.0, -1.0, -1.0, 1.0]), 1), PoseError, "tilted by 180 degrees"),
+        (lambda: touch_at(np.eye(3), 1), PoseError, "give T_surface_sensor"),
+        (lambda: follow_poses(Arm(), [*scan_poses()[:3], surface_to_sensor(900, 0, 0, 100)],
+                              JointErrors(), np.random.default_rng(1)),
+         PoseError, "pose 3 of 4: .* out of reach .*nearer"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused(call, error, match):
+    with pytest.raises(error, match=match):
+        call()
 
 
 def test_a_path_keeps_its_branch():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -21,13 +20,10 @@ from encoded_objects.base.sensor_type_file import (
     sensor_type_named,
     shipped_names,
 )
-from probe.command import run
 from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
-from probe.simulate.simulation import SimulatedProbe, TouchOptions
-from probe.simulate.source import options_of
 
 LEAST = "name: mine\nrows: 4\ncolumns: 6\npitch: 2 mm\n"
 
@@ -89,17 +85,6 @@ def test_which_type_images_are_of():
         choose_sensor_type("fsr-8x8", "", (16, 16), "touch.h5")
 
 
-def test_the_pitch_that_is_proposed():
-    assert SensorType().symbol_pitch_mm == 5.0
-    assert SensorType().with_overlay("pad").symbol_pitch_mm == 7.0
-    assert sensor_type_named("flexitac-12x32").symbol_pitch_mm == 6.0
-    assert sensor_type_named("gel-24x32").symbol_pitch_mm == 3.0
-    few = tuple((row, column) for row in range(16) for column in range(16) if column % 8)
-    small, sparse = SensorType(8, 8, 1.5875), SensorType(missing=few)
-    assert small.symbol_pitch_mm < SensorType().symbol_pitch_mm
-    assert sparse.symbol_pitch_mm < SensorType().symbol_pitch_mm
-
-
 def test_an_overlay_is_taken_as_usual():
     flexitac = sensor_type_named("flexitac-12x32")
     pad = flexitac.with_overlay("pad")
@@ -108,17 +93,6 @@ def test_an_overlay_is_taken_as_usual():
     assert flexitac.with_overlay("tab") is flexitac
     assert SensorType(overlay=Overlay(kind="pad")).with_overlay("tab") == SensorType()
     assert pad.with_overlay("tab").overlay.tab_diameter_mm == pytest.approx(1.2666 * 2 / 1.5875)
-
-
-def test_ports_are_read_as_of_the_type_that_is_given(tmp_path, capsys):
-    recording, given = tmp_path / "a.h5", ["--sensor-type", "fsr-8x8"]
-    assert run(["record", "sim:", "-o", str(recording), "--frames", "2", *given]) == 0
-    held = Recording(recording)
-    assert (held.sensor_type().name, held.shape) == ("fsr-8x8", (8, 8))
-    assert run(["live", "sim:", "--seconds", "0.1", "--json", *given]) == 0
-    capsys.readouterr()
-    assert run(["info", "sim:", "--seconds", "0.1", "--json", *given]) == 0
-    assert json.loads(capsys.readouterr().out)["ident"]["columns"] == 8
 
 
 def test_frames_of_another_shape_are_not_recorded(tmp_path):
@@ -159,19 +133,3 @@ def test_a_type_is_pressed_as_hard_for_its_area_and_a_gel_as_deep():
     assert 80 * force_share(gel) == pytest.approx(0.3 * bed * area)
     soft = replace(gel, overlay=replace(gel.overlay, young_mpa=0.15))
     assert force_share(soft) == pytest.approx(force_share(gel) / 2)
-
-
-@pytest.mark.parametrize(
-    ("name", "newtons"), [("fsr-16", 80.0), ("gel-24x32", 7.75), ("mat-32x32", 508)]
-)
-def test_a_simulated_probe_presses_as_hard_as_its_type_takes(name, newtons):
-    one = next(SimulatedProbe("washer", sensor_type=name).touches())
-    assert one.touch.force_n == pytest.approx(newtons, rel=1e-3)
-    assert options_of({"sensor_type": name})[0]["force"] == one.touch.force_n
-    told = TouchOptions(touches=20)
-    drawn = [
-        one.touch.force_n for one in SimulatedProbe("washer", told, sensor_type=name).touches()
-    ]
-    assert 0.25 * newtons <= min(drawn) < max(drawn) <= 1.5 * newtons
-    asked = TouchOptions(force_n=3.0)
-    assert next(SimulatedProbe("washer", asked, sensor_type=name).touches()).touch.force_n == 3.0

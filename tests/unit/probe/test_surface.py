@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from reference.indenters import block, half_plane, sphere
+from reference.indenters import block
 from reference.mesh_heights import heights_by_numpy, heights_over
 from shapely.geometry import MultiPoint
 
@@ -15,12 +15,10 @@ from probe.errors import SurfaceError
 from probe.surface import indenters
 from probe.surface.body import close_below, manifold_from, mesh_heights, triangulate
 from probe.surface.face import (
-    LatticeSurface,
     list_lookup,
     template,
-    tile_lookup,
 )
-from probe.surface.mesh import mesh, sort_numbers
+from probe.surface.mesh import mesh
 from probe.surface.polygon import polygon
 from probe.surface.symbols import Relief, emboss, outline
 
@@ -43,48 +41,16 @@ def test_no_height_exceeds_the_top_and_none_is_nan(surface):
     assert surface.heights_mm(np.zeros((0, 2))).shape == (0,)
 
 
-@pytest.mark.parametrize(
-    ("surface", "inside", "outside"),
-    [
-        (indenters.Washer(), [(7.5, 0), (3.5, 0), (0, -5)], [(7.51, 0), (3.49, 0), (0, 0)]),
-        (indenters.RaisedStrip(2.0, 10.0), [(1, 5), (-1, -5), (0, 0)], [(1.01, 0), (0, 5.01)]),
-        (indenters.Cross(2.0, 20.0), [(10, 1), (-1, 10), (0, 0)], [(10.1, 0), (1.1, 1.1)]),
-        (half_plane(), [(0, 99), (-5, 0)], [(1e-9, 0)]),
-    ],
-)
-def test_outlines_belong_to_the_body(surface, inside, outside):
-    assert (surface.heights_mm(np.array(inside, float)) == 0).all()
-    assert (surface.heights_mm(np.array(outside, float)) == -math.inf).all()
-
-
-def test_sphere_is_round_and_exact_near_its_top():
-    heights = sphere(20.0).heights_mm(np.array([[12.0, 0.0], [1e-8, 0.0], [20.1, 0.0]]))
-    # z = -r^2 / 2R to 16 digits where the plain formula has lost all of them
-    assert heights == pytest.approx([-4.0, -2.5e-18, -math.inf], rel=1e-12, abs=0)
-
-
 def test_rough_surface_is_its_seed_with_the_stated_rms():
     points = np.random.default_rng(0).uniform(-400, 400, (40_000, 2))
     one, again, other = (indenters.RoughSurface(n, 0.2).heights_mm(points) for n in (5, 5, 6))
     assert np.array_equal(one, again)
     assert not np.array_equal(one, other)
     assert one.std() == pytest.approx(0.2, rel=0.05)
-    with pytest.raises(SurfaceError, match="shortest"):
-        indenters.RoughSurface(shortest_mm=0.0)
 
 
 SQUARE = np.array([[0.0, 0], [10, 0], [10, 10], [0, 10]])
 HOLE = np.array([[4.0, 4], [4, 6], [6, 6], [6, 4]])
-HOOK = np.array([[0.0, 0], [10, 0], [10, 10], [7, 10], [7, 3], [0, 3]])
-
-
-def test_box_has_its_top_inside_and_nothing_beside():
-    part = mesh(block((0, 0, -1), (4, 3, 2)))
-    assert part.top_mm == 2.0
-    assert len(part.corners) == 2  # of a closed mesh, walls and underside are left out
-    points = np.array([[0.0, 0], [4, 3], [2, 1.5], [1, 0], [4.0001, 1], [2, -1e-9], [99, 99]])
-    assert part.heights_mm(points).tolist() == [2, 2, 2, 2, -np.inf, -np.inf, -np.inf]
-    assert part.heights_mm(np.zeros((0, 2))).shape == (0,)
 
 
 def test_the_highest_of_several_bodies_counts_whatever_their_sense():
@@ -100,89 +66,12 @@ def test_frames_move_the_part_under_the_sensor():
     assert part.heights_mm(np.array([[6.5, 7.0], [4.9, 7.0]])).tolist() == [7.0, -np.inf]
 
 
-def test_slanted_triangles_are_planes_and_random_ones_as_by_brute_force():
-    rng = np.random.default_rng(4)
-    corners = rng.uniform(-5, 5, (300, 1, 3)) + rng.normal(size=(300, 3, 3))
-    part = mesh(corners)
-    points = rng.uniform(-7, 7, (400, 2))
-    best = np.full(400, -np.inf)
-    for a, b, c in corners:
-        weights = np.linalg.solve(np.array([a, b, c]).T * [[1], [1], [0]] + [[0], [0], [1]],
-                                  np.c_[points, np.ones(400)].T)  # fmt: skip
-        z = np.where((weights >= 0).all(axis=0), weights.T @ [a[2], b[2], c[2]], -np.inf)
-        best = np.maximum(best, z)
-    ours = part.heights_mm(points)
-    assert (np.isfinite(ours) == np.isfinite(best)).all()
-    seen = np.isfinite(best)
-    assert seen.sum() > 200
-    assert np.abs(ours[seen] - best[seen]).max() < 1e-9
-
-
-def test_upright_walls_cover_nothing():
-    wall = np.array([[[0.0, 0, 0], [1, 0, 0], [1, 0, 5]]])
-    with pytest.raises(SurfaceError, match="no triangle covers"):
-        mesh(wall)
-    with pytest.raises(SurfaceError, match="NaN"):
-        mesh(np.full((1, 3, 3), np.nan))
-
-
-@pytest.mark.parametrize("loops", [[SQUARE], [SQUARE, HOLE], [HOOK], [HOOK[::-1]], [SQUARE[::-1]]])
-def test_points_in_polygons_as_shapely_says(loops):
-    region = polygon(loops)
-    shape = shapely.Polygon(loops[0], loops[1:])
-    points = np.random.default_rng(0).uniform(-1, 11, (5000, 2))
-    points = np.concatenate([points, np.round(points)])  # corners and edges among them
-    assert (region.contains(points) == shapely.intersects_xy(shape, points)).all()
-    away = shapely.distance(shape.boundary, shapely.points(points))
-    assert np.abs(region.distance_mm(points) - away).max() < 1e-9
-
-
-@pytest.mark.parametrize("loops", [[], [SQUARE[:2]], [SQUARE * 0], [SQUARE * np.nan]])
-def test_what_is_no_polygon_is_refused(loops):
-    with pytest.raises(SurfaceError, match="outline"):
-        polygon(loops)
-
-
 def test_filled_loops_cover_their_area_once():
     points, triangles = np.concatenate([SQUARE, HOLE]), triangulate([SQUARE, HOLE])
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     areas = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     assert areas.min() > 0
     assert areas.sum() / 2 == pytest.approx(96.0)
-    with pytest.raises(SurfaceError, match="cover"):
-        triangulate([SQUARE[::-1]])
-
-
-def test_level_ground_is_answered_by_its_bins_as_by_its_triangles():
-    """A plate at z = 0 with a block on it: inside each bin, and on the plate's rim."""
-    n = 40
-    x, y = np.meshgrid(np.linspace(0, 10, n + 1), np.linspace(0, 10, n + 1), indexing="ij")
-    high = ((x > 4.9) & (x < 7.1) & (y > 2.9) & (y < 8.1)).astype(float)
-    top = np.stack([x, y, high], -1)
-    low = np.stack([x, y, np.full_like(x, -1)], -1)
-    quads = [(top[:-1, :-1], top[1:, :-1], top[1:, 1:], top[:-1, 1:]),
-             (low[:-1, :-1], low[:-1, 1:], low[1:, 1:], low[1:, :-1])]  # fmt: skip
-    for way in (0, 1):  # walls along x and along y, at both ends
-        for end in (0, -1):
-            a, b = top.take(end, axis=way), low.take(end, axis=way)
-            a, b = (a[::-1], b[::-1]) if (way == 0) == (end == 0) else (a, b)
-            quads.append((a[:-1], b[:-1], b[1:], a[1:]))
-    found = []
-    for corners in quads:
-        a, b, c, d = (corner.reshape(-1, 3) for corner in corners)
-        found += [np.stack([a, b, c], 1), np.stack([a, c, d], 1)]
-    triangles = np.concatenate(found)
-    closed, apart = mesh(triangles), mesh(triangles[:-1])  # without one wall it is no body
-    assert len(closed.corners) == 2 * n * n
-    assert closed.level.sum() > n * n
-    assert not apart.level.any()
-    points = np.random.default_rng(7).uniform(-1, 11, (20_000, 2))
-    points = np.concatenate([points, np.round(4 * points) / 4, np.round(points)])
-    heights = closed.heights_mm(points)
-    assert np.array_equal(heights, apart.heights_mm(points))
-    inside = ((points >= 0) & (points <= 10)).all(axis=1)
-    assert (np.isfinite(heights) == inside).all()
-    assert 0.4 < closed.bins.level.mean() < 0.95
 
 
 @pytest.mark.parametrize("width", [3.0, 1e-7])
@@ -203,14 +92,6 @@ def test_bins_hold_every_triangle_that_points_lie_under(width):
             for u, v in zip(x, y, strict=True)]  # fmt: skip
     assert np.isfinite(over).mean() > 0.4
     assert np.array_equal(part.heights_mm(points), np.minimum(over, part.top_mm))
-
-
-@pytest.mark.parametrize("most", [1, 1 << 17, 1 << 50])
-def test_numbers_are_sorted_as_numpy_sorts_them(most):
-    numbers = np.random.default_rng(2).integers(0, most, 4000)
-    numbers = np.concatenate([numbers, numbers[::3]])
-    assert np.array_equal(sort_numbers(numbers), np.argsort(numbers, kind="stable"))
-    assert len(sort_numbers(numbers[:0])) == 0
 
 
 def scattered(rng):
@@ -274,13 +155,6 @@ def test_no_height_is_missed_by_more_than_the_tolerance(cells, tolerance):
     assert len(triangles) <= 2 * cells**2
 
 
-def test_a_tolerance_is_used():
-    heights = scene(32, np.random.default_rng(5))
-    counts = [len(mesh_heights(heights, t)) for t in (0.0, 0.1, 0.5, 9.0)]
-    assert counts[0] > counts[1] > counts[2] > counts[3] == 2
-    assert missed(heights, mesh_heights(heights, 0.5)) > 0.25
-
-
 def test_a_slope_is_two_triangles_and_a_corner_of_it_a_few():
     row, column = np.indices((17, 17)).astype(float)
     assert len(mesh_heights(0.3 * row - 0.2 * column, 1e-9)) == 2
@@ -305,12 +179,6 @@ def test_the_body_is_closed_and_holds_what_lies_below_the_heights(tolerance):
     box = body.bounding_box()
     assert box[:3] == pytest.approx((-0.8, -0.8, BOTTOM))
     assert box[3:5] == pytest.approx((0.8, 0.8))
-
-
-@pytest.mark.parametrize("shape", [(9, 5), (2, 2), (13, 13)])
-def test_other_grids_are_refused(shape):
-    with pytest.raises(SurfaceError, match="power of two"):
-        mesh_heights(np.zeros(shape), 0.1)
 
 
 # An L, a glyph with a closed loop, one with a shallow diagonal, and strokes that only touch.
@@ -365,68 +233,33 @@ def test_heights_are_those_of_the_moved_outline(label, relief):
     assert (theirs > 0).mean() > 0.15
 
 
-@pytest.mark.parametrize("relief", RELIEFS)
-def test_table_gives_the_exact_heights(relief):
-    symbols = emboss(GLYPHS, UNIT, relief)
-    known = template(symbols, PITCH)
-    rng = np.random.default_rng(3)
-    labels = rng.integers(-1, len(GLYPHS), 60_000)
-    right, down = rng.random((2, 60_000))
-    exact = np.zeros(60_000)
-    on = labels >= 0
-    x, y = (right - 0.5) * PITCH, (0.5 - down) * PITCH
-    exact[on] = symbols.heights_mm(labels[on], x[on], y[on])
-    assert np.abs(known.heights_mm(labels, right, down) - exact).max() < 1e-12
+WALL = np.array([[[0.0, 0, 0], [1, 0, 0], [1, 0, 5]]])
 
 
 @pytest.mark.parametrize(
-    ("relief", "match"),
+    ("call", "match"),
     [
-        (Relief(height_mm=0.0), "high"),
-        (Relief(draft_rad=1.5), "draft"),
-        (Relief(chamfer_mm=1.2), "chamfer"),
-        (Relief(height_mm=3.0, stroke_mm=0.4, draft_rad=1.0), "vanish"),
+        (lambda: indenters.RoughSurface(shortest_mm=0.0), "shortest"),
+        (lambda: mesh(WALL), "no triangle covers"),
+        (lambda: mesh(WALL * np.nan), "NaN"),
+        *((lambda loops=loops: polygon(loops), "outline")
+          for loops in ([], [SQUARE[:2]], [SQUARE * 0], [SQUARE * np.nan])),
+        (lambda: triangulate([SQUARE[::-1]]), "cover"),
+        (lambda: mesh_heights(np.zeros((9, 5)), 0.1), "power of two"),
+        (lambda: mesh_heights(np.zeros((13, 13)), 0.1), "power of two"),
+        *((lambda given=given: emboss(GLYPHS, UNIT, Relief(**given)), match)
+          for given, match in (
+              ({"height_mm": 0.0}, "high"), ({"draft_rad": 1.5}, "draft"),
+              ({"chamfer_mm": 1.2}, "chamfer"),
+              ({"height_mm": 3.0, "stroke_mm": 0.4, "draft_rad": 1.0}, "vanish"))),
+        *((lambda strokes=strokes, width=width: outline(strokes, width), "stroke")
+          for strokes, width in ((np.zeros((0, 2, 2)), 1.0), ([[[0, 0], [0, 0]]], 1.0),
+                                 ([[[0, 0], [1, 0]]], 0.0))),
+        (lambda: template(emboss(GLYPHS, UNIT, Relief()), 5.0), "overlap"),
+        (lambda: list_lookup([1, 1], [2, 2], [0, 1]), "share a cell"),
+        (lambda: list_lookup([0, 10**6], [0, 10**6], [0, 1]), "one face"),
     ],
-)
-def test_impossible_reliefs_are_refused(relief, match):
+)  # fmt: skip
+def test_what_is_no_surface_is_refused(call, match):
     with pytest.raises(SurfaceError, match=match):
-        emboss(GLYPHS, UNIT, relief)
-
-
-@pytest.mark.parametrize(
-    ("strokes", "width"),
-    [(np.zeros((0, 2, 2)), 1.0), ([[[0, 0], [0, 0]]], 1.0), ([[[0, 0], [1, 0]]], 0.0)],
-)
-def test_strokes_that_draw_nothing_are_refused(strokes, width):
-    with pytest.raises(SurfaceError, match="stroke"):
-        outline(strokes, width)
-
-
-def test_symbols_wider_than_their_cell_are_refused():
-    with pytest.raises(SurfaceError, match="overlap"):
-        template(emboss(GLYPHS, UNIT, Relief()), 5.0)
-
-
-def cell_heights(lattice, row, column, x, y):
-    """Heights at symbol-frame places of a cell of a lattice that is not turned."""
-    centre = np.array([(column + 0.5) * PITCH, -(row + 0.5) * PITCH])
-    return lattice.heights_mm(centre + np.stack([x, y], axis=1))
-
-
-def test_an_endless_lattice_repeats_its_tile():
-    symbols = emboss(GLYPHS, UNIT, Relief())
-    grid = np.random.default_rng(0).integers(-1, 3, (4, 5))
-    x, y = np.random.default_rng(1).uniform(-3.49, 3.49, (2, 500))
-    endless = LatticeSurface(template(symbols, PITCH), tile_lookup(grid))
-    for r, c in np.ndindex(4, 5):
-        label = grid[r, c]
-        want = symbols.heights_mm(np.full(500, label), x, y) if label >= 0 else np.zeros(500)
-        for k in (0, 3, -5):
-            assert np.abs(cell_heights(endless, r + 4 * k, c + 5 * k, x, y) - want).max() < 1e-9
-
-
-def test_two_symbols_in_one_cell_are_refused():
-    with pytest.raises(SurfaceError, match="share a cell"):
-        list_lookup([1, 1], [2, 2], [0, 1])
-    with pytest.raises(SurfaceError, match="one face"):
-        list_lookup([0, 10**6], [0, 10**6], [0, 1])
+        call()

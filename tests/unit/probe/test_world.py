@@ -1,21 +1,17 @@
 """Worlds: each level does to the counts what it says; neighbours, worn symbols, written files."""
 
 import math
-import struct
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from reference.indenters import block
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.circuit.network import loaded_columns
 from probe.contact.contract import Touch
-from probe.contact.tabs import tabs
-from probe.contact.tips import Tips
 from probe.errors import CircuitError, SurfaceError
 from probe.simulate.scene import bare_scene
-from probe.simulate.world.levels import LEVELS, SOUND, TYPICAL
+from probe.simulate.world.levels import SOUND
 from probe.simulate.world.sensor import MOUNTINGS, LevelSensor, mount
 from probe.simulate.world.surfaces import (
     GAP_MM,
@@ -23,19 +19,15 @@ from probe.simulate.world.surfaces import (
     STEP_MM,
     AdjacentParts,
     DistortedSurface,
-    FramePlace,
     place_adjacent,
     worn_scene,
 )
-from probe.simulate.written import part_mesh, written_triangles
 from probe.surface.face import FaceSurface
 from probe.surface.indenters import FlatPlate, RaisedStrip
-from probe.surface.mesh import mesh
 from probe.surface.polygon import polygon
 
 SENSOR = SensorType()
 HERE = Touch(x_mm=0.3, y_mm=0.2, theta_rad=0.4, force_n=60.0)
-STRIP = RaisedStrip(6.0)
 GAIN_S, BREAK_N, LEAK_S = 1e-4, 0.01, 5e-8  # of the film, as the datasheet of the thesis has it
 
 
@@ -47,12 +39,6 @@ def counts_of(level, surface=None, touch=HERE, seed=3):
 def film_s(forces_n):
     """Conductance of a sound film of exponent 1."""
     return LEAK_S + GAIN_S * np.maximum(np.asarray(forces_n) - BREAK_N, 0.0)
-
-
-def assert_read(counts, share, load_ohm=22.0):
-    """Check counts against the shares (rows, columns) of the supply that are read."""
-    expected = np.clip(8 + 1023 * 150 / (1023 * load_ohm * GAIN_S) * share, 0, 1023)
-    assert np.abs(counts - expected).max() <= 0.5 + 1e-6
 
 
 def brute_force(g, floating, load_ohm):
@@ -84,29 +70,25 @@ def test_column_under_load_is_that_of_kirchhoff(loose):
     )
 
 
+STAR = [(r * math.cos(a / 10 * math.pi), r * math.sin(a / 10 * math.pi))
+        for a, r in zip(range(20), [4.0, 10.0] * 10, strict=True)]  # fmt: skip
+ONES, APART = np.ones((5, 4)), np.ones((3, 3)) * [[1], [0], [1]]
+
+
 @pytest.mark.parametrize(
-    ("floating", "load_ohm"), [(np.zeros(4, bool), 220.0), (np.zeros(5, bool), 0.0)]
-)
-def test_column_under_load_refuses_what_is_no_network(floating, load_ohm):
-    with pytest.raises(CircuitError, match="floating rows"):
-        loaded_columns(np.ones((5, 4)), floating, load_ohm)
-
-
-def test_node_that_is_joined_to_nothing_is_refused():
-    g = np.ones((3, 3))
-    g[1] = 0
-    with pytest.raises(CircuitError, match="joined to nothing"):
-        loaded_columns(g, np.ones(3, bool), 220.0)
-
-
-def test_levels_of_one_fault_are_typical_or_sound_but_for_that():
-    for name, level in LEVELS.items():
-        assert level.name == name
-        if name in ("low", "typical", "hard", "mismatch", "sound"):
-            continue
-        base = SOUND if name in ("places-08", "bleed-2") else TYPICAL
-        differ = {k for k, v in asdict(level).items() if v != asdict(base)[k]} - {"name"}
-        assert len(differ) == 1, name
+    ("call", "match"),
+    [
+        (lambda: loaded_columns(ONES, np.zeros(4, bool), 220.0), "floating rows"),
+        (lambda: loaded_columns(ONES, np.zeros(5, bool), 0.0), "floating rows"),
+        (lambda: loaded_columns(APART, np.ones(3, bool), 220.0), "joined to nothing"),
+        (lambda: mount(np.zeros((12, 32)), "quarter turn"), "cannot be mounted 'quarter turn'"),
+        (lambda: place_adjacent(polygon([STAR]), OBLONG, np.random.default_rng(1)),
+         "no edge beside which"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused(call, match):
+    with pytest.raises((CircuitError, SurfaceError), match=match):
+        call()
 
 
 @pytest.mark.parametrize("load_ohm", [22.0, 2200.0, 10000.0])
@@ -119,19 +101,6 @@ def test_flat_plate_is_read_as_the_divider_of_a_loaded_column(load_ohm):
     assert np.abs(counts - expected).max() <= 0.5 + 1e-6
 
 
-def test_film_on_its_way_back_reads_higher_where_it_was_pressed_more():
-    touch = replace(HERE, tilt_x_rad=0.02)
-    rocked = replace(touch, force_n=1.4 * 60, tilt_x_rad=-0.02)
-    now, before = (tabs(STRIP, SENSOR, t, Tips()).forces_n for t in (touch, rocked))
-    felt = np.clip(before, now, 1.4 * now)
-    g = film_s(felt)
-    assert_read(counts_of(replace(SOUND, hysteresis=0.4), STRIP, touch), g / (g.sum(0) + 1 / 22))
-    pressed = now > 0.05
-    ratio = felt[pressed] / now[pressed]
-    assert ratio.min() < 1.1
-    assert ratio.max() == pytest.approx(1.4)  # not one factor for all
-
-
 def test_mountings_put_each_tactel_where_they_say():
     image = np.arange(256, dtype=np.uint16).reshape(16, 16)
     of = {
@@ -142,19 +111,9 @@ def test_mountings_put_each_tactel_where_they_say():
         "halves swapped": lambda r, c: (r, (c + 8) % 16),
         "rolled": lambda r, c: (r, (c + 1) % 16),
     }
-    assert set(of) == set(MOUNTINGS)
-    for mounting, place in of.items():
-        found = mount(image, mounting)
-        assert all(found[place(r, c)] == image[r, c] for r in range(16) for c in range(16))
-        level = replace(TYPICAL, mounting=mounting)
-        np.testing.assert_array_equal(
-            counts_of(level, STRIP), mount(counts_of(TYPICAL, STRIP), mounting)
-        )
-
-
-def test_mounting_that_would_change_the_shape_is_refused():
-    with pytest.raises(CircuitError, match="cannot be mounted 'quarter turn'"):
-        mount(np.zeros((12, 32), np.uint16), "quarter turn")
+    for mounting in MOUNTINGS:
+        found, place = mount(image, mounting), of[mounting]
+        assert all(found[place(r, c)] == image[r, c] for r, c in np.ndindex(16, 16))
 
 
 def test_print_is_scaled_from_its_datum():
@@ -168,7 +127,7 @@ OBLONG = polygon([np.array([(0, 0), (40, 0), (40, 30), (0, 30)])])
 TRIANGLE = polygon([np.array([(0, 0), (50, 0), (25, 45)])])
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("first", "second"), [(OBLONG, TRIANGLE), (TRIANGLE, OBLONG)])
 def test_faces_lie_beside_each_other_and_the_sensor_near_both(first, second, seed):
     place, at = place_adjacent(first, second, np.random.default_rng(seed))
@@ -188,26 +147,6 @@ def test_faces_lie_beside_each_other_and_the_sensor_near_both(first, second, see
     beside = second.distance_mm(place.into(at[None]))[0]
     assert beside <= REACH_MM + GAP_MM
     assert abs(place.z_mm) <= STEP_MM
-
-
-def test_two_bodies_are_one():
-    cube = block((0, 0, 0), (10, 10, 10))
-    place = FramePlace(22.0, 0.0, -0.5, math.pi / 2)  # from x = 12 to 22
-    both = AdjacentParts(mesh(cube), mesh(cube), place)
-    solid = both.solid_mm
-    volume = np.einsum("ni,ni->n", solid[:, 0], np.cross(solid[:, 1], solid[:, 2])).sum() / 6
-    assert volume == pytest.approx(2000, rel=1e-5)
-    again = mesh(solid)
-    points = np.random.default_rng(1).uniform(-15, 30, (500, 2))
-    np.testing.assert_allclose(again.heights_mm(points), both.heights_mm(points), atol=1e-4)
-
-
-def test_a_face_without_an_outer_edge_is_refused():
-    ring = np.linspace(0, 2 * math.pi, 20, endpoint=False)
-    radius = np.where(np.arange(20) % 2, 10.0, 4.0)
-    star = polygon([np.column_stack([radius * np.cos(ring), radius * np.sin(ring)])])
-    with pytest.raises(SurfaceError, match="no edge beside which"):
-        place_adjacent(star, OBLONG, np.random.default_rng(1))
 
 
 TURN = 0.4  # of the face's x axis into the array's
@@ -251,28 +190,3 @@ def test_only_what_is_drawn_is_worn() -> None:
     left = some.heights_mm(CENTRES)
     gone = (np.abs(CENTRES[:, None] - some.centres_mm).max(axis=2) < 1e-9).any(axis=1)
     assert left == pytest.approx(np.where(gone, 0.25, 1.25))
-
-
-def binary(triangles, header=b"solid of a lying header"):
-    """Bytes of a binary STL."""
-    body = b"".join(
-        struct.pack("<12fH", 0, 0, 0, *np.asarray(t, float).ravel(), 0) for t in triangles
-    )
-    return header.ljust(80, b" ") + struct.pack("<I", len(triangles)) + body
-
-
-@pytest.mark.parametrize("kind", ["binary", "ascii"])
-def test_files_are_read_exactly(tmp_path, kind):
-    triangles = np.random.default_rng(0).normal(size=(40, 3, 3)).astype(np.float32)
-    file = tmp_path / "part.stl"
-    if kind == "binary":
-        file.write_bytes(binary(triangles))
-    else:
-        rows = ["solid x"]
-        for t in triangles:
-            rows += ["facet normal 0 0 0", " outer loop"]
-            rows += [f"  vertex {x!r} {y!r} {z!r}" for x, y, z in t.astype(float).tolist()]
-            rows += [" endloop", "endfacet"]
-        file.write_text("\n".join([*rows, "endsolid x"]))
-    assert np.array_equal(written_triangles(file), triangles.astype(float))
-    assert part_mesh(file).top_mm == triangles[..., 2].max()
