@@ -38,6 +38,7 @@ def row(number, verdict="right", **changed):
         "answer": {"right": "Cube/F1", "wrong": "Box-2/F2", "rejected": ""}[verdict],
         "error_mm": 0.05 if right else NAN, "error_deg": -0.2 if right else NAN,
         "chi2": 2.0 if right else NAN, "margin": 30.0, "noise": 0.1,
+        "drawn_anew": "",
     }  # fmt: skip
     return plain | changed
 
@@ -85,7 +86,7 @@ def test_counts_confusion_and_worst(columns, tmp_path):
     rows = [row(i) for i in range(6)]
     rows += [
         row(6, "wrong"),
-        row(7, "rejected"),
+        row(7, "rejected", drawn_anew="slipped off | no rest"),
         row(8, object="Box-2", face="F2", answer="Box-2/F2", error_mm=0.4, level="low"),
         foreign(9, "wrong", kind="foreign", surface="dots"),
         row(10, "rejected", object="Box-10", face="F10", enough=False),
@@ -95,7 +96,8 @@ def test_counts_confusion_and_worst(columns, tmp_path):
     totals = found["totals"]
     assert [totals[n] for n in ("touches", "right", "wrong", "rejected")] == [12, 7, 2, 3]
     assert totals["rms_mm"] == pytest.approx(np.sqrt((6 * 0.05**2 + 0.4**2) / 7), rel=1e-5)
-    assert found["enough"]["touches"] == 9
+    assert (found["enough"]["touches"], totals["expected"]["count"]) == (9, 8)
+    assert totals["drawn_anew"] == 2
     objects = found["objects"]
     assert objects["names"] == ["Box-2", "Box-10", "Cube"]  # by number, as are their faces
     assert [line["face"] for line in objects["faces"]] == ["F2", "F9", "F10", "F1"]
