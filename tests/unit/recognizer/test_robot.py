@@ -125,3 +125,10 @@ def test_an_object_that_lies_still_is_not_taken_for_moved():
     number = 400
     alarms = sum(fuse_poses(drawn(rng, 2 + k % 4)).moved for k in range(number))
     assert alarms <= 4  # one of a thousand, .4
+
+
+@pytest.mark.parametrize(("by", "noticed"), [(0.99, False), (1.01, True)])
+def test_a_move_is_noticed_from_one_in_a_thousand_on(by, noticed):
+    step = by * math.sqrt(22.458 * 2 * SPREAD[0, 0])  # chi2 of six freedoms, both poses off
+    poses = [ObjectPose(T, SPREAD) for T in (BASE, moved(BASE, np.array([step, 0, 0, 0, 0, 0])))]
+    assert fuse_poses(poses).moved is noticed
