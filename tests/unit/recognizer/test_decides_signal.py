@@ -171,30 +171,6 @@ def test_a_contact_rises_by_six_deviations_of_a_noisy_type():
     assert contact_counts(SensorType(exponent=0.5)) == pytest.approx(64.0)  # forces are squares
 
 
-def rising(strong):
-    """A hundred readings: a third rise evenly, a third lie close together, ten are strong."""
-    sums = [np.arange(30.0), 50.0 + np.arange(60.0) / 100, np.full(10, strong)]
-    return np.concatenate(sums).reshape(10, 10)
-
-
-def test_the_background_is_no_higher_over_the_lowest_than_a_fifth_of_the_tactels_nearly_is():
-    image = rising(500.0)
-    lowest, fifth = np.quantile(image, [0.05, 0.2])
-    level = lowest + 1.4 * (fifth - lowest)  # the densest, 50, are higher
-    assert signal_of(image).forces[9] == pytest.approx(np.full(10, 500.0 - level))
-
-
-@pytest.mark.parametrize(("over", "even"), [(1.55, True), (1.65, False)])
-def test_where_few_tactels_stand_out_all_of_them_are_pressed(over, even):
-    lowest, middle = np.quantile(rising(500.0), [0.05, 0.5])
-    strong = middle + over * (middle - lowest)
-    for spike in (strong, 9000.0):  # which is no stroke
-        image = rising(strong)
-        image[9, 0] = spike
-        found = signal_of(image).forces[9, 9]
-        assert bool(found == pytest.approx(strong - lowest)) is even
-
-
 def test_the_law_of_a_type_is_taken_off_counts_alone():
     image = six(4.0 * contact_counts(SensorType()))
     rooted = replace(SensorType(), exponent=0.5)
