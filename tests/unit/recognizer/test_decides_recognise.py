@@ -273,8 +273,6 @@ def test_halves_that_may_be_swapped(reads, monkeypatch, columns, rows, given, tr
     assert answer.cause == (None if swapped is None else Cause(EXCHANGED, {"columns": swapped}))
 
 
-    log_likelihood_ratio=40.0, explained=0.95, inliers=16, bits=32.0, contradictions=0
-)
 SQUARE = polygon([np.array([(0, 0), (40, 0), (40, 40), (0, 40)], float)])
 
 
