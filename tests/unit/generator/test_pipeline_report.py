@@ -1,11 +1,10 @@
-"""What is said of an object: rates of its faces, what would help, its size, how to build it."""
+"""What is said of an object: rates of its faces, what would help, how to build it."""
 
 from __future__ import annotations
 
 import re
 import zipfile
 
-import numpy as np
 import pytest
 
 from generator.command.made_report import next_step, rate_lines
@@ -13,7 +12,6 @@ from generator.errors import PrintError
 from generator.layout.recognition_rate import LOW
 from generator.pipeline import encode
 from generator.pipeline.faces import face_reports, whole_rate
-from generator.pipeline.files import outer_size_mm, parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
 from generator.printed.slicer import PlateCost, read_cost
@@ -77,27 +75,6 @@ def test_what_would_help_does_help():
     again = narrow_face(float(face.promise.remedy.split(" mm wide instead of 14")[0]))
     assert again.promise.at_once > LOW - 0.03
     assert again.promise.remedy == ""
-
-
-def test_a_large_cube_promises_more_than_a_small_one_and_names_no_face():
-    shares = []
-    for side in (20, 60, 200):
-        laid = laid_out({"cube": side}, profile="auto")
-        faces = face_reports(*laid)
-        shares.append(faces[0].promise.at_once)
-    assert shares[0] < 0.9 < shares[1] < 0.99 < shares[2] < 1
-    (line,) = rate_lines(faces, whole_rate(*laid, faces))
-    assert line == (
-        "  of touches anywhere on the part over 99 % are answered at once, "
-        "over 99 % within three; 100 % of its surface is encoded"
-    )
-
-
-def test_a_can_is_as_wide_as_it_is_round():
-    plan, layout = laid_out({"cylinder": {"diameter": 60, "height": 80}}, symbols={"pitch": 14})
-    assert np.ptp(plan.polyhedron.vertices, axis=0)[0] < 59.99  # as its facets are
-    size = outer_size_mm(plan.polyhedron, parts_of(plan, layout)[0])
-    assert size == pytest.approx([60, 60, 80], abs=1e-9)
 
 
 def test_what_a_slicer_reckons():

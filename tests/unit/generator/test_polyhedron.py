@@ -25,6 +25,7 @@ from generator.polyhedron import (
 )
 from generator.polyhedron.flatten import flatten_faces
 from generator.polyhedron.front import covered_parts
+from generator.polyhedron.shapes import cone, cylinder
 from generator.polyhedron.winged import winged_edges
 
 R2, R3, R5 = math.sqrt(2), math.sqrt(3), math.sqrt(5)
@@ -78,9 +79,11 @@ def test_refused_lengths_say_what_is_allowed():
         ("box", {"size": [2, 80, 1000]}, "more than 200 times", "set x to 5 mm or more"),
         ("prism", {"sides": 6.0, "side": 40, "height": 60}, "3 to 64 sides", "whole number"),
         ("prism", {"sides": 6, "height": 60}, "neither side nor radius", "one of the two"),
+        ("cone", {"diameter": 60, "height": 60, "top_diameter": 60}, "is not less than", ""),
+        ("cylinder", {"diameter": 0.5, "height": 60}, "allowed are 1 to 5000", ""),
     ):
         with pytest.raises(ShapeError, match=says) as caught:
-            SHAPES[name](**arguments)
+            (SHAPES | {"cone": cone, "cylinder": cylinder})[name](**arguments)
         assert fix in caught.value.fix
 
 

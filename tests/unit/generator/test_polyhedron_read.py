@@ -43,7 +43,8 @@ def written(tmp_path):
 
 def binary_stl(triangles):
     records = [struct.pack("<12fH", 0, 0, 0, *np.ravel(t), 0) for t in triangles]
-    return bytes(80) + struct.pack("<I", len(records)) + b"".join(records)
+    head = b"solid of another program".ljust(80)
+    return head + struct.pack("<I", len(records)) + b"".join(records)
 
 
 def fan(polygon):

@@ -136,18 +136,6 @@ def block(T, *, bow_mm=0.0, **options):
     )
 
 
-def test_a_face_that_looks_up_in_its_own_frame():
-    quarter = np.array([[0.0, -1, 0, 4], [1, 0, 0, 0], [0, 0, 1, 0.6], [0, 0, 0, 1]])
-    surface = block(quarter)  # origin at the corner (4, 0), x along the part's y
-    assert surface.top_mm == pytest.approx(0.0, abs=1e-6)
-    points = np.array([[0.65, 2.0], [0.85, 2.0], [0.65, 0.05], [3.0, 2.0], [0.65, -3.0]])
-    found = surface.heights_mm(points)
-    assert found[0] == pytest.approx(0.0, abs=1e-6)
-    assert -0.1 < found[1] < -0.01  # the groove between two beads
-    assert found[2] == pytest.approx(-0.1 + math.sqrt(0.0075), abs=1e-3)  # a round end
-    assert np.isneginf(found[3:]).all()
-
-
 def test_an_upright_face_has_a_step_for_each_layer():
     front = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # y = 0
     surface = block(front)

@@ -99,10 +99,8 @@ def test_coordinates_of_every_kind(text):
 def test_filament_and_volumes():
     moves = "M83\nG1 X10 Z.2 E.5"
     assert toolpath_of(moves).volume_mm3[0] == pytest.approx(0.5 * FILAMENT)
-    thick = 0.5 * math.pi * 2.85**2 / 4
-    assert toolpath_of(moves + "\n; filament_diameter = 2.85,1.75").volume_mm3[0] == pytest.approx(
-        thick
-    )
+    thick = toolpath_of(moves + "\n; filament_diameter = 2.85,1.75")
+    assert thick.volume_mm3[0] == pytest.approx(0.5 * math.pi * 2.85**2 / 4)
     for volumetric in ("M200 D1.75\n", ";FLAVOR:Marlin(Volumetric)\n"):
         assert toolpath_of(volumetric + moves).volume_mm3[0] == pytest.approx(0.5)
 

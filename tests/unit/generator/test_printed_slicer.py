@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import stat
-import struct
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
+import trimesh
 
 from generator.errors import PrintError
 from generator.printed import slicer
@@ -18,20 +15,11 @@ from generator.printed.slicer import (
     print_profile,
     profile_of_printer,
     settings_of,
+    slice_part,
 )
 from generator.printers import known_printers, printer_named
 
-BOX = ((0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5),
-       (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7))  # fmt: skip
-
-
-def box_stl(path, size: tuple[float, float, float]) -> Path:
-    """Write a box centred on x and y, standing on z = 0."""
-    x, y, z = np.array(size) * [0.5, 0.5, 1]
-    corners = np.array([(a, b, c) for c in (0, z) for a, b in ((-x, -y), (x, -y), (x, y), (-x, y))])
-    facets = b"".join(struct.pack("<12fH", 0, 0, 0, *corners[list(t)].ravel(), 0) for t in BOX)
-    path.write_bytes(b" " * 80 + struct.pack("<I", len(BOX)) + facets)
-    return path
+FINE, COARSE = PROFILES["fdm-0.4-0.2"], PROFILES["fdm-0.4-0.3"]
 
 
 def test_every_profile_lays_the_layers_that_its_name_says():
@@ -88,35 +76,31 @@ def test_each_printer_of_specs_has_a_profile_or_says_why_not():
         profile_of_printer(replace(finer, nozzle_mm=1.0))
 
 
-def test_the_box_of_a_part(tmp_path):
-    low, high = slicer.stl_box(box_stl(tmp_path / "b.stl", (4, 3, 2)))
-    assert (*low, *high) == (-2, -1.5, 0, 2, 1.5, 2)
-    (tmp_path / "a.stl").write_text("solid ascii\nendsolid\n")
-    with pytest.raises(PrintError, match="not a binary STL"):
-        slicer.stl_box(tmp_path / "a.stl")
-    with pytest.raises(PrintError, match="cannot read"):
-        slicer.stl_box(tmp_path / "none.stl")
+@pytest.fixture
+def part(tmp_path):
+    """A box of 4 x 3 x 1 mm, centred on x and y, standing on z = 0."""
+    trimesh.creation.box((4, 3, 1)).apply_translation((0, 0, 0.5)).export(tmp_path / "b.stl")
+    return tmp_path / "b.stl"
 
 
 @pytest.fixture
-def program(tmp_path, monkeypatch) -> Path:
-    """A program in the slicer's place; its script is written by the test."""
-    monkeypatch.setattr(slicer, "find_slicer", lambda: str(tmp_path / "slicer"))
+def program(tmp_path, monkeypatch):
+    """Return a function that puts a script in the slicer's place, or one that gives G-code."""
+    path = tmp_path / "slicer"
+    monkeypatch.setattr(slicer, "find_slicer", lambda: str(path))
     monkeypatch.setattr(slicer, "_repeatable_command", tuple)
     monkeypatch.setattr(slicer, "slicer_version", lambda: "test")
-    return tmp_path / "slicer"
+
+    def write(script="", gcode=""):
+        (tmp_path / "part.gcode").write_text(gcode)
+        copy = f'while [ "$1" != -o ]; do shift; done; cp {tmp_path}/part.gcode "$2"\n'
+        path.write_text("#!/bin/sh\n" + (script or copy))
+        path.chmod(0o755)
+
+    return write
 
 
-#: Gives a file as the one that is asked for.
-COPY = 'while [ "$1" != -o ]; do shift; done; cp {} "$2"\n'
-
-
-def write_program(path, script):
-    path.write_text("#!/bin/sh\n" + script)
-    path.chmod(path.stat().st_mode | stat.S_IXUSR)
-
-
-def wall(x, y, size: tuple[float, float] = (4, 3), layers: int = 5) -> str:
+def wall(x, y, size=(4, 3), layers=5):
     """G-code of a hollow box with walls of .45 mm, its outside about (x, y)."""
     lines = ["M83"]
     a, b = size[0] / 2 - 0.225, size[1] / 2 - 0.225
@@ -127,36 +111,37 @@ def wall(x, y, size: tuple[float, float] = (4, 3), layers: int = 5) -> str:
     return "\n".join(lines)
 
 
-def test_the_part_lies_in_the_gcode_where_it_is_said_to_lie(program, tmp_path):
-    text = tmp_path / "fine.gcode"
-    text.write_text(wall(50, 50))
-    write_program(program, COPY.format(text))
-    part = box_stl(tmp_path / "b.stl", (4, 3, 1))
-    sliced = slicer.slice_part(part, PROFILES["fdm-0.4-0.2"], cache=tmp_path / "kept")
+def test_the_part_lies_in_the_gcode_where_it_is_said_to_lie(program, part, tmp_path):
+    program(gcode=wall(50, 50))
+    sliced = slice_part(part, FINE, cache=tmp_path / "kept")
     assert sliced.T_part_gcode[:3, 3] == pytest.approx([-50, -50, 0])
-    # The second time nothing is sliced.
-    write_program(program, "exit 1\n")
-    again = slicer.slice_part(part, PROFILES["fdm-0.4-0.2"], cache=tmp_path / "kept")
+    assert (*sliced.low_mm, *sliced.high_mm) == (-2, -1.5, 0, 2, 1.5, 1)
+    program("exit 1\n")  # the second time nothing is sliced
+    again = slice_part(part, FINE, cache=tmp_path / "kept")
     assert (again.toolpath.end_mm == sliced.toolpath.end_mm).all()
     with pytest.raises(PrintError, match="refuses"):
-        slicer.slice_part(part, PROFILES["fdm-0.4-0.3"], cache=tmp_path / "kept")
+        slice_part(part, COARSE, cache=tmp_path / "kept")
 
 
 @pytest.mark.parametrize(
     "text", [wall(51, 50), wall(50, 50, (3, 4)), wall(50, 50, (4.8, 3.6)), wall(50, 50, layers=3)]
 )
-def test_plastic_that_is_not_where_the_part_is(program, tmp_path, text):
-    (tmp_path / "wrong.gcode").write_text(text)
-    write_program(program, COPY.format(tmp_path / "wrong.gcode"))
+def test_plastic_that_is_not_where_the_part_is(program, part, text):
+    program(gcode=text)
     with pytest.raises(PrintError, match="beyond or short of the part"):
-        slicer.slice_part(box_stl(tmp_path / "b.stl", (4, 3, 1)), PROFILES["fdm-0.4-0.2"])
+        slice_part(part, FINE)
 
 
-def test_a_slicer_that_refuses_is_quoted(program, tmp_path):
-    part = box_stl(tmp_path / "b.stl", (4, 3, 1))
-    write_program(program, "echo 'the part is too large' >&2; exit 3\n")
-    with pytest.raises(PrintError, match="refuses: the part is too large"):
-        slicer.slice_part(part, PROFILES["fdm-0.4-0.2"])
-    write_program(program, "exit 0\n")  # says nothing and writes nothing
-    with pytest.raises(PrintError, match="refuses: exit code 0"):
-        slicer.slice_part(part, PROFILES["fdm-0.4-0.2"])
+def test_a_slicer_that_refuses_is_quoted_and_files_that_are_no_part(program, part):
+    for script, said in (
+        ("echo 'the part is too large' >&2; exit 3\n", "refuses: the part is too large"),
+        ("exit 0\n", "refuses: exit code 0"),  # says nothing and writes nothing
+    ):
+        program(script)
+        with pytest.raises(PrintError, match=said):
+            slice_part(part, FINE)
+    part.write_text("solid ascii\nendsolid\n")
+    with pytest.raises(PrintError, match="not a binary STL"):
+        slice_part(part, FINE)
+    with pytest.raises(PrintError, match="cannot read"):
+        slice_part(part.with_name("none.stl"), FINE)

@@ -1,7 +1,6 @@
 """Panels that fit: no overlap and the gap wherever they meet, and symbols that stay whole."""
 
 import itertools
-import math
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from generator.pipeline.files import parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
 from generator.plane.polygon import distance
-from generator.polyhedron.shapes import cube, dodecahedron
+from generator.polyhedron.shapes import dodecahedron
 from generator.polyhedron.winged import polyhedron
 from generator.printers import PRINTERS
 from generator.solid import plain_panels, prove_closed, triangles, volume
@@ -111,32 +110,16 @@ def test_symbols_stand_on_what_the_cuts_leave(gap):
     assert measured(parts)[0] == 0.0
 
 
-def plain_part(solid):
-    facets = tuple(Facet(face.name, face.loops) for face in solid.faces)
-    return Part("solid", solid.vertices, facets, (), np.eye(4))
-
-
-def test_a_cube_loses_a_corner():
-    body = plain_part(cube(1.0))
-    normal = np.ones(3) / math.sqrt(3)
-    offset = float(normal @ (0.5, 0.5, 0.5))
-    (piece,) = beyond(body, normal, offset)
-    assert piece.sum() == 1
-    cut = cut_off(body, normal, offset, piece, "lid")
-    assert cut is not None
-    assert body_volume(cut) == pytest.approx(1 - 0.5**3 / 6)
-    assert [len(facet.loops[0]) for facet in cut.facets if facet.name == "lid"] == [3]
-    assert len(cut.vertices) == 10
-    assert cut_off(body, normal, -1.0, np.ones(8, dtype=bool), "lid") is None
-
-
 def test_a_piece_of_a_fork_is_cut_alone():
-    body = plain_part(extruded([FORK], 2.0))
+    solid = extruded([FORK], 2.0)
+    facets = tuple(Facet(face.name, face.loops) for face in solid.faces)
+    body = Part("solid", solid.vertices, facets, (), np.eye(4))
     up, down = np.array([0.0, 1.0, 0.0]), np.array([0.0, -1.0, 0.0])
     pieces = beyond(body, up, 5.0)
     assert [int(piece.sum()) for piece in pieces] == [4, 4]
     cut = cut_off(body, up, 5.0, pieces[0], "lid")
     assert body_volume(body) - body_volume(cut) == pytest.approx(3 * 4 * 2)
+    assert [len(facet.loops[0]) for facet in cut.facets if facet.name == "lid"] == [4]
     # Along the arms the fork would fall in two.
     (handle,) = beyond(body, down, -2.0)
     assert cut_off(body, down, -2.0, handle, "lid") is not None

@@ -62,18 +62,17 @@ def test_marks_of_keys_and_values():
     assert tree.value_mark(("a",)).source.lines == ("a: 1", "b:", "  - {c: 2}", "")
 
 
-def test_glyphs_of_a_file_are_those_of_the_spec(tmp_path):
+def test_glyphs_of_a_file_are_those_of_the_spec():
     glyphs = "[[[[-1, 1], [-1, -1], [1, -1]]], [[[0, 1], [0, 0], [-1, -1]]]]"
     letters = f"{{name: mine, reach: 0.28, glyphs: {glyphs}}}"
-    (tmp_path / "letters.yaml").write_text(letters)
+    Path("letters.yaml").write_text(letters)
     two = CUBE + "profile: thesis\nsymbols: {alphabet: "
-    written, filed = (spec(f"{two}{one}}}") for one in (letters, tmp_path / "letters.yaml"))
+    written, filed = (spec(f"{two}{one}}}") for one in (letters, "letters.yaml"))
     assert written == filed
     assert written.meaning["alphabet"] == written.alphabet.definition()
     assert written.alphabet.glyphs[1].strokes == (((0, 1), (0, 0)), ((0, 0), (-1, -1)))
     ships = ALPHABETS["thesis-2"].definition()
-    glyphs = [glyph["strokes"] for glyph in ships["glyphs"]]
-    again = {**ships, "glyphs": glyphs}  # the letters that ship, given once more
+    again = {**ships, "glyphs": [glyph["strokes"] for glyph in ships["glyphs"]]}
     assert spec(f"{two}{again}}}".replace("'", "")).meaning == spec(f"{two}thesis-2}}").meaning
 
 

@@ -89,6 +89,7 @@ def test_a_solid_that_would_hang_over_or_fall_is_turned():
     assert not stance_on(leaning, stance(leaning).face, SINE).height_mm > 70
 
 
+CUBE, TAG = {"cube": 40}, {"tag": [40, 40]}
 ROD = {"cylinder": {"diameter": 50, "height": 30}}
 
 
@@ -130,30 +131,27 @@ def test_saying_what_holds_already_means_the_same_object(tmp_path):
 @pytest.mark.parametrize(
     ("shape", "settings", "cause"),
     [
-        ({"cube": 40}, {"print": {"blank": ["F7"]}}, "the object has no face F7"),
-        ({"cube": 40}, {"print": {"blank": "top"}}, "'top' is no name of a face"),
-        ({"cube": 40}, {"print": {**WHOLE, "down": "F9"}}, "the object has no face F9"),
-        ({"cube": 40}, {"print": {"down": "F1"}}, "every panel lies on its back"),
-        ({"cube": 40}, {"print": {"blank": "F1,F2,F3,F4,F5,F6"}}, "all faces are blank"),
+        (CUBE, {"print": {"blank": ["F7"]}}, "the object has no face F7"),
+        (CUBE, {"print": {"blank": "top"}}, "'top' is no name of a face"),
+        (CUBE, {"print": {**WHOLE, "down": "F9"}}, "the object has no face F9"),
+        (CUBE, {"print": {"down": "F1"}}, "every panel lies on its back"),
+        (CUBE, {"print": {"blank": "F1,F2,F3,F4,F5,F6"}}, "all faces are blank"),
         (ROD, {"print": {"down": "F2"}}, "cannot stand"),
-        ({"cube": 40}, {"print": {**WHOLE, "blank": "F2,F3,F4,F5,F6", "down": "F1"}}, "only F1"),
-        ({"tag": [40, 40]}, {"print": {"parts": "panels"}}, "a tag is printed in one piece"),
+        (CUBE, {"print": {**WHOLE, "blank": "F2,F3,F4,F5,F6", "down": "F1"}}, "only F1"),
+        (TAG, {"print": {"parts": "panels"}}, "a tag is printed in one piece"),
         ({"tag": [40]}, {}, "a tag has two sides, not 1"),
-        ({"tag": [40, 40]}, {"mount": {"screws": "M3", "rod": 6}}, "held in one way"),
-        ({"tag": [40, 40]}, {"mount": {"screws": "M7"}}, "'M7' is no screw known here"),
-        ({"tag": [40, 40]}, {"mount": "ISO 9409-1-51-4-M6"}, "is no flange known here"),
-        ({"tag": [40, 40]}, {"mount": "50-4-M6"}, "the mount does not fit face F2"),
-        (
-            {"tag": {"size": [40, 40], "thickness": 3}},
-            {"mount": {"screws": "M6"}},
-            "too thin to sink the head of M6",
-        ),
-        ({"tag": [40, 40]}, {"mount": {"rod": 6}}, "needs 11.5 mm behind face F2"),
-        ({"cube": 40}, {"mount": {"screws": "M3"}, "print": {"parts": "panels"}}, "with a mount"),
+        (TAG, {"mount": {"screws": "M3", "rod": 6}}, "held in one way"),
+        (TAG, {"mount": {"screws": "M7"}}, "'M7' is no screw known here"),
+        (TAG, {"mount": "ISO 9409-1-51-4-M6"}, "is no flange known here"),
+        (TAG, {"mount": "50-4-M6"}, "the mount does not fit face F2"),
+        ({"tag": {"size": [40, 40], "thickness": 3}}, {"mount": {"screws": "M6"}},
+         "too thin to sink the head of M6"),
+        (TAG, {"mount": {"rod": 6}}, "needs 11.5 mm behind face F2"),
+        (CUBE, {"mount": {"screws": "M3"}, "print": {"parts": "panels"}}, "with a mount"),
         (ROD, {"mount": {"rod": 6, "face": "F2"}}, "flat"),
         ({"pyramid": {"side": 60, "height": 50}}, {"mount": {"hole": "M8"}}, "one parallel face"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_is_refused_with_a_way_out(tmp_path, shape, settings, cause):
     with pytest.raises(SpecError) as refused:
         made(tmp_path, shape, **settings)
@@ -204,9 +202,9 @@ def test_screws_of_a_flange_are_on_its_circle_and_the_pin_midway():
         assert wide == pytest.approx(SCREWS[thread].clear_mm / 2)
 
 
-@pytest.mark.parametrize("size", [[40, 40], {"size": "40 x 40 mm", "frame": 10}])
-def test_symbols_keep_clear_of_holes_and_files_read_back(tmp_path, size):
-    made(tmp_path, {"tag": size}, mount={"screws": "M3"}, formats=("step", "stl"), verify=True)
+def test_symbols_keep_clear_of_holes_and_files_read_back(tmp_path):
+    shape = {"tag": {"size": "40 x 40 mm", "frame": 10}}
+    made(tmp_path, shape, mount={"screws": "M3"}, formats=("step", "stl"), verify=True)
     assert (tmp_path / "out/Part.step").read_text().count("CYLINDRICAL_SURFACE") == 4
     known = registered(tmp_path)
     assert bearing(tmp_path) == {"F1"}
