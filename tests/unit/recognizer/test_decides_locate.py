@@ -129,6 +129,23 @@ def test_where_no_window_is_whole_three_cells_are_tried_in_turn_as_registered_on
         assert one.score == pytest.approx(by_hand(lab, fit, (one.row, one.column, one.face)))
 
 
+@pytest.mark.parametrize(
+    ("pairs", "single", "count"), [(2, 509, 1024), (1, 511, 1), (0, 600, 1200)]
+)
+def test_of_more_than_1024_candidates_those_count_that_two_windows_agree_on_if_any(
+    small, pairs, single, count
+):
+    # each zero alone is two candidates, each pair three, of which one has both
+    zeros = {10 * n for n in range(single)}
+    zeros |= {10_000 + 10 * n + far for n in range(pairs) for far in (0, 2)}
+    held = {(0, c): (0, int(c not in zeros)) for c in range(20_000)}
+    lab = small.Lab(held, rows=1, columns=20_000)
+    fit = small.fit_of([(0, 0), (2, 0)], [[0.0, -30, -30, -30, -30]] * 2)
+    found = find_hypotheses(lab.embossed, (fit,), ALL)
+    assert len(found) == count
+    assert sum(one.score == 0.0 for one in found) == pairs
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_rivals_are_sought_from_two_cells_that_the_best_place_holds(small, seed):
     lab = small.two_faces()
