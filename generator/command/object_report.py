@@ -389,7 +389,7 @@ def _chance_text(use: PitchUse) -> str:
     at = f"{use.pitch_mm:g} mm pitch, {use.order} symbols:"
     if use.touches > 1:
         return f"{at} read by a scan of about {use.touches} touches"
-    once = f"once in {_round_text(1 / use.chance)} touches"
+    once = f"once in {_round_text(1 / use.chance)} touches" if use.chance else "never"
     text = (
         f"{at} a touch shows about {use.symbols:.0f} symbols, so a part that is not registered "
         f"here matches one of the {use.places:,} places by chance {once}"

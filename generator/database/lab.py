@@ -21,7 +21,7 @@ from sqlalchemy import Connection, func, select
 from generator.array import PROFILES, FoldedArray, ProductArray, Profile, array_from
 from generator.array.contract import symbols_seen, touches_needed
 from generator.array.lab_key import read_lab_key
-from generator.database.read import read_array
+from generator.database.read import check_pitch, read_array
 from generator.database.registered import RegisteredArray
 from generator.database.tables import arrays, cells, meta, objects
 from generator.database.transaction import of_rows, place_of
@@ -105,7 +105,7 @@ class PitchUse:
     @property
     def most_places(self) -> int:
         """Registered places up to which a single touch is enough."""
-        return int(_CHANCE * self.order**self.symbols)
+        return int(_CHANCE * self.order ** min(self.symbols, 100.0))  # a larger float overflows
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +148,7 @@ def read_fullness(connection: Connection) -> Fullness:
     largest: dict[tuple[float, int], int] = {}
     known: dict[int, RegisteredArray] = {}
     for array_id, pitch, count in connection.execute(held):
+        check_pitch(pitch)
         array = known.setdefault(array_id, read_array(connection, array_id))
         taken[array_id] = taken.get(array_id, 0) + count
         kind = pitch, array.order

@@ -38,7 +38,7 @@ from generator.polyhedron.frame import face_frame, face_polygon
 from generator.polyhedron.winged import Developable, Face, Polyhedron, WingedEdge, developable_from
 
 MOST_SYMBOLS = 127  #: of an array; readers keep labels in 8 bits
-_MOST_MM = 10_000.0  #: no symbol is larger than the largest model
+_PITCHES_MM = (0.1, 10_000.0)  #: no symbol is finer than a resin's beam, or larger than a model
 
 
 @of_rows
@@ -251,10 +251,17 @@ def read_styles(connection: Connection) -> tuple[RegisteredStyle, ...]:
 
 def _style(*lengths: float) -> SymbolStyle:
     style = SymbolStyle(*lengths)
-    sizes, steep = (style.pitch_mm, style.stroke_mm), abs(style.draft_rad) >= math.pi / 2
-    if min(sizes) <= 0 or max(map(abs, lengths)) > _MOST_MM or steep:
+    check_pitch(style.pitch_mm)
+    steep = abs(style.draft_rad) >= math.pi / 2
+    if style.stroke_mm <= 0 or max(map(abs, lengths)) > _PITCHES_MM[1] or steep:
         raise DamagedValueError(f"symbols of {style}")
     return style
+
+
+def check_pitch(pitch_mm: float) -> None:
+    """Refuse a stored pitch that no symbols have."""
+    if not _PITCHES_MM[0] <= pitch_mm <= _PITCHES_MM[1]:
+        raise DamagedValueError(f"a pitch of {pitch_mm:g} mm")
 
 
 @of_rows

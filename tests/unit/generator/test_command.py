@@ -149,8 +149,13 @@ def test_a_database_is_the_file_that_is_named(name, tmp_path, capsys):
 def test_an_object_of_a_pitch_that_no_face_bears_is_called_damaged(cube, capsys):
     with closing(sqlite3.connect("lab.db")) as base, base:
         base.execute("update objects set pitch_mm = 1e-9")
-    assert run(["show", "Cube"]) == 4
-    assert "never written" in capsys.readouterr().err
+    for command in (["show", "Cube"], ["list"]):
+        assert run(command) == 4
+        assert "what was never written: a pitch of 1e-09 mm" in capsys.readouterr().err
+    with closing(sqlite3.connect("lab.db")) as base, base:
+        base.execute("update objects set pitch_mm = 1")
+    assert run(["list"]) == 0
+    assert "places by chance never" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(("answer", "left"), [("n", 1), ("y", 0)])
