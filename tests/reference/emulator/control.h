@@ -5,10 +5,8 @@
  *   garbage N      put N random bytes into the line, at once (at most 4096)
  *   unplug S       take the port and the power away, give both back after S seconds
  *   reset          reset the processor
- *   tau US         time constant of the multiplexers, microseconds
- *   noise MV       deviation of the noise at the ADC, millivolts
- *   statistics     answers with one JSON object
- *   quit           end; so does the end of the input
+ *
+ * The end of the input ends the host.
  */
 #ifndef CONTROL_H
 #define CONTROL_H
@@ -19,13 +17,12 @@ typedef struct {
     bool quit;
     bool reset;
     double unplug_s; /* > 0: unplug for so long */
-    bool statistics; /* to be answered by whoever has the figures */
 } wishes_t;
 
 /* Read what has come, obey or note it in `wishes`; returns at once. */
 void control_read(wishes_t *wishes);
 
 /* Answer with a line. */
-void control_answer(const char *format, ...) __attribute__((format(printf, 1, 2)));
+void control_answer(const char *said);
 
 #endif

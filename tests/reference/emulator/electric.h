@@ -42,7 +42,7 @@ const wiring_t *electric_wiring(const char *board);
 
 /* `trace`, if not 0, gets a line for every switch and every conversion. */
 void electric_connect(avr_t *avr, const wiring_t *wiring, readout_t readout, images_t *images,
-                      uint64_t seed, FILE *trace);
+                      FILE *trace);
 
 /* To be called before the processor is reset. */
 void electric_reset(void);

@@ -24,8 +24,6 @@
 #define U2X0 1 /* bits */
 #define RXEN0 4
 
-line_counts_t line_counts;
-
 static avr_t *avr;
 static avr_uart_t *uart;
 static avr_irq_t *input;
@@ -45,11 +43,8 @@ static bool stopped; /* the processor's receiver is full */
 
 static void keep(uint8_t byte)
 {
-    if (kept == MEMORY) {
-        line_counts.overrun++;
-        return;
-    }
-    memory[kept++] = byte;
+    if (kept < MEMORY)
+        memory[kept++] = byte;
 }
 
 static void processor_sends(avr_irq_t *irq, uint32_t value, void *parameter)
@@ -58,23 +53,12 @@ static void processor_sends(avr_irq_t *irq, uint32_t value, void *parameter)
 
     (void)irq;
     (void)parameter;
-    line_counts.sent++;
-    if (!heard) {
-        line_counts.unheard++;
+    if (!heard || (drops > 0 && chance_uniform(&chance) < drops))
         return;
-    }
-    if (drops > 0 && chance_uniform(&chance) < drops) {
-        line_counts.dropped++;
-        return;
-    }
-    if (flips > 0 && chance_uniform(&chance) < flips) {
+    if (flips > 0 && chance_uniform(&chance) < flips)
         byte ^= (uint8_t)(1u << (chance_bits(&chance) >> 61));
-        line_counts.flipped++;
-    }
-    if (wrong_speed) {
+    if (wrong_speed)
         byte ^= (uint8_t)(chance_bits(&chance) >> 56);
-        line_counts.garbled++;
-    }
     keep(byte);
 }
 
@@ -93,13 +77,13 @@ static void receiver_full(avr_irq_t *irq, uint32_t value, void *parameter)
     stopped = value != 0;
 }
 
-void line_connect(avr_t *processor, const char *link, uint64_t seed)
+void line_connect(avr_t *processor, const char *link)
 {
     uint32_t flags = 0;
 
     avr = processor;
     link_path = link;
-    chance = chance_from(seed);
+    chance = chance_from(1);
     for (avr_io_t *io = avr->io_port; io; io = io->next)
         if (!strcmp(io->kind, "uart") && ((avr_uart_t *)io)->name == '0')
             uart = (avr_uart_t *)io;
@@ -189,8 +173,6 @@ void line_reset(void)
 static void forget(void)
 {
     int slave = open(terminal, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-
-    line_counts.unheard += kept;
     kept = 0;
     if (slave >= 0) {
         tcflush(slave, TCIFLUSH);
@@ -219,7 +201,6 @@ static void deliver(void)
 
     if (written <= 0)
         return;
-    line_counts.delivered += (uint64_t)written;
     kept -= (unsigned)written;
     memmove(memory, memory + written, kept);
 }
@@ -231,10 +212,8 @@ static void fetch(void)
     if (given == taken) {
         given = taken = 0;
         got = read(master, received, sizeof received);
-        if (got > 0) {
+        if (got > 0)
             taken = (unsigned)got;
-            line_counts.received += taken;
-        }
     }
     while (given < taken && !stopped) {
         uint8_t byte = received[given++];
@@ -268,6 +247,6 @@ void line_set_drops(double per_million)
 
 void line_put_garbage(uint32_t bytes)
 {
-    for (; bytes && heard; bytes--, line_counts.garbage++)
+    for (; bytes && heard; bytes--)
         keep((uint8_t)(chance_bits(&chance) >> 56));
 }

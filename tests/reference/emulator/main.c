@@ -1,7 +1,7 @@
 /* Runs the probe's firmware on an emulated AVR, with its circuit, serial line and faults.
  *
  *   emulator --board uno --firmware probe.elf --images FILE --link PATH
- *            [--wiring grounded|floating|virtual] [--load OHM] [--tau US] [--noise MV] [--seed N] [--trace FILE] [--free]
+ *            [--wiring grounded|floating|virtual] [--load OHM] [--tau US] [--noise MV] [--trace FILE] [--free]
  *
  * Says "ready" on standard output, then obeys the lines of control.h. Paced at 16 MHz of real
  * time, with --free as fast as it goes. Ends with its standard input.
@@ -33,7 +33,6 @@ static struct {
     const char *board, *firmware, *images, *link, *trace;
     readout_t readout;
     double tau_us, noise_mv;
-    uint64_t seed;
     bool free;
 } options = {.board = "uno", .readout = {.load_ohm = 2200}, .tau_us = 1};
 
@@ -43,8 +42,6 @@ static avr_t *avr;
 static double origin_s;           /* wall time at which `emulated_s` was 0 */
 static double emulated_s;         /* time of the processor, without the time off power */
 static avr_cycle_count_t counted; /* cycles that are in it */
-static double worst_lag_s, slipped_s;
-static unsigned resets;
 
 static void fail(const char *format, ...)
 {
@@ -91,8 +88,8 @@ static void read_options(int count, char **values)
     static const struct option names[] = {
         {"board", 1, 0, 'b'}, {"firmware", 1, 0, 'f'}, {"images", 1, 0, 'i'},
         {"link", 1, 0, 'l'},  {"trace", 1, 0, 'c'},    {"tau", 1, 0, 't'},
-        {"noise", 1, 0, 'n'}, {"seed", 1, 0, 's'},     {"free", 0, 0, 'r'},
-        {"wiring", 1, 0, 'w'}, {"load", 1, 0, 'o'},
+        {"noise", 1, 0, 'n'}, {"free", 0, 0, 'r'},     {"wiring", 1, 0, 'w'},
+        {"load", 1, 0, 'o'},
         {0, 0, 0, 0}};
     int letter;
 
@@ -105,7 +102,6 @@ static void read_options(int count, char **values)
         case 'c': options.trace = optarg; break;
         case 't': options.tau_us = atof(optarg); break;
         case 'n': options.noise_mv = atof(optarg); break;
-        case 's': options.seed = strtoull(optarg, 0, 0); break;
         case 'r': options.free = true; break;
         case 'o': options.readout.load_ohm = atof(optarg); break;
         case 'w':
@@ -139,7 +135,6 @@ static void reset(void)
         avr_extint_set_strict_lvl_trig(avr, pin, 0);
     counted = avr->cycle;
     line_reset();
-    resets++;
 }
 
 static void make_processor(const wiring_t *wiring)
@@ -173,39 +168,17 @@ static void run_slice(void)
     counted = avr->cycle;
 }
 
-/* Wait for real time, or note how far behind it we are. */
+/* Wait for real time, or give up what is too far behind it. */
 static void keep_pace(void)
 {
     double ahead_s = origin_s + emulated_s - wall_s();
 
     if (options.free)
         return;
-    if (ahead_s > 0) {
+    if (ahead_s > 0)
         pause_s(ahead_s);
-        return;
-    }
-    if (-ahead_s > worst_lag_s)
-        worst_lag_s = -ahead_s;
-    if (-ahead_s > SLIP_S) {
-        slipped_s -= ahead_s;
+    else if (-ahead_s > SLIP_S)
         origin_s -= ahead_s;
-    }
-}
-
-static void answer_statistics(double started_s)
-{
-    const line_counts_t *line = &line_counts;
-
-    control_answer("{\"emulated_s\": %.6f, \"wall_s\": %.6f, \"worst_lag_s\": %.6f, "
-                   "\"slipped_s\": %.6f, \"resets\": %u, \"sent\": %llu, \"delivered\": %llu, "
-                   "\"unheard\": %llu, \"overrun\": %llu, \"dropped\": %llu, \"flipped\": %llu, "
-                   "\"garbage\": %llu, \"garbled\": %llu, \"received\": %llu}",
-                   emulated_s, wall_s() - started_s, worst_lag_s, slipped_s, resets,
-                   (unsigned long long)line->sent, (unsigned long long)line->delivered,
-                   (unsigned long long)line->unheard, (unsigned long long)line->overrun,
-                   (unsigned long long)line->dropped, (unsigned long long)line->flipped,
-                   (unsigned long long)line->garbage, (unsigned long long)line->garbled,
-                   (unsigned long long)line->received);
 }
 
 static void plug(void)
@@ -223,7 +196,7 @@ int main(int count, char **values)
     images_t *images;
     FILE *trace = 0;
     wishes_t wishes = {0};
-    double back_s = 0, started_s = wall_s(); /* back_s: when power comes back; 0: it is there */
+    double back_s = 0; /* when power comes back; 0: it is there */
 
     read_options(count, values);
     if (!(wiring = electric_wiring(options.board)))
@@ -237,10 +210,10 @@ int main(int count, char **values)
     signal(SIGPIPE, SIG_IGN);
 
     make_processor(wiring);
-    electric_connect(avr, wiring, options.readout, images, options.seed, trace);
+    electric_connect(avr, wiring, options.readout, images, trace);
     electric_set_tau(options.tau_us);
     electric_set_noise(options.noise_mv);
-    line_connect(avr, options.link, ~options.seed);
+    line_connect(avr, options.link);
     reset();
     run_slice(); /* lets the firmware set its line rate, which the port takes on */
     plug();
@@ -262,8 +235,6 @@ int main(int count, char **values)
             keep_pace();
         }
         control_read(&wishes);
-        if (wishes.statistics)
-            answer_statistics(started_s);
         if (wishes.unplug_s > 0) {
             line_unplug();
             back_s = wall_s() + wishes.unplug_s;
