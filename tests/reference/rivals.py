@@ -44,22 +44,7 @@ class RivalShares:
 
 
 def rival_shares(array: FoldedArray, sets: Sequence[VisibleSet]) -> RivalShares:
-    """Return how often what is seen whole has a rival elsewhere on a full array.
-
-    Parameters
-    ----------
-    array
-        All of its cells carry symbols.
-    sets
-        Of `visible_sets`.
-
-    Examples
-    --------
-    >>> from generator.array.profiles import profile
-    >>> sets = visible_sets(7.0, (12.7, 12.7), 2.52)
-    >>> round(rival_shares(profile("one-touch").array(), sets).poses[0], 2)
-    0.1
-    """
+    """Return how often what is seen whole has a rival elsewhere on a full array."""
     extent = 1 + np.max([one.cells.max(axis=0, initial=0) for one in sets], axis=0)
     offsets = array.offsets(np.arange(extent[0])[:, None], np.arange(extent[1]))
     cells = array.sequence.coefficients(offsets).reshape(*extent, -1)  # what each shows of a state
