@@ -12,7 +12,7 @@ Ctrl-C. In a test:
 
 Firmware and emulator are built by make on first use, and kept under a name made of sources and
 settings. The emulator (`emulator/`, C on libsimavr) obeys lines on its standard input, the faults
-among them (`emulator/control.h`), and ends with it. Images pass through a mapped file
+among them (`emulator/main.c`), and ends with it. Images pass through a mapped file
 (`emulator/images.h`): it takes an image whole at the beginning of a scan, and notes its number.
 """
 
@@ -115,7 +115,7 @@ class EmulatedProbe:
         return int(self._file["seen"][0, seq % REMEMBERED])
 
     def fault(self, command: str) -> None:
-        """Make a fault, or end it: flip N, drop N, garbage N, unplug S, reset (`control.h`)."""
+        """Make a fault, or end it: flip N, drop N, garbage N, unplug S, reset (`main.c`)."""
         self.process.stdin.write(command.encode() + b"\n")
         assert self._answer() == "ok", command
 

@@ -7,13 +7,12 @@
 #include <poll.h>
 #include <pty.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <termios.h>
 #include <unistd.h>
 
 #include <simavr/avr_uart.h>
-
-#include "chance.h"
 
 #define MEMORY 65536 /* bytes kept for a slow listener, as by a Linux serial driver */
 #define RECEIVED 256
@@ -28,7 +27,6 @@ static avr_t *avr;
 static avr_uart_t *uart;
 static avr_irq_t *input;
 static const char *link_path;
-static chance_t chance;
 static double flips, drops; /* probability for a byte */
 
 static int master = -1;
@@ -53,12 +51,12 @@ static void processor_sends(avr_irq_t *irq, uint32_t value, void *parameter)
 
     (void)irq;
     (void)parameter;
-    if (!heard || (drops > 0 && chance_uniform(&chance) < drops))
+    if (!heard || (drops > 0 && drand48() < drops))
         return;
-    if (flips > 0 && chance_uniform(&chance) < flips)
-        byte ^= (uint8_t)(1u << (chance_bits(&chance) >> 61));
+    if (flips > 0 && drand48() < flips)
+        byte ^= (uint8_t)(1u << (mrand48() & 7));
     if (wrong_speed)
-        byte ^= (uint8_t)(chance_bits(&chance) >> 56);
+        byte ^= (uint8_t)mrand48();
     keep(byte);
 }
 
@@ -83,7 +81,6 @@ void line_connect(avr_t *processor, const char *link)
 
     avr = processor;
     link_path = link;
-    chance = chance_from(1);
     for (avr_io_t *io = avr->io_port; io; io = io->next)
         if (!strcmp(io->kind, "uart") && ((avr_uart_t *)io)->name == '0')
             uart = (avr_uart_t *)io;
@@ -217,7 +214,7 @@ static void fetch(void)
     }
     while (given < taken && !stopped) {
         uint8_t byte = received[given++];
-        avr_raise_irq(input, wrong_speed ? (uint8_t)(chance_bits(&chance) >> 56) : byte);
+        avr_raise_irq(input, wrong_speed ? (uint8_t)mrand48() : byte);
     }
 }
 
@@ -248,5 +245,5 @@ void line_set_drops(double per_million)
 void line_put_garbage(uint32_t bytes)
 {
     for (; bytes && heard; bytes--)
-        keep((uint8_t)(chance_bits(&chance) >> 56));
+        keep((uint8_t)mrand48());
 }

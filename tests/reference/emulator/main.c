@@ -3,10 +3,18 @@
  *   emulator --board uno --firmware probe.elf --images FILE --link PATH
  *            [--wiring grounded|floating|virtual] [--load OHM] [--tau US] [--noise MV] [--trace FILE] [--free]
  *
- * Says "ready" on standard output, then obeys the lines of control.h. Paced at 16 MHz of real
- * time, with --free as fast as it goes. Ends with its standard input.
+ * Says "ready" on standard output, then obeys lines of its input, and ends with it:
+ *
+ *   flip N         damage one bit in N of a million bytes
+ *   drop N         lose N of a million bytes
+ *   garbage N      put N random bytes into the line, at once (at most 4096)
+ *   unplug S       take the port and the power away, give both back after S seconds
+ *   reset          reset the processor
+ *
+ * Paced at 16 MHz of real time, with --free as fast as it goes.
  */
 #include <getopt.h>
+#include <poll.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -14,12 +22,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <simavr/avr_extint.h>
 #include <simavr/sim_avr.h>
 #include <simavr/sim_elf.h>
 
-#include "control.h"
 #include "electric.h"
 #include "images.h"
 #include "line.h"
@@ -32,11 +40,12 @@
 static struct {
     const char *board, *firmware, *images, *link, *trace;
     readout_t readout;
-    double tau_us, noise_mv;
     bool free;
-} options = {.board = "uno", .readout = {.load_ohm = 2200}, .tau_us = 1};
+} options = {.board = "uno", .readout = {.load_ohm = 2200, .tau_us = 1}};
 
 static volatile sig_atomic_t terminated;
+static bool quit, reset_wanted; /* what the input asked for */
+static double unplug_s;
 
 static avr_t *avr;
 static double origin_s;           /* wall time at which `emulated_s` was 0 */
@@ -100,8 +109,8 @@ static void read_options(int count, char **values)
         case 'i': options.images = optarg; break;
         case 'l': options.link = optarg; break;
         case 'c': options.trace = optarg; break;
-        case 't': options.tau_us = atof(optarg); break;
-        case 'n': options.noise_mv = atof(optarg); break;
+        case 't': options.readout.tau_us = atof(optarg); break;
+        case 'n': options.readout.noise_mv = atof(optarg); break;
         case 'r': options.free = true; break;
         case 'o': options.readout.load_ohm = atof(optarg); break;
         case 'w':
@@ -181,6 +190,49 @@ static void keep_pace(void)
         origin_s -= ahead_s;
 }
 
+/* Lines of the input, each obeyed and answered with a line. */
+static void answer(const char *said)
+{
+    puts(said);
+    fflush(stdout);
+}
+
+static void obey(const char *line)
+{
+    char word[16] = "";
+    double value = -1;
+
+    sscanf(line, "%15s %lf", word, &value);
+    if (!strcmp(word, "reset")) {
+        reset_wanted = true;
+    } else if (!strcmp(word, "unplug") && value > 0 && value <= 3600) {
+        unplug_s = value;
+    } else if (!strcmp(word, "flip") && value >= 0 && value <= 1e6) {
+        line_set_flips(value);
+    } else if (!strcmp(word, "drop") && value >= 0 && value <= 1e6) {
+        line_set_drops(value);
+    } else if (!strcmp(word, "garbage") && value >= 0 && value <= 4096) {
+        line_put_garbage((unsigned)value);
+    } else {
+        answer("error: no command with a number in its range");
+        return;
+    }
+    answer("ok");
+}
+
+static void read_commands(void)
+{
+    struct pollfd state = {.fd = STDIN_FILENO, .events = POLLIN};
+    char line[256];
+
+    while (!quit && poll(&state, 1, 0) > 0) { /* who asks waits for the answer */
+        if (fgets(line, sizeof line, stdin))
+            obey(line);
+        else
+            quit = true;
+    }
+}
+
 static void plug(void)
 {
     int error = line_plug();
@@ -195,7 +247,6 @@ int main(int count, char **values)
     const char *why = "";
     images_t *images;
     FILE *trace = 0;
-    wishes_t wishes = {0};
     double back_s = 0; /* when power comes back; 0: it is there */
 
     read_options(count, values);
@@ -211,16 +262,14 @@ int main(int count, char **values)
 
     make_processor(wiring);
     electric_connect(avr, wiring, options.readout, images, trace);
-    electric_set_tau(options.tau_us);
-    electric_set_noise(options.noise_mv);
     line_connect(avr, options.link);
     reset();
     run_slice(); /* lets the firmware set its line rate, which the port takes on */
     plug();
-    control_answer("ready");
+    answer("ready");
 
     origin_s = wall_s() - emulated_s;
-    while (!wishes.quit && !terminated) {
+    while (!quit && !terminated) {
         if (back_s > 0 && wall_s() >= back_s) {
             back_s = 0;
             reset();
@@ -234,14 +283,15 @@ int main(int count, char **values)
             line_carry();
             keep_pace();
         }
-        control_read(&wishes);
-        if (wishes.unplug_s > 0) {
+        read_commands();
+        if (unplug_s > 0) {
             line_unplug();
-            back_s = wall_s() + wishes.unplug_s;
+            back_s = wall_s() + unplug_s;
         }
-        if (wishes.reset && back_s == 0)
+        if (reset_wanted && back_s == 0)
             reset();
-        wishes = (wishes_t){.quit = wishes.quit};
+        reset_wanted = false;
+        unplug_s = 0;
     }
     line_unplug();
     if (trace)
