@@ -5,13 +5,12 @@ Databases of either engine: SQLite files, and a PostgreSQL server of this run's 
 
 import os
 import signal
-import subprocess
-import sys
 import tempfile
 from contextlib import ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
 
+import postgres
 import pytest
 
 for library in ("OMP", "OPENBLAS", "MKL"):
@@ -53,24 +52,13 @@ def ask(capsys):
 @pytest.fixture(scope="session")
 def postgresql_server():
     """URL of a real server; its absence is a failure, so that nothing goes untested."""
-    script = Path(__file__).with_name("postgres.py")
-    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
-    server = subprocess.Popen([sys.executable, script], text=True, **pipes)
-    with server:
-        url = server.stdout.readline().strip()
-        if not url:
-            pytest.fail(server.stderr.read().strip(), pytrace=False)
+    with postgres.running() as url:
         yield url
-        server.stdin.close()
-        server.wait(timeout=60)
 
 
 @pytest.fixture(scope="session")
 def database_on(request):
-    """Return a context manager: engine -> URL of a new, empty database, gone at its end.
-
-    On the server it is a schema of its own, which costs a hundredth of a database.
-    """
+    """Return a context manager: engine -> URL of a new, empty database, gone at its end."""
 
     @contextmanager
     def made(engine):
@@ -80,9 +68,8 @@ def database_on(request):
             return
         server = request.getfixturevalue("postgresql_server")
         name = f"lab{next(NUMBERS)}"
-        _on_server(server, f"CREATE SCHEMA {name}")
-        yield f"{server}?options=-csearch_path%3D{name}"
-        _on_server(server, f"DROP SCHEMA {name} CASCADE")
+        yield postgres.new_schema(server, name)
+        postgres.execute(server, f"DROP SCHEMA {name} CASCADE")
 
     return made
 
@@ -92,13 +79,6 @@ def new_database(database_on):
     """Return a function that names a new, empty database of an engine."""
     with ExitStack() as made:
         yield lambda engine: made.enter_context(database_on(engine))
-
-
-def _on_server(server, statement):
-    import psycopg
-
-    with psycopg.connect(server, autocommit=True) as connection:
-        connection.execute(statement)
 
 
 @pytest.fixture(params=ENGINES)

@@ -19,11 +19,42 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 INSTALLED = Path("/usr/lib/postgresql")
 MISSING = "PostgreSQL's server is not installed: apt-get install postgresql"
 FAST = ("-F", "-c", "full_page_writes=off", "-c", "synchronous_commit=off")
+
+
+@contextmanager
+def running(*options: str) -> Iterator[str]:
+    """Yield the URL of a server of this script's own; its absence is an error."""
+    command = [sys.executable, __file__, *options]
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    with subprocess.Popen(command, text=True, **pipes) as server:
+        try:
+            url = server.stdout.readline().strip()
+            if not url:
+                raise RuntimeError(server.stderr.read().strip())
+            yield url
+        finally:
+            server.stdin.close()
+            server.wait(timeout=60)
+
+
+def execute(server: str, statement: str) -> None:
+    import psycopg
+
+    with psycopg.connect(server, autocommit=True) as connection:
+        connection.execute(statement)
+
+
+def new_schema(server: str, name: str) -> str:
+    """Make an empty schema, which costs a hundredth of a database; return its URL."""
+    execute(server, f"CREATE SCHEMA {name}")
+    return f"{server}?options=-csearch_path%3D{name}"
 
 
 def programs() -> Path:

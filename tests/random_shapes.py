@@ -1,8 +1,8 @@
 """Random solids for tests and verification campaigns, 40 to 120 mm, seeded by the caller.
 
 Convex: hulls of random points, hulls of lattice points (many coplanar), truncated blocks.
-Non-convex: extruded stars, steps and frames, straight or tapered, and blocks with a boss
-or a pocket, whose faces have holes. SciPy is loaded when a hull is made.
+Non-convex: extruded stars, some with a hole, straight or tapered, steps, and blocks with a
+boss or a pocket, whose faces have holes. SciPy is loaded when a hull is made.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def random_convex(rng: np.random.Generator) -> Polyhedron:
 
 def random_nonconvex(rng: np.random.Generator) -> Polyhedron:
     """Return a non-convex polyhedron, of genus 0 or 1, without short edges."""
-    return _first_good(rng, (_star, _steps, _frame, _block_with_boss))
+    return _first_good(rng, (_star, _steps, _block_with_boss))
 
 
 def convex_hull(points: Floats) -> Polyhedron:
@@ -141,17 +141,6 @@ def _steps(rng: np.random.Generator) -> Polyhedron:
         profile += [(x[k], z[k]), (x[k - 1], z[k])]
     profile += [(x[0], z[0]), (0.0, z[0])]
     return extruded([np.array(profile)], rng.uniform(40.0, 80.0), 1.0, _rotation(rng))
-
-
-def _frame(rng: np.random.Generator) -> Polyhedron:
-    """Block with a rectangular or polygonal through hole."""
-    a, b = rng.uniform(40.0, 90.0, size=2)
-    outer = 0.5 * np.array([(-a, -b), (a, -b), (a, b), (-a, b)])
-    count = int(rng.integers(3, 9))
-    angles = rng.uniform(0, 2 * math.pi) - 2 * math.pi * np.arange(count) / count
-    radius = rng.uniform(0.15, 0.4) * min(a, b)
-    hole = radius * np.column_stack([np.cos(angles), np.sin(angles)])
-    return extruded([outer, hole], rng.uniform(40.0, 90.0), rng.uniform(0.7, 1.0), _rotation(rng))
 
 
 def _block_with_boss(rng: np.random.Generator) -> Polyhedron:

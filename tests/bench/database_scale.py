@@ -1,18 +1,14 @@
-"""How a lab's database bears years of objects: placing, registering, looking up, density.
+"""How a lab's database bears years of objects: placing, registering, looking up.
 
-    python tests/bench/database_scale.py [--engine sqlite|postgresql|both] [--fill blocks|placed]
+    python tests/bench/database_scale.py [--engine sqlite|postgresql|both]
                                          [--objects 2 10 167 1000 10000 16667] [--array 4095]
-    python tests/bench/database_scale.py --full [--array 1023] [--size 1.0]
 
-The array is of `large` "and up", the next object a 60 mm cube of 384 symbols. `blocks` fills it
-with such cubes, 8 x 8 cells per face in growing squares, so that the search for a free place must
-look at all of it; `placed` has every object of a mixture find its place by the layout. The same
-objects are registered on each engine, 100 in a transaction. Medians at each number of objects:
-one more cube placed and registered (open, taken cells, layout, rows, commit), wall and CPU time
-of this process; the taken cells alone; object and face of a 3 x 4 window, on an open connection
-and with opening it. `opened`: used cells by those of the corner that placing has opened
-(`torus.board_size`), `array`: by those of the array. `--full` places the mixture, edges `--size`
-times as long, until none of its shapes fits anywhere, without a database.
+The array is of `large` "and up", the next object a 60 mm cube of 384 symbols. Such cubes fill it, 8
+x 8 cells a face in growing squares, so that the search for a free place must look at all of it. The
+same objects are registered on each engine, 100 in a transaction. Medians at each number of objects:
+one more cube placed and registered (open, taken cells, layout, rows, commit), wall and CPU time of
+this process; the taken cells alone; object and face of a 3 x 4 window, on an open connection and
+with opening it.
 """
 
 from __future__ import annotations
@@ -31,15 +27,11 @@ from generator.array.profiles import next_larger, profile
 from generator.database import tables
 from generator.database.cells import faces_at, find_array, occupancy
 from generator.database.open import open_database
-from generator.database.read import list_objects, read_layout
+from generator.database.read import list_objects
 from generator.database.register import ObjectRecord, register, remove
 from generator.database.transaction import read_transaction, retry_on_conflict, write_transaction
-from generator.errors import LayoutError
 from generator.layout.layout import lay_out
-from generator.layout.occupancy import Occupancy
 from generator.layout.placement import FaceLayout, Layout, Placement
-from generator.layout.torus import board_size
-from generator.pipeline.place import occupancy_with
 from generator.polyhedron import shapes
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
@@ -58,14 +50,9 @@ def array_of(rows):
     return known.array()
 
 
-def laid_out(solid, array, taken):
-    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in solid.faces]
-    return lay_out(solid, array, 7.0, 2.7, clearances, taken, allow_blank_faces=True)
-
-
-def registration(name, solid, layout, array):
+def registration(name, layout, array):
     return ObjectRecord(
-        name, solid, layout, array, "large", alphabet_named("dense-4"), STYLE, {"name": name}, "0"
+        name, CUBE, layout, array, "large", alphabet_named("dense-4"), STYLE, {"name": name}, "0"
     )
 
 
@@ -89,47 +76,17 @@ def block_layout(array, where):
     return Layout("faces", 7.0, tuple(faces), (), ())
 
 
-def blocks(array):
-    """Yield solids with layouts that leave no cell between them."""
-    where = spots()
-    while True:
-        yield CUBE, block_layout(array, where)
-
-
-def mixed(array, size=1.0):
-    """Yield solids with the layouts that are found for them, until no shape fits."""
-    taken = Occupancy.from_cells([], [], array)
-    shapes_left = [
-        shapes.cube(60.0 * size),
-        shapes.box([60.0 * size, 40.0 * size, 30.0 * size]),
-        shapes.triangular_prism(60.0 * size, 45.0 * size),
-        shapes.tetrahedron(75.0 * size),
-    ]
-    number = 0
-    while shapes_left:
-        solid = shapes_left[number % len(shapes_left)]
-        try:
-            layout = laid_out(solid, array, taken)
-        except LayoutError:
-            shapes_left.remove(solid)
-            continue
-        taken = occupancy_with(taken, layout)
-        number += 1
-        yield solid, layout
-
-
-def fill(engines, array, objects, have, want):
+def fill(engines, array, where, have, want):
     """Register more objects, the same on each engine; return the seconds of each."""
     spent = [0.0] * len(engines)
     for first in range(have, want, 100):
         numbers = range(first, min(first + 100, want))
-        found = [next(objects) for _ in numbers]
+        found = [block_layout(array, where) for _ in numbers]
         for k, engine in enumerate(engines):
             began = time.perf_counter()
             with write_transaction(engine) as connection:
-                for number, (solid, layout) in zip(numbers, found, strict=True):
-                    new = registration(f"object {number}", solid, layout, array)
-                    register(connection, new)
+                for number, layout in zip(numbers, found, strict=True):
+                    register(connection, registration(f"object {number}", layout, array))
             spent[k] += time.perf_counter() - began
     return spent
 
@@ -138,8 +95,10 @@ def place(url, name, array):
     """Place and register a cube as a command does, the opening of the database included."""
 
     def work(connection):
-        layout = laid_out(CUBE, array, occupancy(connection, array))
-        return register(connection, registration(name, CUBE, layout, array))
+        clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in CUBE.faces]
+        taken = occupancy(connection, array)
+        layout = lay_out(CUBE, array, 7.0, 2.7, clearances, taken, allow_blank_faces=True)
+        return register(connection, registration(name, layout, array))
 
     return retry_on_conflict(open_database(url), work)
 
@@ -186,58 +145,32 @@ def measured(url, array, objects):
         for k in range(20):
             assert look(connection, k)[0][0] > 0
     opening = timed(look_opening, 20)[0]
-    high, wide = board_size(held)
     runner.row(engine.dialect.name, objects, faces, held.used, placing, cpu, 1e3 * taken,
-               1e3 * looking, 1e3 * opening, listing, held.used / (high * wide),
-               held.density)  # fmt: skip
+               1e3 * looking, 1e3 * opening, listing)  # fmt: skip
 
 
-def scaled(urls, array, how, steps):
+def scaled(urls, array, steps):
     engines = [open_database(url) for url in urls]
-    objects, have = (blocks if how == "blocks" else mixed)(array), 0
+    where, have = spots(), 0
     runner.table(("engine", "objects", "faces", "cells", "place s", "CPU s", "taken ms", "look ms",
-                  "+open ms", "list s", "opened", "array"))  # fmt: skip
+                  "+open ms", "list s"))  # fmt: skip
     for want in steps:
-        spent = fill(engines, array, objects, have, want)
+        spent = fill(engines, array, where, have, want)
         each = ", ".join(f"{1e3 * seconds / max(want - have, 1):.1f}" for seconds in spent)
         print(f"  registering {want - have} more objects: {each} ms each", flush=True)
         have = want
         for url in urls:
             measured(url, array, want)
-    for engine in engines:
-        with read_transaction(engine) as connection:
-            assert len(read_layout(connection, "object 0").faces) >= 4
-
-
-def filled(array, size):
-    """Print how full the array gets when nothing fits any more."""
-    taken, number, began = Occupancy.from_cells([], [], array), 0, time.process_time()
-    runner.table(("objects", "cells", "opened", "array", "CPU s"))
-
-    def show():
-        high, wide = board_size(taken)
-        share, spent = taken.used / (high * wide), time.process_time() - began
-        runner.row(number, taken.used, share, taken.density, spent)
-
-    for _, layout in mixed(array, size):
-        taken = occupancy_with(taken, layout)
-        number += 1
-        if number % 1000 == 0:
-            show()
-    show()
 
 
 def main() -> None:
-    """Print the tables."""
-    chosen = runner.asked(__doc__, engine="both", fill="blocks", array=4095, full=False, size=1.0,
+    """Print the table."""
+    chosen = runner.asked(__doc__, engine="both", array=4095,
                           objects=[2, 10, 167, 1000, 10000, 16667])  # fmt: skip
     array = array_of(chosen.array)
-    print(f"array {array.rows} x {array.columns}, fill {chosen.fill}")
-    if chosen.full:
-        filled(array, chosen.size)
-        return
+    print(f"array {array.rows} x {array.columns}")
     with runner.databases(chosen.engine, "--durable") as urls:
-        scaled(list(urls.values()), array, chosen.fill, sorted(chosen.objects))
+        scaled(list(urls.values()), array, sorted(chosen.objects))
         if "sqlite" in urls:
             print(f"{Path(urls['sqlite']).stat().st_size / 1e6:.0f} MB")
 

@@ -106,16 +106,7 @@ def measure(scenes: list[Scene], reader: Reader, defect: Defect, touches: int) -
         scene = scenes[number % len(scenes)]
         at, counts = touched(scene, reader.sensor, defect, number)
         answer = recognise(reader, reader.signal(counts), number)
-        trial = {"verdict": "rejected", "reason": answer.reason}
-        if answer:
-            turn = math.remainder(math.radians(answer.theta_deg) - at.theta_rad, math.tau)
-            off = np.array([answer.x_mm - at.x_mm, answer.y_mm - at.y_mm, turn])
-            mm, same = math.hypot(*off[:2]), (answer.object, answer.face)
-            right = same == (scene.object_name, scene.face) and mm <= 2
-            trial |= {"verdict": "right" if right else "wrong", "error_mm": mm,
-                      "error_deg": math.degrees(turn),
-                      "chi2": float(off @ np.linalg.solve(answer.covariance, off))}  # fmt: skip
-        trials.append(trial)
+        trials.append(runner.trial_of(answer, at, scene))
     return runner.outcome(trials)
 
 

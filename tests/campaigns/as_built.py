@@ -42,7 +42,6 @@ from recognizer.touch.source import TouchImage
 
 ON_FACE = TouchRanges(force_n=(20, 120), tilt_rad=math.radians(2), margin_mm=9)
 LARGE_MM = 45.0  #: least side of a panel on which a sensor finds room
-Errors = list[tuple[float, float, float]]
 
 
 def printed_panels(run: Path, count: int) -> Iterator[tuple[str, int, Scene]]:
@@ -83,30 +82,17 @@ def touched(
         yield touch, TouchImage(number, 0, 1, counts.astype(float), np.zeros(4), None)
 
 
-def errors_of(reader: Reader, felt: list[tuple[Touch, TouchImage]]) -> Errors:
-    """Return squares of place (mm) and turn (degrees), and chi squared, of what is answered."""
-    found = []
-    for touch, image in felt:
-        answer = reader.read(image.counts)
-        if not answer:
-            continue
-        turn = math.remainder(math.radians(answer.theta_deg) - touch.theta_rad, math.tau)
-        error = np.array([answer.x_mm - touch.x_mm, answer.y_mm - touch.y_mm, turn])
-        chi2 = error @ np.linalg.solve(answer.covariance, error)
-        found.append((error[:2] @ error[:2], math.degrees(turn) ** 2, chi2))
-    return found
+def trials_of(
+    scene: Scene, reader: Reader, felt: list[tuple[Touch, TouchImage]]
+) -> list[runner.Row]:
+    return [runner.trial_of(reader.read(image.counts), touch, scene) for touch, image in felt]
 
 
-def summary(errors: Errors) -> str:
-    """Return how many, rms of place and turn, and the share inside the 95 % ellipsoid."""
-    if not errors:
-        return "  0"
-    away, turns, chi2 = np.array(errors).T
-    inside = 100 * np.mean(chi2 < runner.INSIDE_CHI2)
-    return (
-        f"{len(errors):3d} {math.sqrt(away.mean()):6.3f} mm {math.sqrt(turns.mean()):5.2f} deg "
-        f"{inside:4.0f} %"
-    )
+def summary(trials: list[runner.Row]) -> str:
+    """Return how many are right and wrong, rms of place and turn, and the share inside."""
+    line = runner.outcome(trials)
+    return (f"{line['right']:3d} right, {line['wrong']} wrong, {line['rms_mm']:6.3f} mm "
+            f"{line['rms_deg']:5.2f} deg {100 * line['inside']:4.0f} %")  # fmt: skip
 
 
 def sizes(found: AsBuilt) -> str:
@@ -133,9 +119,9 @@ def main() -> None:
         except AsBuiltError as error:
             print(f"{name}: {error}", flush=True)
             continue
-        old = errors_of(usual, judge)
+        old = trials_of(scene, usual, judge)
         keep_prints(database, [found])
-        new = errors_of(Reader(open_lab(database)), judge)
+        new = trials_of(scene, Reader(open_lab(database)), judge)
         before, after = before + old, after + new
         print(f"{name}: {len(felt)} of {len(learn)}, {sizes(found)} rad; strokes "
               f"{found.stroke_mm:.2f}\n  before {summary(old)}\n  after  {summary(new)}\n"

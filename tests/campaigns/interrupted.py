@@ -42,12 +42,7 @@ def new_database(folder: Path, server: str) -> str:
     """Return the URL of an empty database: a file in the folder, or a schema on the server."""
     if not server:
         return f"sqlite:///{folder / 'lab.db'}"
-    import psycopg
-
-    name = f"lab_{folder.name}"
-    with psycopg.connect(server, autocommit=True) as connection:
-        connection.execute(f"CREATE SCHEMA {name}")
-    return f"{server}?options=-csearch_path%3D{name}"
+    return runner.postgres.new_schema(server, f"lab_{folder.name}")
 
 
 def digests(folder: Path) -> dict[str, str]:

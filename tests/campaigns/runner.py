@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import subprocess
 import sys
@@ -24,6 +25,9 @@ from contextlib import ExitStack, contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, TypeVar
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+import postgres
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -76,10 +80,7 @@ def databases(engine: str, *options: str) -> Iterator[dict[str, str]]:
         if engine != "postgresql":
             urls["sqlite"] = stack.enter_context(tempfile.TemporaryDirectory()) + "/lab.db"
         if engine != "sqlite":
-            command = [sys.executable, str(Path(__file__).parents[1] / "postgres.py"), *options]
-            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-            server = stack.enter_context(subprocess.Popen(command, text=True, **pipes))
-            urls["postgresql"] = server.stdout.readline().strip()
+            urls["postgresql"] = stack.enter_context(postgres.running(*options))
         yield urls
 
 
@@ -150,6 +151,21 @@ def rows_of(folder: Path, what: str = "shards") -> list[Row]:
 
     files = sorted(folder.glob(f"{what}/touches/*.parquet"))
     return [row for file in files for row in pq.read_table(file).to_pylist()]
+
+
+def trial_of(answer: Any, touch: Any, scene: Any) -> Row:
+    """Return what became of a touch of a scene, as `outcome` takes it: right within 2 mm."""
+    import numpy as np
+
+    if not answer:
+        return {"verdict": "rejected", "reason": answer.reason}
+    turn = math.remainder(math.radians(answer.theta_deg) - touch.theta_rad, math.tau)
+    off = np.array([answer.x_mm - touch.x_mm, answer.y_mm - touch.y_mm, turn])
+    mm, same = math.hypot(*off[:2]), (answer.object, answer.face)
+    right = same == (scene.object_name, scene.face) and mm <= 2
+    return {"verdict": "right" if right else "wrong", "reason": "", "error_mm": mm,
+            "error_deg": math.degrees(turn),
+            "chi2": float(off @ np.linalg.solve(answer.covariance, off))}  # fmt: skip
 
 
 def outcome(trials: Iterable[Any]) -> Row:

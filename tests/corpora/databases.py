@@ -15,22 +15,13 @@ import gzip
 import hashlib
 import json
 import sqlite3
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from corpora.commands import (
-    DATA,
-    FIXTURES,
-    LAB_KEY,
-    ROOT,
-    Commands,
-    normal_text,
-    started_commands,
-)
+import postgres
+from corpora.commands import DATA, FIXTURES, LAB_KEY, Commands, normal_text, started_commands
 
 NAME = "databases"
 PARTS = ("sqlite", "postgresql")
@@ -101,39 +92,24 @@ _FOREIGN = {
 def _postgresql(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
     import psycopg
 
-    pipe = subprocess.PIPE
-    script = [sys.executable, ROOT / "tests/postgres.py"]
-    with subprocess.Popen(script, stdin=pipe, stdout=pipe, text=True) as server:
-        assert server.stdin is not None
-        assert server.stdout is not None
-        try:
-            address = server.stdout.readline().strip()
-            if not address:
-                raise RuntimeError("no PostgreSQL server starts here")
+    with postgres.running() as address:
 
-            def new(schema: str) -> str:
-                with psycopg.connect(address, autocommit=True) as connection:
-                    connection.execute(f"CREATE SCHEMA {schema}")
-                return f"{address}?options=-csearch_path%3D{schema}"
+        def rows(schema: str) -> tuple[list[str], Callable[[str], Rows]]:
+            return _postgresql_rows(address, schema)
 
-            def rows(schema: str) -> tuple[list[str], Callable[[str], Rows]]:
-                return _postgresql_rows(address, schema)
-
-            place = address.partition("@")[2].partition("/")[0]
-            for version in (1, 2):
-                url = new(f"v{version}")
-                with psycopg.connect(url, autocommit=True) as connection:
-                    connection.execute((FIXTURES / f"database/v{version}.sql").read_bytes())
-                for entry, value in _objects(commands, f"v{version}", url):
-                    yield entry, _placeless(value, place)
-                yield from _tables(f"v{version}/dump", *rows(f"v{version}"), work)
-            for entry, value in _fresh(commands, "fresh", new("lab"), new("other")):
+        place = address.partition("@")[2].partition("/")[0]
+        for version in (1, 2):
+            url = postgres.new_schema(address, f"v{version}")
+            with psycopg.connect(url, autocommit=True) as connection:
+                connection.execute((FIXTURES / f"database/v{version}.sql").read_bytes())
+            for entry, value in _objects(commands, f"v{version}", url):
                 yield entry, _placeless(value, place)
-            yield from _tables("fresh/dump", *rows("lab"), work)
-            yield from _tables("fresh/imported", *rows("other"), work)
-        finally:
-            server.stdin.close()
-            server.wait(timeout=60)
+            yield from _tables(f"v{version}/dump", *rows(f"v{version}"), work)
+        lab, other = (postgres.new_schema(address, name) for name in ("lab", "other"))
+        for entry, value in _fresh(commands, "fresh", lab, other):
+            yield entry, _placeless(value, place)
+        yield from _tables("fresh/dump", *rows("lab"), work)
+        yield from _tables("fresh/imported", *rows("other"), work)
 
 
 def _file_of(version: int) -> bytes:

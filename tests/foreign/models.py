@@ -146,7 +146,8 @@ def read_3mf(path, _out):
     from generator.printed.deposit import beads_of
     from generator.printed.gcode import read_gcode
 
-    beads_of(read_gcode(path))
+    if not np.isfinite(beads_of(read_gcode(path)).width_mm).all():
+        raise FaultError("wrong value", "beads that have no width")
 
 
 KINDS = {

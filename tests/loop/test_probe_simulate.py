@@ -1,8 +1,6 @@
 """From a spec to a simulated touch: registered faces are the surfaces of the written parts."""
 
-import itertools
 import json
-import math
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +13,9 @@ from generator.spec import read_specs
 from probe.command import run
 from probe.contact.contract import Touch
 from probe.contact.press import press
-from probe.errors import SurfaceError
 from probe.recording.read import Recording
 from probe.simulate.registered import registered_object, registered_surface
-from probe.simulate.scene import TouchRanges, pose_of, random_touches
+from probe.simulate.scene import pose_of
 from probe.simulate.target import part_surface, surface_of
 
 SET = """
@@ -108,38 +105,6 @@ def test_file_alone_is_touched_as_it_lies(lab):
     framed = surface_of(f"{file_of(lab, 'Cube-F1')}@{lab / 'lab.db'}")
     assert framed.surface.top_mm == pytest.approx(1.0)
     assert framed.object_name == "Cube"
-
-
-@pytest.mark.parametrize(
-    ("target", "match"),
-    [
-        ("{db}#", "5 objects, none is named"),
-        ("{other}@{db}", "its STL parts"),
-    ],
-)
-def test_unknown_targets_say_what_is_known(lab, target, match):
-    other = lab / "other.stl"
-    other.write_bytes(file_of(lab, "Ball").read_bytes())
-    with pytest.raises(SurfaceError, match=match):
-        surface_of(target.format(db=lab / "lab.db", other=other))
-
-
-def test_random_touches_fill_their_region_and_ranges(lab):
-    scene = surface_of(f"{lab / 'lab.db'}#Ball/F1")  # a pentagon
-    ranges = TouchRanges(force_n=(20.0, 30.0), tilt_rad=0.02, margin_mm=5.0)
-    found = list(
-        itertools.islice(random_touches(scene.region, np.random.default_rng(0), ranges), 1000)
-    )
-    at = np.array([(t.x_mm, t.y_mm) for t in found])
-    assert scene.region.contains(at).all()
-    assert scene.region.distance_mm(at).min() >= 5.0
-    inner = shapely.Polygon(scene.region.starts).buffer(-5.0)
-    assert abs(at.mean(axis=0) - np.array(inner.centroid.coords[0])).max() < 0.05 * inner.length
-    assert all(20 <= t.force_n <= 30 for t in found)
-    assert max(math.hypot(t.tilt_x_rad, t.tilt_y_rad) for t in found) <= 0.02
-    assert np.ptp([t.theta_rad for t in found]) > 6.0
-    with pytest.raises(SurfaceError, match="smaller margin"):
-        next(random_touches(scene.region, np.random.default_rng(0), TouchRanges(margin_mm=50.0)))
 
 
 def test_pose_of_a_touch_carries_sensor_points_onto_the_tips_plane(lab):

@@ -31,22 +31,28 @@ def decodable(entry):
     return is_decodable(entry.order, entry.degree)
 
 
+def drawn_cells(data, most):
+    cell = st.tuples(st.integers(0, 7), st.integers(0, 7))
+    return np.array(data.draw(st.lists(cell, min_size=1, max_size=most, unique=True)))
+
+
+def seen_at_all_places(array, rows, columns):
+    places = np.arange(array.rows)[:, None, None], np.arange(array.columns)[:, None]
+    return array.symbols(places[0] + rows, places[1] + columns).reshape(-1, len(rows))
+
+
 @quick
 @given(folding, st.data())
 def test_rank_test_says_exactly_which_cells_identify(entry, data):
     """Any set of visible cells: full rank if and only if no two places look alike."""
     fold = data.draw(st.sampled_from(folds(entry.order, entry.degree)))
     array = FoldedArray(sequence_of(entry), *data.draw(st.permutations(fold)))
-    k = data.draw(st.integers(1, entry.degree + 3))
-    cell = st.tuples(st.integers(0, 7), st.integers(0, 7))
-    cells = np.array(data.draw(st.lists(cell, min_size=k, max_size=k, unique=True)))
+    cells = drawn_cells(data, entry.degree + 3)
     rows, columns = np.unique(cells % (array.rows, array.columns), axis=0).T
-    places = np.arange(array.rows)[:, None, None], np.arange(array.columns)[:, None]
-    seen = array.symbols(places[0] + rows, places[1] + columns).reshape(-1, rows.size)
+    seen = seen_at_all_places(array, rows, columns)
     unique = len(np.unique(seen, axis=0)) == len(seen)
-    assert array.identifies(rows, columns) == unique
     distance = array.minimum_distance(rows, columns)
-    assert (distance > 0) == unique
+    assert array.identifies(rows, columns) == (distance > 0) == unique
     if unique:  # linear: the same from every place, but for the zero word that no place shows
         some = data.draw(st.integers(0, len(seen) - 2))
         others = [np.sort(np.count_nonzero(seen != seen[k], axis=1))[1] for k in (some, some + 1)]
@@ -60,16 +66,11 @@ def test_product_identifies_when_both_factors_are_determined(a, b, data):
     array = ProductArray(sequence_of(a), sequence_of(b))
     if array.rows * array.columns > 40_000:
         return
-    k = data.draw(st.integers(1, max(a.degree, b.degree) + 2))
-    cell = st.tuples(st.integers(0, 5), st.integers(0, 5))
-    cells = np.array(data.draw(st.lists(cell, min_size=k, max_size=k, unique=True)))
-    rows, columns = cells.T
-    places = np.arange(array.rows)[:, None, None], np.arange(array.columns)[:, None]
-    seen = array.symbols(places[0] + rows, places[1] + columns).reshape(-1, k)
+    rows, columns = drawn_cells(data, max(a.degree, b.degree) + 2).T
+    seen = seen_at_all_places(array, rows, columns)
     unique = len(np.unique(seen, axis=0)) == len(seen)
-    assert array.identifies(rows, columns) == unique
     distance = array.minimum_distance(rows, columns)
-    assert (distance > 0) == unique
+    assert array.identifies(rows, columns) == (distance > 0) == unique
     if unique:
         assert min(np.count_nonzero(seen[1:] != seen[0], axis=1)) >= distance
 

@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from random_shapes import random_nonconvex
 
 from generator.alphabet.known import ALPHABETS
 from generator.alphabet.outline import SymbolStyle
@@ -21,11 +22,13 @@ from generator.polyhedron.shapes import tetrahedron
 ARRAY = PROFILES["one-touch"].array()
 CELLS = ARRAY.rows * ARRAY.columns
 SOLID = tetrahedron(60.0)
+FRAMES = [random_nonconvex(np.random.default_rng(seed)) for seed in (4, 8)]  # with holes
 
 engines = st.sampled_from(["sqlite", "sqlite", "sqlite", "postgresql"])  # a server is slow
 floats = st.floats(-1e4, 1e4)  # lengths in mm; a database refuses what no model has
 angles = st.floats(-1.5, 1.5)
 positive = st.floats(min_value=1e-300, max_value=1e4)
+solids = st.sampled_from([SOLID, *FRAMES])
 names = st.text(st.characters(blacklist_categories=["Cs"], blacklist_characters="\0"), min_size=1)
 formats = st.sampled_from(["step", "stl"])
 values = st.recursive(
@@ -67,12 +70,12 @@ def registrations(draw):
     ]
     alphabet = draw(st.sampled_from(sorted(ALPHABETS)))
     return ObjectRecord(
-        draw(names), SOLID, layout, ARRAY, draw(names), ALPHABETS[alphabet], style,
+        draw(names), draw(solids), layout, ARRAY, draw(names), ALPHABETS[alphabet], style,
         {"spec": draw(values)}, draw(names), tuple(parts),
     )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=38)
+@settings(deadline=None, max_examples=30)
 @given(engine=engines, registration=registrations())
 def test_everything_comes_back_bit_for_bit(database_on, engine, registration):
     with database_on(engine) as url:
@@ -90,17 +93,27 @@ def comes_back(engine, registration):
             objects, faces = faces_at(connection, 1, face.rows, face.columns)
             assert (objects == known.entry.object_id).all()
             assert (faces == face.face).all()
+        free = sorted({*range(CELLS)} - {*occupied(connection)})[:3]
+        assert (np.array(faces_at(connection, 1, *np.divmod(free, ARRAY.columns))) == -1).all()
+    solid = registration.polyhedron
+    assert known.polyhedron.vertices.tobytes() == solid.vertices.tobytes()
+    assert (known.polyhedron.faces, known.polyhedron.edges) == (solid.faces, solid.edges)
+    holes = [len(face.polygon_mm) for face in known.faces]
+    assert holes == [len(face.loops) for face in solid.faces]
     assert same_layout(known.layout, registration.layout)
     assert repr(known.style) == repr(registration.style)  # repr tells -0.0 from 0.0
     assert canonical(known.spec) == canonical(dict(registration.spec))
     assert known.alphabet == registration.alphabet.definition()
     assert known.entry.profile == registration.profile
-    assert len(known.parts) == len(registration.parts)
+    found = [(part.name, part.format, part.file) for part in known.parts]
+    assert found == [(part.name, part.format, part.file) for part in registration.parts]
     for part, given_part in zip(known.parts, registration.parts, strict=True):
-        assert (part.name, part.format, part.file) == (
-            given_part.name, given_part.format, given_part.file,
-        )  # fmt: skip
         assert part.T_object_part.tobytes() == given_part.T_object_part.tobytes()
+
+
+def occupied(connection):
+    rows, columns = occupied_cells(connection, find_array(connection, ARRAY))
+    return (rows * ARRAY.columns + columns).tolist()
 
 
 steps = st.lists(
@@ -162,8 +175,7 @@ def shares_no_cell(engine, steps):
         with read_transaction(engine) as connection:
             assert [e.name for e in list_objects(connection)] == sorted(held)
             assert object_names(connection) == tuple(sorted(held))
-            rows, columns = occupied_cells(connection, find_array(connection, ARRAY))
-            cells = (rows * 65 + columns).tolist()
+            cells = occupied(connection)
             assert cells == sorted(c for cells in held.values() for c in cells)
             assert held_cells(connection, 1)[:, :2].tolist() == [
                 [cell // 65, cell % 65] for cell in cells

@@ -1,4 +1,4 @@
-"""Every solid: links, closure, angles and frames; the same in files; damaged files are refused."""
+"""Every solid: links, closure, angles and frames; the same faces back from mesh files."""
 
 import math
 import tempfile
@@ -8,6 +8,7 @@ from pathlib import Path
 import manifold3d
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from random_shapes import random_convex, random_nonconvex
@@ -15,9 +16,7 @@ from random_shapes import random_convex, random_nonconvex
 from generator.errors import ShapeError
 from generator.plane.polygon import orientations
 from generator.polyhedron import (
-    Polyhedron,
     dihedral,
-    edge_length,
     face_area,
     face_frame,
     face_normal,
@@ -78,16 +77,8 @@ def test_convex_solids_have_angles_below_pi_and_the_theorem_of_gauss(solid):
     assert min(angles) > 0.0
     assert max(angles) < math.pi
     # Angle defects over all vertices sum to 4 pi (Descartes).
-    corners = 0.0
-    for k in range(len(solid.faces)):
-        corners += math.pi * (len(solid.faces[k].loops[0]) - 2)
+    corners = sum(math.pi * (len(face.loops[0]) - 2) for face in solid.faces)
     assert 2 * math.pi * len(solid.vertices) - corners == pytest.approx(4 * math.pi)
-    # Mean width by Steiner's formula bounds the size: it is additive over edges.
-    mean_width = sum(
-        edge_length(solid, k) * (math.pi - angle) for k, angle in enumerate(angles)
-    ) / (4 * math.pi)  # fmt: skip
-    extent = np.ptp(solid.vertices, axis=0)
-    assert extent.min() / 2 < mean_width < float(np.linalg.norm(extent))
 
 
 @settings(max_examples=40, deadline=None)
@@ -163,9 +154,6 @@ def test_orientation_agrees_with_rational_arithmetic(a, b, t, ulps):
     assert orientations(a, b, (x, y)) == (exact > 0) - (exact < 0)
 
 
-SHAPES_FOLDER = Path(__file__).parents[2] / "fixtures" / "shapes"
-
-
 def triangles(solid, rng):
     """Triangles (n, 3, 3) of a solid, some split at inner points and on edges, shuffled."""
     found = []
@@ -181,156 +169,22 @@ def triangles(solid, rng):
     return np.array(found)[rng.permutation(len(found))]
 
 
-def binary_stl(corners):
-    record = np.zeros(
-        len(corners), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("a", "<u2")])
-    )
-    record["corners"] = corners
-    return (
-        b"solid of another program".ljust(80)
-        + len(corners).to_bytes(4, "little")
-        + record.tobytes()
-    )
-
-
-def ascii_stl(corners):
-    lines = ["solid part"]
-    for corner in corners:
-        lines += ["facet normal 0 0 0", "outer loop"]
-        lines += [f"vertex {x:e} {y:e} {z:e}" for x, y, z in corner]
-        lines += ["endloop", "endfacet"]
-    return "\n".join([*lines, "endsolid part"]).encode()
-
-
-def obj(corners):
-    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in corners.reshape(-1, 3)]
-    lines += [f"f {3 * k + 1} {3 * k + 2} {3 * k + 3}" for k in range(len(corners))]
-    return "\n".join(lines).encode()
-
-
-WRITERS = {".stl": binary_stl, ".STL": ascii_stl, ".obj": obj}
-
-
-def read(suffix, content):
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"part{suffix}"
-        path.write_bytes(content)
-        return read_shape(path)
-
-
-def assert_same(solid, back, rel=1e-4):
-    assert len(back.vertices) == len(solid.vertices)
-    assert len(back.edges) == len(solid.edges)
-    assert len(back.faces) == len(solid.faces)
-    assert back.genus == solid.genus
-    assert volume(back) == pytest.approx(volume(solid), rel=rel)
-    areas, found = (
-        sorted(face_area(p, k) for k in range(len(p.faces))) for p in (solid, back)
-    )  # fmt: skip
-    assert found == pytest.approx(areas, rel=rel, abs=0.05)
-    loops = [sorted(tuple(map(len, f.loops)) for f in p.faces) for p in (solid, back)]
-    assert loops[0] == loops[1]
-
-
 @settings(max_examples=60, deadline=None)
-@given(SOLIDS, SEEDS, st.sampled_from(sorted(WRITERS)), st.sampled_from([0.0, 1000.0]))
-def test_meshes_give_the_faces_back(solid, seed, suffix, offset):
+@given(SOLIDS, SEEDS, st.sampled_from(["stl", "stl_ascii", "obj"]), st.sampled_from([0.0, 1000.0]))
+def test_meshes_give_the_faces_back(solid, seed, kind, offset):
     # Edges that are nearly flat are one face for a mesh file.
     assume(all(abs(dihedral(solid, k) - np.pi) > 0.02 for k in range(len(solid.edges))))
     corners = triangles(solid, np.random.default_rng(seed)) + offset
-    assert_same(solid, read(suffix, WRITERS[suffix](corners)))
-
-
-def step_of(solid):
-    """STEP text of a solid, by the CAD kernel alone."""
-    from OCP.BRepBuilderAPI import (
-        BRepBuilderAPI_MakeFace,
-        BRepBuilderAPI_MakePolygon,
-        BRepBuilderAPI_MakeSolid,
-        BRepBuilderAPI_Sewing,
-    )
-    from OCP.BRepLib import BRepLib
-    from OCP.gp import gp_Pnt
-    from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
-    from OCP.TopoDS import TopoDS
-
-    sewing = BRepBuilderAPI_Sewing(1e-5)
-    for face in solid.faces:
-        wires = []
-        for loop in face.loops:
-            polygon = BRepBuilderAPI_MakePolygon()
-            for v in loop:
-                polygon.Add(gp_Pnt(*map(float, solid.vertices[v])))
-            polygon.Close()
-            wires.append(polygon.Wire())
-        maker = BRepBuilderAPI_MakeFace(wires[0], True)
-        for wire in wires[1:]:
-            maker.Add(wire)
-        sewing.Add(maker.Face())
-    sewing.Perform()
-    body = BRepBuilderAPI_MakeSolid(TopoDS.Shell_s(sewing.SewedShape())).Solid()
-    BRepLib.OrientClosedSolid_s(body)
-    writer = STEPControl_Writer()
-    writer.Transfer(body, STEPControl_AsIs)
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "part.step"
-        writer.Write(str(path))
-        return path.read_bytes()
-
-
-@settings(max_examples=3, deadline=None)  # the kernel starts in a process of its own
-@given(SOLIDS)
-def test_step_gives_the_faces_back(solid):
-    assert_same(solid, read(".step", step_of(solid)), rel=1e-9)
-
-
-WORDS = ["v", "f", "0", "1", "2", "3", "4", "-1", "1e3", "/", "#", "\n", "solid", "vertex"]
-FIXTURES = ["l_bracket.stl", "l_bracket_ascii.stl", "prism.obj", "cube_with_hole.step"]
-
-
-def survives(suffix, content):
-    """A solid or a `ShapeError` with a cause and a way out: nothing else may come."""
-    try:
-        solid = read(suffix, content)
-    except ShapeError as error:
-        refusal = error
-    else:
-        return isinstance(solid, Polyhedron)
-    assert refusal.cause
-    assert refusal.fix
-    assert f"part{suffix}" in refusal.place
-    return False
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.sampled_from(FIXTURES), st.floats(0, 1, exclude_max=True))
-def test_truncated_files_are_refused(name, share):
-    content = (SHAPES_FOLDER / name).read_bytes().rstrip()
-    cut = content[: int(share * len(content))]
-    whole = survives(Path(name).suffix, cut)
-    # Only the free text behind 'endsolid' may be missing.
-    assert not whole or len(content) - len(cut) <= 1 or b"endsolid" in cut[-20:]
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.sampled_from(FIXTURES[:3]), st.data())
-def test_damaged_meshes_never_crash(name, data):
-    content = bytearray((SHAPES_FOLDER / name).read_bytes())
-    for _ in range(data.draw(st.integers(1, 4))):
-        at = data.draw(st.integers(0, len(content) - 1))
-        content[at] = data.draw(st.integers(0, 255))
-    survives(Path(name).suffix, bytes(content))
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.sampled_from([".stl", ".obj", ".step"]), st.binary(max_size=400))
-def test_garbage_is_refused(suffix, content):
-    assert not survives(suffix, content)
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.lists(st.sampled_from(WORDS), max_size=60))
-def test_words_in_any_order_are_refused(words):
-    text = " ".join(words).encode()
-    assert not survives(".obj", text)
-    assert not survives(".stl", b"solid x\n" + text)
+        path = Path(folder) / f"part.{kind[:3]}"
+        index = np.arange(3 * len(corners)).reshape(-1, 3)
+        mesh = trimesh.Trimesh(corners.reshape(-1, 3), index, process=False)
+        mesh.export(path, file_type=kind)
+        back = read_shape(path)
+    assert (len(back.vertices), len(back.edges)) == (len(solid.vertices), len(solid.edges))
+    assert back.genus == solid.genus
+    assert volume(back) == pytest.approx(volume(solid), rel=1e-4)
+    areas, found = (sorted(face_area(p, k) for k in range(len(p.faces))) for p in (solid, back))
+    assert found == pytest.approx(areas, rel=1e-4, abs=0.05)
+    loops = [sorted(tuple(map(len, f.loops)) for f in p.faces) for p in (solid, back)]
+    assert loops[0] == loops[1]

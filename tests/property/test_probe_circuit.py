@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference.drawn_fsr import draw_fsr
 
 from probe.circuit import (
     QUIET,
     Electronics,
-    conductances,
     effective_resistances,
     invert_readings,
 )
@@ -88,16 +86,3 @@ def test_the_scan_is_undone(seed, shape, settled, coupling):
     e = replace(Electronics(), settling_s=settled * 5e-6, coupling=coupling)
     share = np.random.default_rng(seed).random((3, *shape))
     np.testing.assert_allclose(unscan_shares(scan_shares(share, e), e), share, atol=1e-10)
-
-
-@settings(deadline=None, max_examples=40)
-@given(seeds, st.lists(st.floats(0, 100), min_size=2, max_size=12))
-def test_a_reading_lies_between_the_way_up_and_the_hysteresis(seed, path):
-    fsr = replace(draw_fsr(np.random.default_rng(seed)), drift=0.0)
-    one, state = np.ones((16, 16)), None
-    for force in path:
-        g, state = conductances(fsr, force * one, state, 0.1)
-    up, _ = conductances(fsr, path[-1] * one)
-    most, _ = conductances(fsr, path[-1] * (1 + fsr.hysteresis) * one + fsr.hysteresis * 10)
-    assert (g >= up * (1 - 1e-12)).all()
-    assert (g <= most * (1 + 1e-12)).all()

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from probe.arm import GAIN, LEAST_SINGULAR, LENGTH_MM, Arm, forward, inverse, joint_speeds
 from probe.errors import PoseError
@@ -46,8 +47,7 @@ def test_every_branch_reaches_the_pose_singular_or_not(q, bend, folded):
 def test_a_vertical_approach_is_reached_or_refused(place, turn, tilt):
     pose = np.eye(4)
     out = math.atan2(place[1], place[0])
-    yaw, pitch = (rotation(axis, angle) for axis, angle in ((2, out), (1, tilt)))
-    pose[:3, :3] = yaw @ pitch @ rotation(2, turn)
+    pose[:3, :3] = Rotation.from_euler("ZYZ", [out, tilt, turn]).as_matrix()
     pose[:3, 3] = place
     branches, refusal = [], ""
     try:
@@ -88,11 +88,3 @@ def test_the_wrist_there_and_back(ab, ad, sine, obtuse, z, x, y):
     turn = gripper_to_plate(wrist, found)[:3, :3]
     assert np.abs(turn @ turn.T - np.eye(3)).max() < 1e-14
     assert np.linalg.eigvalsh(found.covariance).min() > -1e-18
-
-
-def rotation(axis, angle):
-    c, s = math.cos(angle), math.sin(angle)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    matrix = np.eye(3)
-    matrix[[i, i, j, j], [i, j, i, j]] = c, -s, s, c
-    return matrix

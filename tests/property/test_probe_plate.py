@@ -48,18 +48,15 @@ def drawn(rng, number):
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_springs_come_to_rest(seed):
     rng = np.random.default_rng(seed)
-    worst = 0
     for number in range(3000):
         points, heights, k, load = drawn(rng, number)
         found = rest(points, heights, Linear(k), load)
-        worst = max(worst, found.iterations)
+        assert found.iterations <= 15
         in_balance(found, points, heights, k, load)
-    assert worst <= 15
 
 
-@pytest.mark.parametrize("seed", [3])
-def test_crushed_columns_come_to_rest(seed):
-    rng = np.random.default_rng(seed)
+def test_crushed_columns_come_to_rest():
+    rng = np.random.default_rng(3)
     for number in range(700):
         points, heights, k, load = drawn(rng, number)
         found = rest(points, heights, NeoHooke(k, 2.0), load)

@@ -1,6 +1,7 @@
 """The protocol survives any split, any garbage and any bytes at all."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -113,6 +114,7 @@ def test_any_split_gives_the_same_frames(seed, data):
     seen += receiver.settle(0)
     assert [f.seq for f in seen] == list(range(12))
     assert receiver.statistics().failed == 0
+    assert receiver.statistics().rate == pytest.approx(1e6 / STEP_US)
 
 
 @settings(deadline=None, max_examples=50)

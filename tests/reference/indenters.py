@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
+from shapely.geometry import MultiPoint
 
 
 @dataclass(frozen=True)
@@ -47,3 +49,12 @@ def block(low: Sequence[float], high: Sequence[float]) -> np.ndarray:
     corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)], float)
     quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     return corners[[t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]]
+
+
+def nib_region(strokes: Sequence, width_mm: float, unit_mm: float = 1.0) -> shapely.Geometry:
+    """Return what an octagonal nib covers on its way along strokes between nodes."""
+    turns = (np.arange(8) + 0.5) * math.pi / 4
+    nib = width_mm / 2 / math.cos(math.pi / 8) * np.stack([np.cos(turns), np.sin(turns)], 1)
+    once = dict.fromkeys(strokes)  # GEOS loses a polygon where another one comes twice
+    ends = [np.concatenate([unit_mm * np.array(end) + nib for end in stroke]) for stroke in once]
+    return shapely.union_all([MultiPoint(points).convex_hull for points in ends])

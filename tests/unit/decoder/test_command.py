@@ -15,33 +15,22 @@ WINDOW = "01 11 01 01 00 01"
 
 
 def test_picture(ask, tmp_path):
-    path = tmp_path / "window.png"
-    code, *_ = ask(run, WINDOW, "--profile", "thesis", "--plot", path)
-    assert code == 0
+    path, marked = tmp_path / "window.png", (196, 60, 20)
+    assert ask(run, WINDOW, "--profile", "thesis", "--plot", path)[0] == 0
     with Image.open(path) as picture:
         assert picture.size == (65 * 16, 63 * 16)
-        assert picture.getpixel((61 * 16, 1 * 16)) == (196, 60, 20)
-        assert picture.getpixel((61 * 16 - 1, 1 * 16)) != (196, 60, 20)
+        assert picture.getpixel((61 * 16, 1 * 16)) == marked
+        assert picture.getpixel((61 * 16 - 1, 1 * 16)) != marked
+    array = profile("thesis").array()  # a window that wraps is outlined on both sides
+    rows = ["".join(str(array.symbols(60 + r, 64 + c)) for c in range(2)) for r in range(6)]
+    assert ask(run, *rows, "--profile", "thesis", "--plot", path)[0] == 0
+    with Image.open(path) as picture:
+        assert picture.getpixel((64 * 16, 61 * 16)) == picture.getpixel((15, 16)) == marked
     large = '{"family": "prba", "order": 2, "degree": 64}'
-    window = "0" * 15 + "1"
-    rows = [window[i : i + 4] for i in range(0, 16, 4)] * 16
-    code, *_ = ask(run, *rows[:1], "--array", large, "--plot", path)
-    assert code == 1
-    assert path.stat().st_size > 100
+    assert ask(run, "0000", "--array", large, "--plot", path)[0] == 1
     code, _, err = ask(run, WINDOW, "--profile", "thesis", "--plot", tmp_path / "a/b")
     assert code == 2
     assert "cannot write" in err
-
-
-def test_a_wrapping_window_is_outlined_on_both_sides(ask, tmp_path):
-    array = profile("thesis").array()
-    rows = ["".join(str(array.symbols(60 + r, 64 + c)) for c in range(2)) for r in range(6)]
-    path = tmp_path / "wrap.png"
-    code, *_ = ask(run, *rows, "--profile", "thesis", "--plot", path)
-    assert code == 0
-    with Image.open(path) as picture:
-        assert picture.getpixel((64 * 16, 61 * 16)) == (196, 60, 20)
-        assert picture.getpixel((15, 16)) == (196, 60, 20)
 
 
 def test_nothing_heavy_is_imported():

@@ -11,7 +11,7 @@ import decoder.likelihood
 import decoder.ranking
 from decoder import Likelihood, WindowError, decode_likelihood
 from decoder.errors import MethodError
-from decoder.ranking import Joint, Places, Ranked, best_of, best_of_all, ranking_of
+from decoder.ranking import Joint, Places, best_of, ranking_of
 from decoder.window import (
     checked_labels,
     checked_scores,
@@ -94,39 +94,24 @@ def test_doubt_margin_and_place_are_those_of_bayes_rule(name, turns):
         second = one.runner_up
         assert (second.row, second.column, second.rotation) == ranked[1][:3]
         assert one.candidates == ()
+        listed = Likelihood(array, rotations=turns, doubt=1.0).decode(scores, top=5)[0].candidates
+        score = {own[:3]: own[3] for own in ranked}
+        at = [score[c.row, c.column, c.rotation] for c in listed]
+        assert [c.score for c in listed] == pytest.approx(at, abs=1e-4)
+        assert at == pytest.approx([own[3] for own in ranked[:5]], abs=1e-4)
 
 
 @pytest.mark.parametrize("blank", [0.0, 0.01, 0.3])
 def test_the_more_turns_and_places_the_more_a_blank_surface_weighs(blank):
-    window = QUATERNARY.symbols(*np.indices((3, 3)))
-    scores = hard_scores(window, 4, 0.2)
-    for turns in ((0,), (0, 2), ALL_TURNS):
-        _, doubt, _ = bayes(QUATERNARY, scores, turns, blank=blank)
-        found = Likelihood(QUATERNARY, rotations=turns, blank=blank, doubt=1.0).decode(scores)
+    scores = hard_scores(QUATERNARY.symbols(*np.indices((3, 3))), 4, 0.2)
+    for turns, cells in (
+        ((0,), None), ((0, 2), None), (ALL_TURNS, None),
+        (ALL_TURNS, [(0, 0), (3, 5), (14, 16), (7, 7)]),
+    ):  # fmt: skip
+        _, doubt, _ = bayes(QUATERNARY, scores, turns, cells, blank)
+        options = {"prior": cells, "rotations": turns, "blank": blank, "doubt": 1.0}
+        found = Likelihood(QUATERNARY, **options).decode(scores)
         assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
-    cells = [(0, 0), (3, 5), (14, 16), (7, 7)]
-    _, doubt, _ = bayes(QUATERNARY, scores, ALL_TURNS, cells, blank)
-    found = Likelihood(QUATERNARY, prior=cells, rotations=ALL_TURNS, blank=blank, doubt=1.0).decode(
-        scores
-    )
-    assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
-
-
-def test_a_symbol_is_read_wrong_once_in_twenty_times():
-    window = QUATERNARY.symbols(*np.indices((4, 4)))
-    window[1, 2] = (window[1, 2] + 1) % 4
-    window[0, 0] = -1
-    right, wrong = math.log(0.95), math.log(0.05 / 3)
-    scores = np.full((4, 4, 4), wrong)
-    np.put_along_axis(scores, np.where(window < 0, 0, window)[..., None], right, axis=-1)
-    scores[0, 0] = 0.0
-    ranked, doubt, _ = bayes(QUATERNARY, scores)
-    for found in (
-        Likelihood(QUATERNARY, doubt=1.0).decode(window),
-        decode_likelihood(QUATERNARY, window, doubt=1.0),
-    ):
-        assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
-        assert found.margins[0] == pytest.approx(-ranked[1][3], abs=1e-4)
 
 
 def test_scores_of_labels_by_hand():
@@ -167,35 +152,16 @@ def with_doubt(target, turns=(0,)):
 
 @pytest.mark.parametrize("turns", [(0,), ALL_TURNS])
 def test_by_default_one_wrong_answer_in_two_thousand_is_allowed(turns):
-    assert Likelihood(BINARY, rotations=turns).decode(with_doubt(4.95e-4, turns))[0]
-    assert not Likelihood(BINARY, rotations=turns).decode(with_doubt(5.05e-4, turns))[0]
-    allowed = decode_likelihood(BINARY, with_doubt(4.95e-4, turns), rotations=turns)[0]
-    refused = decode_likelihood(BINARY, with_doubt(5.05e-4, turns), rotations=turns)[0]
-    assert allowed
-    assert allowed.candidates == ()
-    assert refused.reason == "ambiguous"
-    assert not decode_likelihood(BINARY, with_doubt(4.95e-4, turns), rotations=turns, doubt=4e-4)[0]
-
-
-def test_a_doubt_as_large_as_is_allowed_is_allowed():
-    scores = with_doubt(1e-3)
-    doubt = float(Likelihood(BINARY, doubt=1.0).decode(scores).doubts[0])
-    assert Likelihood(BINARY, doubt=doubt).decode(scores)[0]
-    assert not Likelihood(BINARY, doubt=doubt * (1 - 1e-12)).decode(scores)[0]
-
-
-@pytest.mark.parametrize("turns", [(0,), ALL_TURNS])
-@pytest.mark.parametrize("blank", [0.01, 0.2, 0.4])
-def test_a_surface_without_code_is_told_where_it_is_the_likelier_one(blank, turns):
-    base = drawn(BINARY, (6, 6), 11)
-    low, high = 0.05, 20.0
-    for _ in range(26):
-        middle = (low + high) / 2
-        _, _, without = bayes(BINARY, middle * base, turns, blank=blank)
-        low, high = (low, middle) if without else (middle, high)
-    for scale, reason in ((0.99 * low, "ambiguous"), (1.01 * low, "not an encoded surface")):
-        found = Likelihood(BINARY, rotations=turns, blank=blank).decode(scale * base)[0]
-        assert found.reason == reason
+    for decode in (
+        lambda scores, **given: Likelihood(BINARY, rotations=turns, **given).decode(scores)[0],
+        lambda scores, **given: decode_likelihood(BINARY, scores, rotations=turns, **given)[0],
+    ):
+        allowed, refused = decode(with_doubt(4.95e-4, turns)), decode(with_doubt(5.05e-4, turns))
+        assert allowed
+        assert allowed.candidates == ()
+        assert refused.reason == "ambiguous"
+        assert not decode(with_doubt(4.95e-4, turns), doubt=4e-4)
+        assert decode(with_doubt(4.95e-4, turns), doubt=allowed.doubt)
 
 
 @pytest.mark.parametrize("turns", [(0,), (1,), ALL_TURNS])
@@ -240,75 +206,30 @@ def test_candidates_are_listed_down_to_seven_nats_and_sixteen_of_them(turns):
     assert min(lengths) < 16
 
 
-def test_candidates_at_the_edge_of_seven_nats():
-    row = np.asarray(BINARY.symbols(np.zeros(17, int), np.arange(17)), int).tolist()
-    zeros = [c for c in range(17) if row[c] == 0]
-    cells = [(0, zeros[0]), (0, zeros[1]), (0, row.index(1))]
-    for gap, listed in ((6.99, 3), (7.01, 2)):
-        scores = np.zeros((1, 1, 2))
-        scores[0, 0, 1] = -gap
-        found = Likelihood(BINARY, prior=cells).decode(scores)[0]
-        assert found.reason == "too few symbols"
-        assert len(found.candidates) == listed
-
-
-def test_as_many_candidates_as_are_asked_for_answered_or_not():
-    scores = np.stack([clear(BINARY, (4, 4), seed, 0.3 + 3 * seed) for seed in range(3)])
-    found = Likelihood(BINARY).decode(scores, top=5)
-    assert found.answered.any()
-    assert not found.answered.all()
-    for i, own in enumerate(scores):
-        ranked = bayes(BINARY, own)[0][:5]
-        second = found[i].runner_up
-        assert (second.row, second.column) == ranked[1][:2]
-        assert [(c.row, c.column, c.rotation) for c in found[i].candidates] == [
-            one[:3] for one in ranked
-        ]
-        assert [c.score for c in found[i].candidates] == pytest.approx(
-            [one[3] for one in ranked], abs=1e-4
-        )
-    assert len(Likelihood(BINARY).decode(scores[2], top=1)[0].candidates) == 2
-
-
 @pytest.mark.parametrize("turns", [(0,), ALL_TURNS])
 def test_a_prior_of_one_place_has_no_rival_but_its_turns(turns):
     scores = drawn(BINARY, (4, 4), 5)
-    found = Likelihood(BINARY, prior=[(3, 4)], rotations=turns, doubt=1.0).decode(scores)
+    found = Likelihood(BINARY, prior=[(3, 4)], rotations=turns, doubt=1.0).decode(scores, top=5)[0]
     ranked, doubt, _ = bayes(BINARY, scores, turns, [(3, 4)])
-    one = found[0]
-    assert (one.row, one.column, one.rotation) == ranked[0][:3]
-    assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
+    assert (found.row, found.column, found.rotation) == ranked[0][:3]
+    assert found.doubt == pytest.approx(doubt, rel=1e-3)
+    assert len(found.candidates) == len(turns)
     if len(turns) == 1:
-        assert one.margin is None
-        assert one.runner_up is None
-        listed = Likelihood(BINARY, prior=[(3, 4)], doubt=1.0).decode(scores, top=5)[0]
-        assert (listed.margin, listed.runner_up) == (None, None)
-        assert [(c.row, c.column, c.score) for c in listed.candidates] == [(3, 4, 0.0)]
+        assert (found.margin, found.runner_up, found.candidates[0].score) == (None, None, 0.0)
     else:
-        assert one.margin == pytest.approx(-ranked[1][3], abs=1e-4)
+        assert found.margin == pytest.approx(-ranked[1][3], abs=1e-4)
 
 
-def test_a_prior_is_taken_round_the_torus_and_each_place_once():
+def test_a_prior_is_taken_round_the_torus_each_place_once_and_may_be_so_large():
     cells = [(3, 4), (3, 4), (14, 16), (18, 21)]  # 15 x 17: the last is (3, 4) again
     scores = drawn(BINARY, (4, 4), 6)
     _, doubt, _ = bayes(BINARY, scores, cells=[(3, 4), (14, 16)])
     found = Likelihood(BINARY, prior=cells, doubt=1.0).decode(scores)
     assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
-
-
-def places_of(count, shape, row=18, column=21):
-    """Weigh one place that is given so many times."""
-    return Places(BINARY, shape, np.broadcast_to(np.array([row, column]), (count, 2)))
-
-
-def test_a_prior_holds_a_million_places_and_half_a_gigabyte_at_most():
     # 2^20 places, and 2^27 numbers: places times rows times columns times two symbols
-    found = places_of(1 << 20, (16, 4))
-    assert (found.size, found.work) == (1, 1)
-    assert (found.rows.tolist(), found.columns.tolist()) == ([3], [4])
     for count, shape in (((1 << 20) + 1, (1, 1)), (1 << 20, (65, 1)), (1 << 20, (1, 65))):
         with pytest.raises(WindowError):
-            places_of(count, shape)
+            Places(BINARY, shape, np.broadcast_to(np.array([18, 21]), (count, 2)))
 
 
 def test_windows_of_a_large_batch_are_weighed_as_one_by_one(monkeypatch):
@@ -341,20 +262,15 @@ def test_the_index_is_the_one_congruent_to_row_and_column(name):
         if name != "product":
             truth = next(t for t in range(255) if (t % 15, t % 17) == (r, c))
         assert (found.row, found.column, found.t) == (r, c, truth)
-
-
-@pytest.mark.parametrize("degree", [48, 64])
-def test_the_index_of_an_array_of_2_to_the_48_and_64_cells(degree):
-    array = array_from({"family": "prba", "order": 2, "degree": degree})
-    cell = (array.rows - 2, array.columns - 3)
-    a, b = np.indices((9, 9)).astype(np.uint64)
-    rows = (np.uint64(cell[0]) + a) % np.uint64(array.rows)
-    columns = (np.uint64(cell[1]) + b) % np.uint64(array.columns)
-    found = Likelihood(array, prior=[cell, (0, 0)]).decode(array.symbols(rows, columns))[0]
-    assert (found.row, found.column) == cell
-    assert found.t % array.rows == cell[0]
-    assert found.t % array.columns == cell[1]
-    assert found.t < array.rows * array.columns
+    for degree in (48, 64):
+        array = array_from({"family": "prba", "order": 2, "degree": degree})
+        r, c = array.rows - 2, array.columns - 3
+        a, b = np.indices((9, 9)).astype(np.uint64)
+        rows, columns = (np.uint64(r) + a) % array.rows, (np.uint64(c) + b) % array.columns
+        found = Likelihood(array, prior=[(r, c), (0, 0)]).decode(array.symbols(rows, columns))[0]
+        assert (found.row, found.column) == (r, c)
+        assert (found.t % array.rows, found.t % array.columns) == (r, c)
+        assert found.t < array.rows * array.columns
 
 
 @pytest.mark.parametrize(
@@ -365,36 +281,8 @@ def test_the_index_of_an_array_of_2_to_the_48_and_64_cells(degree):
 def test_what_is_no_probability_and_no_turn_is_refused(options):
     with pytest.raises(WindowError):
         Likelihood(BINARY, **options)
-
-
-def test_the_bounds_of_what_is_allowed_are():
-    Likelihood(BINARY, doubt=1.0, blank=0.0, rotations=(0, 1, 2, 3))
+    Likelihood(BINARY, doubt=1.0, blank=0.0, rotations=(0, 1, 2, 3))  # the bounds
     Likelihood(BINARY, doubt=1e-12, blank=0.999, rotations=(3,))
-
-
-def pooled(parts):
-    """All places of parts whose `rest` is that of all of them, best first."""
-    return np.sort(np.concatenate(parts, axis=1), axis=1)[:, ::-1]
-
-
-@pytest.mark.parametrize("number", [2, 3, 7])
-def test_joined_parts_are_as_if_all_were_ranked_at_once(number):
-    rng = np.random.default_rng(8)
-    values = [rng.normal(size=(4, size)) for size in (9, 5, 12)]
-    parts = []
-    for own in values:
-        places, chosen, rest = best_of(own.astype(np.float32), number)
-        rows = places.astype(np.uint64)
-        parts.append(Ranked(rows, rows + np.uint64(100), chosen, rest))
-    found, source = best_of_all(parts, number)
-    whole = pooled(values)
-    np.testing.assert_allclose(found.values, whole[:, :number], atol=1e-5)
-    np.testing.assert_allclose(found.rest, np.exp(whole - whole[:, :1]).sum(axis=1) - 1, rtol=1e-4)
-    for i in range(4):
-        for k in range(number):
-            own = values[source[i, k]][i]
-            assert own[int(found.rows[i, k])] == pytest.approx(found.values[i, k], abs=1e-5)
-            assert found.columns[i, k] == found.rows[i, k] + 100
 
 
 @pytest.mark.parametrize("places", [3, 40, 1023, 1024, 1500, 4099])
@@ -474,45 +362,6 @@ def test_product_arrays_of_more_than_2_to_the_16_rows_or_columns_are_refused(row
         Joint(SimpleNamespace(rows=rows, columns=columns), (3, 3))
 
 
-@pytest.mark.parametrize("number", [2, 16])
-@pytest.mark.parametrize("shape", [(3, 5), (5, 3)])
-def test_every_window_of_a_product_array_is_found_row_by_row(monkeypatch, shape, number):
-    monkeypatch.setattr(decoder.ranking, "_PAIRS", 15)  # one row
-    places, shown = hypotheses(PRODUCT, shape)
-    labels = shown.reshape(len(places), 15, -1).argmax(axis=2)
-    found = ranking_of(PRODUCT, shape).rank(hard_scores(labels, PRODUCT.order, 0.1), number)
-    first = (found.rows[:, 0] * PRODUCT.columns + found.columns[:, 0]).astype(int)
-    np.testing.assert_array_equal(labels[first], labels)
-    wrong = (labels[:, None] != labels).sum(axis=2)
-    listed = np.sort(wrong, axis=1)[:, :number]
-    np.testing.assert_allclose(found.values, -listed * math.log(0.9 * 3 / 0.1), rtol=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("shape", "kind", "whole"),
-    [
-        ((2, 3), int, (1, 2, 3)),
-        ((1, 1), bool, (1, 1, 1)),
-        ((4, 2, 3), np.uint8, (4, 2, 3)),
-        ((0, 2, 3), int, (0, 2, 3)),
-        ((0, 3), int, None),
-        ((3, 0), int, None),
-        ((3, 0, 2), int, None),
-        ((3, 2, 0), int, None),
-        ((2,), int, None),
-        ((1, 1, 1, 1), int, None),
-        ((2, 3), float, None),
-        ((2,), float, None),
-    ],
-)
-def test_windows_are_whole_numbers_of_two_dimensions_or_a_batch(shape, kind, whole):
-    if whole is None:
-        with pytest.raises(WindowError, match="a window is"):
-            checked_labels(np.zeros(shape, kind), 4)
-    else:
-        assert checked_labels(np.zeros(shape, kind), 4).shape == whole
-
-
 @pytest.mark.parametrize(
     ("labels", "said"),
     [([-1, 3], None), ([-2, 3], "from -2 to 3"), ([-1, 4], "from -1 to 4"), ([4, 4], "from 4")],
@@ -535,27 +384,30 @@ def test_labels_are_symbols_of_the_array_or_unseen(labels, said):
     assert "commas" in caught.value.fix
 
 
+LABELS = [
+    ((2, 3), int, (1, 2, 3)), ((1, 1), bool, (1, 1, 1)), ((4, 2, 3), np.uint8, (4, 2, 3)),
+    ((0, 2, 3), int, (0, 2, 3)),
+    *((shape, int, None) for shape in ((0, 3), (3, 0), (3, 0, 2), (3, 2, 0), (2,), (1, 1, 1, 1))),
+    ((2, 3), float, None), ((2,), float, None),
+]  # fmt: skip
+SCORES = [
+    ((2, 3, 4), float, (1, 2, 3, 4)), ((5, 2, 3, 4), np.float32, (5, 2, 3, 4)),
+    ((0, 2, 3, 4), float, (0, 2, 3, 4)), ((1, 1, 4), float, (1, 1, 1, 4)),
+    *((shape, float, None) for shape in (
+        (0, 2, 4), (2, 0, 4), (3, 0, 2, 4), (3, 2, 0, 4), (2, 3, 5), (2, 4), (1, 1, 1, 1, 4))),
+    ((2, 3, 4), int, None), ((2, 4), int, None),
+]  # fmt: skip
+
+
 @pytest.mark.parametrize(
-    ("shape", "kind", "whole"),
-    [
-        ((2, 3, 4), float, (1, 2, 3, 4)),
-        ((5, 2, 3, 4), np.float32, (5, 2, 3, 4)),
-        ((0, 2, 3, 4), float, (0, 2, 3, 4)),
-        ((1, 1, 4), float, (1, 1, 1, 4)),
-        ((0, 2, 4), float, None),
-        ((2, 0, 4), float, None),
-        ((3, 0, 2, 4), float, None),
-        ((3, 2, 0, 4), float, None),
-        ((2, 3, 5), float, None),
-        ((2, 4), float, None),
-        ((1, 1, 1, 1, 4), float, None),
-        ((2, 3, 4), int, None),
-        ((2, 4), int, None),
-    ],
+    ("checked", "shape", "kind", "whole"),
+    [(checked_labels, *case) for case in LABELS] + [(checked_scores, *case) for case in SCORES],
 )
-def test_scores_are_numbers_for_each_symbol_of_each_cell(shape, kind, whole):
+def test_windows_have_two_dimensions_scores_one_more_and_batches_another(
+    checked, shape, kind, whole
+):
     if whole is None:
-        with pytest.raises(WindowError, match=r"scores are|at least one cell"):
-            checked_scores(np.zeros(shape, kind), 4)
+        with pytest.raises(WindowError, match=r"a window is|scores are|at least one cell"):
+            checked(np.zeros(shape, kind), 4)
     else:
-        assert checked_scores(np.zeros(shape, kind), 4).shape == whole
+        assert checked(np.zeros(shape, kind), 4).shape == whole

@@ -43,30 +43,19 @@ def test_ordered_statistics_agree_with_the_transform_at_few_errors(name):
 
 
 def test_floor_of_success_rates():
-    """Hard decisions, likeliest place if single; `encoding.md`: 96 and 75, 99.9 and 95 %."""
+    """Likeliest place if single; `encoding.md`: 96 and 75, 99.9 and 95 %."""
     rng = np.random.default_rng(6)
     for side, floors in ((5, (95.0, 72.5)), (6, (99.5, 94.0))):
         rows, columns, windows = every_window(ROBUST, (side, side))
         for error, floor in zip((0.05, 0.10), floors, strict=True):
             read = windows ^ (rng.random(windows.shape) < error)
             found = Likelihood(ROBUST, doubt=1.0).decode(read)
-            right = (found.rows == rows) & (found.columns == columns) & (found.margins > 1e-3)
-            assert 100 * right.mean() > floor
-
-
-def test_default_threshold_gives_no_wrong_answer_and_no_window_is_lost():
-    rng = np.random.default_rng(7)
-    rows, columns, windows = every_window(ROBUST, (6, 6))
-    read = windows ^ (rng.random(windows.shape) < 0.05)
-    found = Likelihood(ROBUST).decode(read)
-    wrong = found.answered & ((found.rows != rows) | (found.columns != columns))
-    assert not wrong.any()
-    assert found.answered.mean() > 0.9
-    for i in np.flatnonzero(~found.answered)[:50]:
-        refused = found[int(i)]
-        assert refused.row is None
-        assert refused.reason in ("ambiguous", "not an encoded surface")
-        assert bool(refused.candidates) == (refused.reason == "ambiguous")
+            right = (found.rows == rows) & (found.columns == columns)
+            assert 100 * (right & (found.margins > 1e-3)).mean() > floor
+            if (side, error) == (6, 0.05):
+                default = Likelihood(ROBUST).decode(read)
+                assert right[default.answered].all()
+                assert default.answered.mean() > 0.9
 
 
 @pytest.mark.parametrize(("order", "degree"), [(2, 64), (4, 32), (2, 40), (3, 20)])
@@ -83,39 +72,10 @@ def test_ordered_statistics_on_large_arrays(order, degree):
     assert (found.row, found.column, found.t) == (0, 0, 0)
 
 
-@pytest.mark.parametrize("name", ["thesis", "GF(3)"])
-def test_rank_deficient_views_are_never_answered(name):
-    array = ARRAYS[name]
-    window = array.symbols(*np.indices((6, 6)))
-    window[1:] = -1
-    window[0, 4:] = -1
-    assert not array.identifies(*np.nonzero(window >= 0))
-    for method in (None, Ordered):
-        decoder = Likelihood(array, doubt=0.4)
-        if method is not None:
-            near = AllPlaces(array, (6, 6))
-            near._method = Ordered(array.sequence, array.offsets(*np.indices((6, 6))))
-            decoder._places[6, 6] = near
-            decoder._prior = np.zeros((1, 2))  # so that the ranking above is taken
-        found = decoder.decode(window)[0]
-        assert found.reason == "too few symbols"
-        assert found.row is None
-        assert found.doubt > 0.4
-
-
 def test_a_batch_may_be_empty():
     for array in ARRAYS.values():
         assert len(decode_likelihood(array, np.zeros((0, 4, 4), int), rotations=(0, 1))) == 0
     assert len(decode_good_tuple(ROBUST, np.zeros((0, 6, 6), int))) == 0
-
-
-def test_nothing_seen_and_all_zero():
-    for name in ("thesis", "GF(9)", "product"):
-        array = ARRAYS[name]
-        nothing = np.full((3, 4, 4), -1)
-        assert {d.reason for d in decode_likelihood(array, nothing)} == {"too few symbols"}
-    zero = decode_likelihood(ROBUST, np.zeros((6, 6), int))[0]
-    assert zero.row is None
 
 
 def test_a_surface_without_code_is_told_apart():
@@ -135,12 +95,6 @@ def test_scores_that_are_not_finite_are_refused(bad):
     scores[1, 1, 1] = bad
     with pytest.raises(WindowError, match="finite"):
         decode_likelihood(ROBUST, scores)
-
-
-def test_what_is_no_label_is_refused():
-    for label in (-2, 2):
-        with pytest.raises(WindowError):
-            decode_likelihood(ROBUST, np.full((6, 6), label))
 
 
 @pytest.mark.parametrize(

@@ -15,41 +15,6 @@ from encoded_objects.base.errors import UsageError, require
 from encoded_objects.base.options import Application, Argument, Json, Option, Options, command
 from encoded_objects.base.output import write, write_json
 
-PROGRAM = """
-import gc, json, os, sys
-from encoded_objects.base import console
-from encoded_objects.base.options import Application, command
-
-app = Application()
-
-class Cycle:
-    def __init__(self): self.own = self
-    def __del__(self): print("walked")
-
-@command(app)
-def act():
-    state = [gc.get_threshold()[0], os.environ["PYDANTIC_DISABLE_PLUGINS"]]
-    print(json.dumps(state))
-    Cycle()
-    return 3
-
-console.main("do", lambda _: app, [], bare=True)
-"""
-
-
-CLEAN = {"PATH": "", "PYTHONPATH": ":".join(sys.path)}
-
-
-@pytest.mark.parametrize("asked", [{}, {"PYDANTIC_DISABLE_PLUGINS": "one"}])
-def test_a_command_does_not_walk_through_what_stays(asked):
-    words = [sys.executable, "-c", PROGRAM]
-    done = subprocess.run(words, capture_output=True, text=True, env=CLEAN | asked)
-    assert (done.returncode, done.stderr) == (3, "")
-    threshold, plugins = json.loads(done.stdout)  # the cycle is left to the end of the process
-    assert threshold > 10_000
-    assert plugins == asked.get("PYDANTIC_DISABLE_PLUGINS", "__all__")
-
-
 STREAMS = """
 import sys
 from encoded_objects.base import console
@@ -68,6 +33,9 @@ def act(as_json: Json = False):
 
 console.main("do", lambda _: app, bare=True)
 """
+
+
+CLEAN = {"PATH": "", "PYTHONPATH": ":".join(sys.path)}
 
 
 @pytest.mark.parametrize(

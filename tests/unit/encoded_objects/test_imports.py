@@ -14,16 +14,6 @@ cadquery generator.spec generator.array generator.pipeline"""
 SCENE = f"""
 from generator.command import run
 assert run([{str(CUBE)!r}, '-o', 'made', '--database', 'd.db']) == 0"""
-MESH = """
-import trimesh
-from generator import encode
-mesh = trimesh.creation.box((30, 35, 40))
-mesh.export("box.stl")
-given = {"database": "lab.db", "formats": ["stl"]}
-solid = encode(mesh, name="Mesh", folder="mesh", **given)
-model = encode("box.stl", name="File", folder="file", **given)
-assert solid.faces == model.faces == 6 and solid.symbols == model.symbols > 50
-assert solid.folder.name == "mesh" """
 # Fields are described by the text under them: in the schema, not at start-up.
 SETTINGS = """
 import linecache, generator.spec.settings
@@ -49,7 +39,6 @@ PROGRAMS = {
         importlib.resources""",
     ),
     "help": ("from generator.command import run; assert run(['--help']) == 0", HELP),
-    "help of init": ("from generator.command import run; assert run(['init', '-h']) == 0", HELP),
     "help of list": ("from generator.command import run; assert run(['list', '-h']) == 0", HELP),
     "help of probe": ("from probe.command import run; assert run(['--help']) == 0", PROBE),
     "help of calibrate": (
@@ -68,7 +57,6 @@ PROGRAMS = {
         generator.export.check generator.export.robot.model generator.printed
         generator.pipeline.sets""",
     ),
-    "mesh": (MESH, "OCP build123d cadquery"),
     "settings": (SETTINGS, ""),
 }
 

@@ -9,8 +9,6 @@ import pytest
 
 from generator.alphabet import (
     ALPHABETS,
-    Counts,
-    Glyph,
     SymbolStyle,
     alphabet_from,
     alphabet_named,
@@ -19,7 +17,6 @@ from generator.alphabet import (
     outlines,
 )
 from generator.alphabet.figures import FIGURES, figures_of, in_figures
-from generator.alphabet.known import line
 from generator.alphabet.outline import engrave
 from generator.alphabet.printable import gap_between_mm, gap_inside_mm
 from generator.alphabet.strokes import check_distinguishable, same_shape
@@ -59,31 +56,15 @@ def test_letters_made_for_tactels_print_and_have_about_the_same_ink(order, tmp_p
     alphabet = alphabet_named(f"tactel-{order}")
     assert alphabet.order == order
     assert alphabet_from(alphabet.definition()) == alphabet
-    for pitch, printer in ((4.5, "fdm-0.4"), (5, "fdm-0.4"), (6, "fdm-0.6"), (8, "fdm-0.6")):
+    for pitch, printer in ((4.5, "fdm-0.4"), (8, "fdm-0.6")):
         (tmp_path / "cube.yaml").write_text(
-            "name: Cube\nshape: {cube: 60 mm}\nprint: {printer: " + printer + "}\n"
+            f"name: Cube\nshape: {{cube: 60 mm}}\nprint: {{printer: {printer}}}\n"
             f"symbols: {{alphabet: {alphabet.name}, pitch: {pitch} mm}}\n"
         )
         (spec,) = read_specs([tmp_path / "cube.yaml"])
         check_printable(alphabet, spec.style, PRINTERS[printer])
         tops = [sum(map(signed_area, tiers.rings[-1])) for tiers in outlines(alphabet, spec.style)]
         assert max(tops) < 1.6 * min(tops)
-
-
-@pytest.mark.parametrize(
-    ("strokes", "wanted"),
-    [
-        (line((-1, 0), (0, 0), (1, 0)), Counts(2, 0, 0, 1)),  # straight on: no vertex
-        (line((-1, 0), (1, 0)) + line((0, 0), (0, 1)), Counts(3, 1, 0, 1)),  # T on an interior
-        (line((-1, -1), (1, 1)) + line((-1, 1), (1, -1)), Counts(4, 1, 0, 1)),  # X
-        (line((-1, 0), (0, 1)) + line((-1, 1), (0, 0)), Counts(4, 1, 0, 1)),  # X off the nodes
-        (line((-1, 0), (1, 0)) + line((0, 0), (1, 0)), Counts(2, 0, 0, 1)),  # drawn twice
-        (line((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)), Counts(0, 4, 1, 1)),
-        (line((-1, -1), (0, -1)) + line((-1, 1), (0, 1)), Counts(4, 0, 0, 2)),
-    ],
-)
-def test_counts_split_strokes_where_they_meet(strokes, wanted):
-    assert counts(Glyph("x", strokes)) == wanted
 
 
 @pytest.mark.parametrize(
@@ -95,7 +76,6 @@ def test_counts_split_strokes_where_they_meet(strokes, wanted):
          "turned by"),
         (glyphs([[[-2, 0], [1, 0]]]), "outside"),
         (glyphs([[[0.5, 0], [1, 0]]]), "not understood"),
-        ({"reach": "wide"}, "not understood"),
         ({"reach": 0.7}, "reach 0.7"),
     ],
 )  # fmt: skip
@@ -109,9 +89,6 @@ def test_figures_are_single_pieces_and_all_different():
     digits = [figure for figure in FIGURES if figure.name in "0123456789F-"]
     assert not any(same_shape(a, b) for i, a in enumerate(digits) for b in digits[:i])
     assert len({frozenset(map(frozenset, figure.strokes)) for figure in FIGURES}) == len(FIGURES)
-
-
-def test_names_are_written_in_capitals_or_not_at_all():
     every = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.+()"
     assert in_figures(every.lower()) == every == "".join(FIGURES[k].name for k in figures_of(every))
     assert [in_figures(text) for text in ("Bügel 1", "a:b", "\u7acb")] == ["BUGEL 1", None, None]
@@ -135,12 +112,9 @@ DENSE = alphabet_named("dense-4")
         (SymbolStyle(pitch_mm=3.9, stroke_mm=0.8, height_mm=0.5), "two strokes of symbol '1'"),
         (SymbolStyle(pitch_mm=7.0, stroke_mm=3.0), "touch at a pitch of 7 mm"),
         (SymbolStyle(draft_rad=math.radians(14)), "collapse"),
-        (SymbolStyle(pitch_mm=8.0, stroke_mm=1.4), "collapse"),
         (SymbolStyle(stroke_mm=1.2), "."),
-        (SymbolStyle(chamfer_mm=0.3), "."),
         (SymbolStyle(pitch_mm=8.0, stroke_mm=2.0, chamfer_mm=0.9), "chamfer"),
         (SymbolStyle(chamfer_mm=1e-9), "chamfer 1e-09 mm"),
-        (SymbolStyle(draft_rad=-0.1), "draft -5.7"),
         (SymbolStyle(stroke_mm=math.nan), "stroke nan"),
     ],
 )
@@ -169,13 +143,13 @@ def test_gaps_are_measured_on_the_outline():
 def test_rings_tell_crossings_and_points_inside():
     square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
     hole = np.array([[1.0, 1.0], [1.0, 2.0], [2.0, 2.0], [2.0, 1.0]])
-    assert not edges_cross([square, hole])
-    assert edges_cross([square, hole + np.array([2.5, 0.0])])
-    assert edges_cross([square[[0, 2, 1, 3]]])
-    assert edges_cross([square, hole - np.array([1.0, 0.0])])  # touching counts
-    points = np.array([[0.5, 0.5], [1.5, 1.5], [3.0, 3.0], [5.0, 1.0]])
-    assert points_inside(points, [square, hole]).tolist() == [True, False, True, False]
     turned = np.linspace(0, 2 * math.pi, 700, endpoint=False)
     many = np.stack([np.cos(turned), np.sin(turned)], axis=1)
-    assert not edges_cross([many])
-    assert edges_cross([many, 0.5 * many + [0.7, 0.0]])
+    for apart in ([square, hole], [many]):
+        assert not edges_cross(apart)
+    aside, narrow = hole - np.array([1.0, 0.0]), 0.5 * many + [0.7, 0.0]
+    beyond, twisted = hole + np.array([2.5, 0.0]), square[[0, 2, 1, 3]]
+    for crossing in ([square, beyond], [twisted], [square, aside], [many, narrow]):
+        assert edges_cross(crossing)  # touching counts
+    points = np.array([[0.5, 0.5], [1.5, 1.5], [3.0, 3.0], [5.0, 1.0]])
+    assert points_inside(points, [square, hole]).tolist() == [True, False, True, False]

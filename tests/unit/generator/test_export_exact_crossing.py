@@ -49,54 +49,46 @@ def turned(triangle):
     return tuple(tuple((M @ corner + [7, -3, 11]).tolist()) for corner in triangle)
 
 
-@pytest.mark.parametrize("name", APART)
-def test_nothing_or_what_is_shared(name: str) -> None:
-    for corners in permutations(APART[name]):
-        for one, other in ((BASE, corners), (corners, BASE), (turned(BASE), turned(corners))):
-            assert not triangles_cross(one, other)
+@pytest.mark.parametrize(("cases", "cross"), [(APART, False), (TOGETHER, True)])
+def test_more_than_what_is_shared(cases, cross):
+    for name, triangle in cases.items():
+        for corners in permutations(triangle):
+            for one, other in ((BASE, corners), (corners, BASE), (turned(BASE), turned(corners))):
+                assert bool(triangles_cross(one, other)) == cross, name
 
 
-@pytest.mark.parametrize("name", TOGETHER)
-def test_more_than_what_is_shared(name: str) -> None:
-    for corners in permutations(TOGETHER[name]):
-        for one, other in ((BASE, corners), (corners, BASE), (turned(BASE), turned(corners))):
-            assert triangles_cross(one, other)
+def test_segments_without_area():
+    for p, q, r, s, cross in (
+        ((0, 0, 0), (4, 4, 4), (0, 4, 2), (4, 0, 2), True),
+        ((0, 0, 0), (4, 4, 4), (0, 4, 2), (4, 0, 3), False),
+        ((0, 0, 0), (4, 0, 0), (4, 0, 0), (9, 0, 0), False),
+        ((0, 0, 0), (4, 0, 0), (3, 0, 0), (9, 0, 0), True),
+    ):
+        assert bool(triangles_cross((p, q, p), (r, s, r))) == cross
 
 
-def test_segments_and_points_without_area() -> None:
-    def segment(p, q):
-        return (p, q, p)
-
-    assert triangles_cross(segment((0, 0, 0), (4, 4, 4)), segment((0, 4, 2), (4, 0, 2)))
-    assert not triangles_cross(segment((0, 0, 0), (4, 4, 4)), segment((0, 4, 2), (4, 0, 3)))
-    assert not triangles_cross(segment((0, 0, 0), (4, 0, 0)), segment((4, 0, 0), (9, 0, 0)))
-    assert triangles_cross(segment((0, 0, 0), (4, 0, 0)), segment((3, 0, 0), (9, 0, 0)))
-
-
-def test_the_least_step_of_a_float_decides() -> None:
+def test_the_least_step_of_a_float_decides():
     base = [[0, 0, 0.1], [1, 0, 0.1], [0, 1, 0.1]]
-    for dz, cut in ((np.inf, False), (0.0, True), (-np.inf, True)):
-        z = 0.1 if dz == 0.0 else float(np.nextafter(0.1, dz))
+    for z, cut in ((np.nextafter(0.1, 1), False), (0.1, True), (np.nextafter(0.1, 0), True)):
         other = [[0.25, 0.25, z], [0.25, 0.25, 1], [0.5, 0.25, 1]]
-        found = cut_triangles(np.array([base, other]), np.array([0, 1]))
-        assert found.tolist() == [cut, cut]
+        assert cut_triangles(np.array([base, other]), np.array([0, 1])).tolist() == [cut, cut]
 
 
-def test_a_slanted_surface_in_single_precision_does_not_cut_itself() -> None:
+def test_a_slanted_surface_in_single_precision_does_not_cut_itself():
     shape = dodecahedron(40.0)
     points = shape.vertices.astype(np.float32).astype(np.float64)
-    fans = [[loop[0], *loop[k : k + 2]] for f in shape.faces for loop in f.loops for k in (1, 2, 3)]
-    faces = np.array(fans)
+    faces = np.array(
+        [[loop[0], *loop[k : k + 2]] for f in shape.faces for loop in f.loops for k in (1, 2, 3)]
+    )
     every = np.arange(len(faces))
     assert not cut_triangles(points[faces], every).any()
     assert len(perhaps_folded(points, faces)) == 0
-    inward = points.copy()
-    inward[0] *= -2.0  # a corner pushed through the opposite side
-    assert cut_triangles(inward[faces], every).sum() >= 9
+    points[0] *= -2.0  # a corner pushed through the opposite side
+    assert cut_triangles(points[faces], every).sum() >= 9
 
 
-def test_folded_neighbours_are_found() -> None:
+def test_folded_neighbours_are_found():
     points = np.array([[0, 0, 0], [8, 0, 0], [0, 8, 0], [2, 2, 0], [4, -5, 0], [4, 0, 0]], float)
-    assert perhaps_folded(points, np.array([[0, 1, 2], [1, 0, 3]])).tolist() == [0, 1]
-    assert perhaps_folded(points, np.array([[0, 1, 2], [1, 0, 4]])).tolist() == []
-    assert perhaps_folded(points, np.array([[0, 1, 2], [1, 0, 5]])).tolist() == [0, 1]
+    for corner, folded in ((3, [0, 1]), (4, []), (5, [0, 1])):
+        found = perhaps_folded(points, np.array([[0, 1, 2], [1, 0, corner]]))
+        assert found.tolist() == folded

@@ -1,9 +1,8 @@
-"""What files hold as text, packages as zipfile reads them, plates, and names of faces."""
+"""What files hold as numbers, packages as zipfile reads them, and plates."""
 
 from __future__ import annotations
 
 import io
-import re
 import zipfile
 from itertools import combinations
 
@@ -14,21 +13,21 @@ from hypothesis import strategies as st
 
 from generator.errors import WriteError
 from generator.export import threemf as package_module
-from generator.export.bed import Plate, Size, arrange_plates
+from generator.export.bed import arrange_plates
 from generator.export.fixed_text import (
     decimal_numbers,
     decimal_width,
     number_lines,
 )
-from generator.export.lettering import HALF_HEIGHT, Label, place_labels
-from generator.export.step.entities import step_string
+from generator.export.robot.crate import Attribute, Prim, crate_chunks
 from generator.export.threemf import deflate_text, zip_package
 
 lengths = st.floats(-1e6, 1e6, allow_nan=False)
 
 
 @given(st.lists(lengths, min_size=1, max_size=20), st.integers(1, 10))
-def test_decimals_are_the_rounded_number(values: list[float], places: int) -> None:
+@example([0.0, -0.0, -0.04, 12.5, -12.5, 999.96, -0.5], 1)
+def test_decimals_are_the_rounded_number(values, places):
     width = decimal_width(max(map(abs, values)), places)
     rows = decimal_numbers(np.array(values), width, places)
     assert rows.shape == (len(values), width)
@@ -40,29 +39,8 @@ def test_decimals_are_the_rounded_number(values: list[float], places: int) -> No
         assert "-0." not in text or scaled < 0
 
 
-def test_decimals_by_hand() -> None:
-    values = np.array([0.0, -0.0, -0.04, 12.5, -12.5, 999.96, -0.5])
-    rows = decimal_numbers(values, decimal_width(1000.0, 1), 1)
-    texts = [row.tobytes().decode("ascii") for row in rows]
-    assert texts == ["    0.0", "    0.0", "    0.0", "   12.5", "  -12.5", " 1000.0", "   -0.5"]
-
-
-@given(st.text(max_size=30))
-def test_step_strings_read_back(text: str) -> None:
-    """Part 21, 6.4.3: doubled quotes and backslashes, hexadecimal beyond printable ASCII."""
-    written = step_string(text)
-    assert written.isascii()
-    assert written.isprintable()
-    back = re.sub(
-        r"\\X[24]\\([0-9A-F]+)\\X0\\|''|\\\\",
-        lambda found: chr(int(found[1], 16)) if found[1] else found[0][0],
-        written,
-    )
-    assert back == text
-
-
 @given(st.lists(st.tuples(*[st.floats(-1e5, 1e5, allow_nan=False)] * 3), max_size=20))
-def test_decimals_of_a_line_are_the_shortest(rows: list[tuple[float, float, float]]) -> None:
+def test_decimals_of_a_line_are_the_shortest(rows):
     text = number_lines(("<", ",", ";", ">\n"), np.array(rows).reshape(-1, 3), 3).decode()
     wanted = [[f"{value:.3f}" for value in np.round(row, 3) + 0.0] for row in rows]
     short = [[one.rstrip("0").rstrip(".") for one in row] for row in wanted]
@@ -70,7 +48,8 @@ def test_decimals_of_a_line_are_the_shortest(rows: list[tuple[float, float, floa
 
 
 @given(st.lists(st.lists(st.binary(max_size=300), max_size=4), min_size=1, max_size=4))
-def test_a_package_holds_its_pieces_in_order(entries: list[list[bytes]]) -> None:
+@example([[b"head", bytes(range(256)) * 1000, b"tail"]])  # longer than its zeros are moved at once
+def test_a_package_holds_its_pieces_in_order(entries):
     named = {f"e{number}": pieces for number, pieces in enumerate(entries)}
     content = zip_package({name: [deflate_text([p]) for p in ps] for name, ps in named.items()})
     with zipfile.ZipFile(io.BytesIO(content)) as file:
@@ -81,26 +60,36 @@ def test_a_package_holds_its_pieces_in_order(entries: list[list[bytes]]) -> None
             assert file.getinfo(name).date_time == (1980, 1, 1, 0, 0, 0)
 
 
-def test_a_long_piece_behind_another() -> None:
-    """Longer than the zeros that its checksum is moved over at once."""
-    pieces = [b"head", bytes(range(256)) * 1000, b"tail"]
-    content = zip_package({"a": [deflate_text([piece]) for piece in pieces]})
-    with zipfile.ZipFile(io.BytesIO(content)) as file:
-        assert file.read("a") == b"".join(pieces)
-
-
-def test_a_package_that_no_zip_can_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_that_no_zip_can_hold(monkeypatch):
     monkeypatch.setattr(package_module, "_LARGEST", 5)
     zip_package({"a": [deflate_text([b"12345"])]})
     with pytest.raises(WriteError, match="exceeds 4 GiB"):
         zip_package({"a": [deflate_text([b"123"]), deflate_text([b"456"])]})
 
 
+def test_whole_numbers_of_a_crate_file_as_openusd_reads_them(tmp_path):
+    """Differences of 1, 2 and 4 bytes, both signs, and those that leave 32 bits."""
+    from pxr import Usd
+
+    arrays = [
+        np.random.default_rng(size).integers(-largest, largest, size, endpoint=True)
+        for size in (0, 1, 15, 16, 17, 5000)
+        for largest in (1, 120, 130, 32_000, 33_000, 2**31 - 1)
+    ]
+    told = {f"a{k}": Attribute("int[]", values) for k, values in enumerate(arrays)}
+    path = tmp_path / "stage.usdc"
+    path.write_bytes(b"".join(crate_chunks(Prim("A", "Mesh", told))))
+    stage = Usd.Stage.Open(str(path))  # it ends with its last name
+    prim = stage.GetPrimAtPath("/A")
+    for k, values in enumerate(arrays):
+        assert list(prim.GetAttribute(f"a{k}").Get()) == list(values)
+
+
 BED = (250.0, 210.0)
-sides = st.floats(1.0, 205.0)
 
 
-def boxes(plate: Plate, sizes: list[Size]) -> list[tuple[float, float, float, float]]:
+def boxes(plate, sizes):
+    """Return x and y of the front left and of the back right corner of each part."""
     out = []
     for place in plate.places:
         width, depth = sizes[place.part][::-1] if place.turned else sizes[place.part]
@@ -108,56 +97,42 @@ def boxes(plate: Plate, sizes: list[Size]) -> list[tuple[float, float, float, fl
     return out
 
 
-@given(st.lists(st.tuples(sides, sides), max_size=25))
-def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size]) -> None:
-    plates = arrange_plates(sizes, BED)
+@given(
+    st.lists(st.tuples(st.floats(1.0, 256.0), st.floats(1.0, 256.0)), max_size=20),
+    st.sampled_from([(BED, (0.0, 0.0)), ((256.0, 256.0), (18.0, 28.0))]),
+)
+@example([(245.0, 201.0)], ((256.0, 256.0), (18.0, 28.0)))  # wider than what a rim leaves
+@example([(210.0, 250.0)], (BED, (0.0, 0.0)))  # the exact size of the bed, turned
+def test_parts_keep_their_distance_on_the_bed_and_off_its_blocked_corner(sizes, printer):
+    (width, depth), corner = printer
+    plates = arrange_plates(sizes, (width, depth), blocked_mm=corner)
     assert sorted(p.part for plate in plates for p in plate.places) == list(range(len(sizes)))
     for plate in plates:
-        assert plate.fits
         found = boxes(plate, sizes)
+        if not plate.fits:
+            ((left, front, right, back),) = found
+            short, long = sorted((right - left, back - front))
+            free = width - corner[0], depth - corner[1]
+            assert long > max(width, depth) - 1e-6 or short > min(free) - 1e-6
+            continue
         for left, front, right, back in found:
-            assert left >= -1e-6
-            assert front >= -1e-6
-            assert right <= BED[0] + 1e-6
-            assert back <= BED[1] + 1e-6
+            assert left >= corner[0] - 1e-6 or front >= corner[1] - 1e-6
+            assert min(left, front) >= -1e-6
+            assert right <= width + 1e-6
+            assert back <= depth + 1e-6
         for a, b in combinations(found, 2):
             apart = max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3])
             assert apart >= 5.0 - 1e-6
 
 
-@given(st.lists(st.tuples(st.floats(1.0, 256.0), st.floats(1.0, 256.0)), max_size=12))
-@example([(245.0, 201.0)])  # wider than what a rim leaves
-def test_nothing_lies_on_the_blocked_corner_of_the_bed(sizes: list[Size]) -> None:
-    corner, bed = (18.0, 28.0), (256.0, 256.0)
-    plates = arrange_plates(sizes, bed, blocked_mm=corner)
-    assert sorted(p.part for plate in plates for p in plate.places) == list(range(len(sizes)))
-    for plate in plates:
-        found = boxes(plate, sizes)
-        if not plate.fits:
-            (low,) = {(right - left, back - front) for left, front, right, back in found}
-            assert min(low) > 228.0 - 1e-6
-            continue
-        for left, front, right, back in found:
-            assert left >= corner[0] - 1e-6 or front >= corner[1] - 1e-6
-            assert min(left, front) >= -1e-6
-            assert max(right, back) <= 256.0 + 1e-6
-
-
-def test_a_brim_has_room_where_it_takes_no_more_plates() -> None:
+def test_a_brim_has_room_where_it_takes_no_more_plates():
     tight, wide = (arrange_plates([(60.0, 60.0)] * 9, (side, side)) for side in (195.0, 203.0))
     assert [len(tight), len(wide)] == [1, 1]
     assert np.array(boxes(wide[0], [(60.0, 60.0)] * 9)).min() == pytest.approx(6.5)
     assert np.array(boxes(tight[0], [(60.0, 60.0)] * 9)).min() == pytest.approx(2.5)
 
 
-def test_the_exact_size_of_the_bed_fits_also_turned() -> None:
-    (plate,) = arrange_plates([(210.0, 250.0)], BED)
-    assert plate.fits
-    assert plate.places[0].turned
-    assert (plate.places[0].x_mm, plate.places[0].y_mm) == pytest.approx((0.0, 0.0))
-
-
-def test_a_part_larger_than_the_bed_lies_alone_and_says_so() -> None:
+def test_a_part_larger_than_the_bed_lies_alone_and_says_so():
     plates = arrange_plates([(50.0, 50.0), (100.0, 260.0), (50.0, 50.0)], BED)
     assert [[p.part for p in plate.places] for plate in plates] == [[0, 2], [1]]
     assert plates[0].fits
@@ -166,7 +141,7 @@ def test_a_part_larger_than_the_bed_lies_alone_and_says_so() -> None:
     assert plates[1].places[0].turned
 
 
-def test_a_group_lies_on_one_plate_where_one_can_hold_it() -> None:
+def test_a_group_lies_on_one_plate_where_one_can_hold_it():
     sizes = [(60.0, 60.0)] * 18  # six to a cube; nine fit a bed
     plates = arrange_plates(sizes, (205, 205), groups=[k // 6 for k in range(18)])
     assert [sorted(p.part for p in plate.places) for plate in plates] == [
@@ -177,42 +152,3 @@ def test_a_group_lies_on_one_plate_where_one_can_hold_it() -> None:
     assert [len(plate.places) for plate in mixed] == [9]
     split = arrange_plates(sizes[:10], (205, 205), groups=[0] * 10)
     assert [len(plate.places) for plate in split] == [9, 1]
-
-
-STEP = 4.0
-
-
-def wanted_at(face: int, x: float, y: float, half_width: float) -> Label:
-    return Label(face, "", x, y, half_width)
-
-
-def places_of(seen: np.ndarray, step: float, wanted: list[Label]) -> list[tuple | None]:
-    return [one and (one.x, one.y) for one in place_labels(seen, step, wanted)]
-
-
-def the_map() -> np.ndarray:
-    """400 x 400 px: a large face 0 with face 1 in front of its middle; face 2 shows 4 places."""
-    seen = np.full((100, 100), -1)
-    seen[10:90, 10:90] = 0
-    seen[40:60, 40:60] = 1
-    seen[5:7, 5:7] = 2
-    return seen
-
-
-def test_hidden_faces_have_no_name() -> None:
-    wanted = [wanted_at(2, 24.0, 24.0, 20.0), wanted_at(3, 200.0, 200.0, 20.0)]
-    assert places_of(the_map(), STEP, wanted) == [None, None]
-    assert places_of(np.full((100, 100), -1), STEP, wanted) == [None, None]
-
-
-def test_labels_do_not_overlap() -> None:
-    seen = np.full((60, 60), -1)
-    for k in range(6):
-        seen[20:40, 6 * k + 10 : 6 * k + 16] = k
-    wanted = [wanted_at(k, STEP * (6 * k + 13), 120.0, 18.0) for k in range(6)]
-    places = places_of(seen, STEP, wanted)
-    found = [place for place in places if place is not None]
-    assert len(found) >= 5
-    for k, (x, y) in enumerate(found):
-        for other_x, other_y in found[:k]:
-            assert abs(x - other_x) >= 36 or abs(y - other_y) >= 2 * HALF_HEIGHT

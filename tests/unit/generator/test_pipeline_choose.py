@@ -8,39 +8,45 @@ from pathlib import Path
 
 import pytest
 
-from generator.database import open as open_module
 from generator.database.open import open_if_there
 from generator.database.transaction import read_transaction
-from generator.layout.layout import lay_out
-from generator.pipeline import encode, place
+from generator.pipeline import encode
 from generator.pipeline.choose import choose_array, lab_of
 from generator.spec import SpecError, read_specs
 
 DATABASES = Path(__file__).parents[3] / "fixtures" / "database"
-
-
-def dry(folder: Path, text: str, **options):
-    file = folder / "spec.yaml"
-    file.write_text(text)
-    url = f"sqlite:///{folder / 'lab.db'}"
-    return encode(read_specs([file]), database=url, folder=folder / "out",
-                  **({"dry_run": True} | options))  # fmt: skip
-
-
 DENSE = "symbols: {alphabet: dense-4}\n"  #: on the smaller arrays
 
 
-def choice(folder: Path, text: str):
+def specs(folder, text):
     file = folder / "spec.yaml"
     file.write_text(text)
+    return read_specs([file])
+
+
+def dry(folder, text, **options):
+    url = f"sqlite:///{folder / 'lab.db'}"
+    options = {"dry_run": True} | options
+    return encode(specs(folder, text), database=url, folder=folder / "out", **options)
+
+
+def made(folder, text, **options):
+    return dry(folder, text, **({"dry_run": False, "formats": ()} | options))
+
+
+def choice(folder, text):
     lab = open_if_there(f"sqlite:///{folder / 'lab.db'}")
     with read_transaction(lab) if lab else nullcontext() as connection:
-        specs = read_specs([file])
-        return choose_array(specs, lab_of(specs, connection), connection)
+        read = specs(folder, text)
+        return choose_array(read, lab_of(read, connection), connection)
 
 
-def profiles(found) -> set[str]:
+def profiles(found):
     return {one.spec.profile for one in found.plans}
+
+
+def pitches(found):
+    return {one.spec.style.pitch_mm for one in found.plans}
 
 
 def test_auto_takes_letters_that_the_sensor_tells_apart(tmp_path):
@@ -63,50 +69,36 @@ def test_auto_takes_letters_that_the_sensor_tells_apart(tmp_path):
 
 def test_a_lab_goes_on_with_its_letters(tmp_path):
     text = "name: {}\nshape: {{cube: 40 mm}}\n{}"
-    dry(tmp_path, text.format("Old", "profile: large\n"), dry_run=False, formats=())
+    made(tmp_path, text.format("Old", "profile: large\n"))
     (new,) = choice(tmp_path, text.format("New", "")).plans
     assert (new.spec.profile, new.spec.alphabet.name) == ("large", "dense-4")
     assert (new.spec.style.pitch_mm, new.array.rows) == (5.0, 51)
-    dry(tmp_path, text.format("Letters", "profile: tactel-8\n"), dry_run=False, formats=())
+    made(tmp_path, text.format("Letters", "profile: tactel-8\n"))
     (new,) = choice(tmp_path, text.format("New", "")).plans
     assert (new.spec.profile, new.spec.alphabet.name) == ("tactel-8", "tactel-8")
 
 
-def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
-    text = f"name: A\nprofile: auto\nshape: {{cube: 60 mm}}\n{DENSE}copies: "
-    smallest = choice(tmp_path, text + "36")
+def test_auto_takes_the_smallest_array_that_holds_the_objects_beside_those_there(tmp_path):
+    text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole, down: none}}\n"
+    text += DENSE.replace("{", "{{").replace("}", "}}") + "copies: {}\n"
+    first = made(tmp_path, text.format("A", 2))
+    assert (first.rows, first.columns) == (51, 1285)
+    smallest = choice(tmp_path, text.format("B", 2))
     assert (profiles(smallest), smallest.notes) == ({"large"}, ())
-    assert {one.spec.style.pitch_mm for one in smallest.plans} == {5.0}
-    larger = choice(tmp_path, text + "37")  # 36 leave room for as many
-    assert profiles(larger) == {"large-511x513"}
-    assert larger.plans[0].array.rows == 511
-    (note,) = larger.notes
+    more = choice(tmp_path, text.format("B", 4))
+    assert profiles(more) == {"large-511x513"}
+    assert more.plans[0].array.rows == 511
+    (note,) = more.notes
     assert note.startswith("profile large-511x513 is taken (window 3x3 in place of 4x2): ")
-    assert note.endswith("26862 cells are needed, and large 51x1285 has room for 26214")
-    assert larger.plans[36].spec.name == "A-37"
-
-
-@pytest.mark.parametrize("copies", [1, 2])
-def test_a_run_opens_the_database_once(tmp_path, monkeypatch, copies):
-    calls, database_engine = [], open_module.database_engine
-
-    def connectable(*arguments, **options):
-        calls.append(arguments)
-        return database_engine(*arguments, **options)
-
-    monkeypatch.setattr(open_module, "database_engine", connectable)
-    text = f"name: A\nshape: {{cube: 22 mm}}\nprint: {{parts: whole}}\ncopies: {copies}\n"
-    dry(tmp_path, text)
-    assert (calls, [file.name for file in tmp_path.iterdir()]) == ([], ["spec.yaml"])
-    for options in ({"dry_run": False, "formats": ()}, {"dry_run": False, "formats": ()}, {}):
-        calls.clear()
-        dry(tmp_path, text, **options)
-        assert len(calls) == 1
+    assert "cells are needed, and large 51x1285 has room for" in note
+    again = dry(tmp_path, text.format("A", 2))
+    assert again.objects[0].reused
+    assert (again.rows, again.columns) == (51, 1285)
 
 
 def test_auto_takes_finer_symbols_where_the_usual_ones_show_no_place(tmp_path):
     small = choice(tmp_path, "name: A\nshape: {cube: 16 mm}\n")
-    assert {plan.spec.style.pitch_mm for plan in small.plans} == {4.5}
+    assert pitches(small) == {4.5}
     assert "shows places on 6 of the 6 faces" in small.notes[-1]
     with pytest.raises(SpecError) as refused:
         choice(tmp_path, "name: A\nshape: {cube: 10 mm}\n")
@@ -114,100 +106,66 @@ def test_auto_takes_finer_symbols_where_the_usual_ones_show_no_place(tmp_path):
     assert "5 mm pitch" in problem.cause
     assert "set pitch" not in problem.fix  # 2.7 mm, which no nozzle of .4 mm prints
     assert "1.7 times larger" in problem.fix
+    for side, settings, pitch in (
+        (15, DENSE, 4.5),
+        (14, DENSE, 4.0),
+        # makes 4.5 mm, which show no more
+        (14, DENSE + "print: {printer: fdm-0.6}\n", 5.0),
+        (15, "symbols: {alphabet: dense-4, pitch: 5 mm}\n", 5.0),
+        (17, DENSE, 5.0),
+    ):
+        found = choice(tmp_path, f"name: A\nshape: {{box: [60, {side}, {side}]}}\n{settings}")
+        assert pitches(found) == {pitch}
+        assert bool(found.notes) == (pitch < 5)
 
 
 def test_an_object_that_is_made_again_has_the_pitch_of_its_changed_spec(tmp_path):
     text = "name: A\nshape: {{cube: 60 mm}}\nsymbols: {}\n"
-    pitches = []
+    found = []
     for symbols in ("{stroke: 2.4 mm}", "{}", "{}", "{stroke: 2.4 mm}"):
-        (made,) = dry(
-            tmp_path, text.format(symbols), dry_run=False, replace=True, formats=[]
-        ).objects
-        pitches.append((made.layout.pitch_mm, made.reused))
-        said = [
-            note for note in made.warnings if note.startswith("pitch 10 mm is taken; at 5 mm: ")
-        ]
+        (one,) = made(tmp_path, text.format(symbols), replace=True).objects
+        found.append((one.layout.pitch_mm, one.reused))
+        said = [note for note in one.warnings if note.startswith("pitch 10 mm is taken; at 5 mm: ")]
         assert bool(said) == (symbols != "{}")
-    assert pitches == [(10.0, False), (5.0, False), (5.0, True), (10.0, False)]
+    assert found == [(10.0, False), (5.0, False), (5.0, True), (10.0, False)]
 
 
 def test_printed_parts_of_a_replaced_object_are_not_read_as_the_new_one(tmp_path):
-    def made(side: int, printer: str, **options):
+    def cells_and_warnings(make, side, printer, *formats):
         text = f"name: A\nshape: {{cube: {side} mm}}\nprint: {{printer: {printer}}}\n"
-        (one,) = dry(tmp_path, text, replace=True, **options).objects
+        (one,) = make(tmp_path, text, replace=True, formats=formats).objects
         cells = {
             cell for face in one.layout.faces
             for cell in zip(face.rows.tolist(), face.columns.tolist(), strict=True)
         }  # fmt: skip
         return cells, " ".join(one.warnings)
 
-    first, said = made(60, "fdm-0.4", dry_run=False, formats=["step", "stl"])
+    first, said = cells_and_warnings(made, 60, "fdm-0.4", "step", "stl")
     assert said == ""
-    again, said = made(60, "prusa-mini", dry_run=False, formats=["stl"])  # printed ones stay good
+    again, said = cells_and_warnings(made, 60, "prusa-mini", "stl")  # printed ones stay good
     assert again == first
     assert "A-F1.step, A-F2.step" in said
     assert "destroy" not in said
-    planned, said = made(50, "prusa-mini")
+    planned, said = cells_and_warnings(dry, 50, "prusa-mini", "stl")
     assert "destroy its printed parts" in said
-    other, said = made(50, "prusa-mini", dry_run=False, formats=["stl"])
+    other, said = cells_and_warnings(made, 50, "prusa-mini", "stl")
     assert other == planned
     assert not other & first
     assert "destroy its printed parts" in said
 
 
-def test_auto_goes_on_where_the_database_is_full(tmp_path):
-    text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole, down: none}}\n"
-    text += "symbols: {{alphabet: dense-4}}\ncopies: {}\n"
-    first = dry(tmp_path, text.format("A", 2), dry_run=False, formats=())
-    assert (first.rows, first.columns) == (51, 1285)
-    assert profiles(choice(tmp_path, text.format("B", 2))) == {"large"}  # which is there for it
-    more = choice(tmp_path, text.format("B", 4))
-    assert profiles(more) == {"large-511x513"}
-    assert "large 51x1285 has room for" in more.notes[0]  # beside A
-    again = dry(tmp_path, text.format("A", 2))
-    assert again.objects[0].reused
-    assert (again.rows, again.columns) == (51, 1285)
-
-
 def test_a_database_goes_on_with_the_arrays_that_it_has(tmp_path):
     """Profile large was 255x257 when this one was made."""
-    new = "name: {}\nprofile: {}\nshape: {{cube: 30 mm}}\n"
-    assert dry(tmp_path, new.format("New", "large")).rows == 51
     shutil.copy(DATABASES / "v2.db", tmp_path / "lab.db")
-    for profile in ("large", "fine"):
-        result = dry(tmp_path, new.format(f"New {profile}", profile), dry_run=False, formats=())
-        assert (result.rows, result.columns) == (255, 257)
-        assert result.used_cells > result.objects[0].symbols  # beside the brick
+    result = made(tmp_path, "name: New\nprofile: large\nshape: {cube: 30 mm}\n")
+    assert (result.rows, result.columns) == (255, 257)
+    assert result.used_cells > result.objects[0].symbols  # beside the brick
     brick = "name: Brick\nprofile: {}\nshape: {{box: [40, 30, 20]}}\n"
     for profile in ("large", "auto"):  # of 7 mm, as it is registered
-        (same,) = dry(tmp_path, brick.format(profile)).objects
-        assert same.reused
+        assert dry(tmp_path, brick.format(profile)).objects[0].reused
     beside = choice(tmp_path, f"objects:\n- {{{brick[:11]}, shape: {{box: [40, 30, 20]}}}}\n"
                     "- {name: Beside, shape: {cube: 30 mm}}\n")  # fmt: skip
-    assert [one.spec.style.pitch_mm for one in beside.plans] == [7.0, 7.0]
-    many = choice(tmp_path, new.format("Many", "auto") + "copies: 120\n")
-    assert profiles(many) == {"large"}
-    assert many.plans[0].spec.encoding["rows"] == 255
-    assert dry(tmp_path, new.format("Other", "one-touch")).rows == 63
-
-
-def test_auto_takes_finer_symbols_on_a_printer_that_makes_them(tmp_path):
-    text = "name: A\nshape: {box: [60, 15, 15]}\n"
-    found = choice(tmp_path, text + DENSE)
-    assert profiles(found) == {"large"}
-    assert found.plans[0].spec.style.pitch_mm == 4.5
-    (note,) = found.notes
-    assert note.startswith("pitch 4.5 mm is taken: it shows places on 2 of the 2 faces")
-    for box, settings, pitch in (
-        ("[60, 14, 14]", DENSE, 4.0),
-        # makes 4.5 mm, which show no more
-        ("[60, 14, 14]", DENSE + "print: {printer: fdm-0.6}\n", 5.0),
-        ("[60, 15, 15]", "symbols: {alphabet: dense-4, pitch: 5 mm}\n", 5.0),
-        ("[60, 17, 17]", DENSE, 5.0),
-    ):
-        found = choice(tmp_path, f"name: A\nshape: {{box: {box}}}\n{settings}")
-        assert found.plans[0].spec.style.pitch_mm == pitch
-        assert bool(found.notes) == (pitch < 5)
+    assert pitches(beside) == {7.0}
 
 
 def test_auto_follows_a_profile_that_the_set_names(tmp_path):
@@ -219,18 +177,15 @@ def test_auto_follows_a_profile_that_the_set_names(tmp_path):
         dry(tmp_path, two)
 
 
-def test_each_face_is_told_with_the_least_size_that_shows_a_place(tmp_path):
-    (made,) = dry(tmp_path, "name: A\nshape: {cube: 60 mm}\nprofile: one-touch\n").objects
-    assert [face.name for face in made.face_reports] == [f"F{k}" for k in range(1, 7)]
-    least = made.face_reports[0].smallest_mm[0]
+def test_the_least_size_of_a_face_shows_a_place(tmp_path):
+    (cube,) = dry(tmp_path, "name: A\nshape: {cube: 60 mm}\nprofile: one-touch\n").objects
+    least = cube.face_reports[0].smallest_mm[0]
     assert 18 < least < 24
     box = "name: A\nshape: {{box: [60, {0:.2f}, {0:.2f}]}}\nlayout: faces\nprofile: one-touch\n"
-    (enough,) = dry(tmp_path, box.format(least + 0.5)).objects
-    assert enough.face_reports[2].places > 0
-    (short,) = dry(tmp_path, box.format(least - 1.5)).objects
-    square = [face for face in short.face_reports if max(face.size_mm) < 59]
-    assert square
-    assert not any(face.places for face in square)
+    for side, shows in ((least + 0.5, True), (least - 1.5, False)):
+        (one,) = dry(tmp_path, box.format(side)).objects
+        square = [face for face in one.face_reports if max(face.size_mm) < 59]
+        assert [bool(face.places) for face in square] == [shows] * 2
 
 
 @pytest.mark.parametrize(
@@ -254,25 +209,6 @@ def test_what_cannot_be_made_is_refused_where_it_is_asked_for(tmp_path, settings
 
 
 def test_a_part_larger_than_the_bed_is_told_before_it_is_made(tmp_path):
-    text = "name: A\nshape: {tag: 400 x 20 mm}\n"
+    (one,) = dry(tmp_path, "name: A\nshape: {tag: 400 x 20 mm}\n").objects
     said = "larger than the bed of fdm-0.4, 250 x 210 mm: A; take a larger printer"
-    for options in ({}, {"dry_run": False, "formats": ["stl"]}):
-        (one,) = dry(tmp_path, text, **options).objects
-        assert said in one.warnings
-
-
-@pytest.mark.parametrize("copies", [1, 3])
-def test_a_new_lab_lays_its_first_objects_out_once(tmp_path, monkeypatch, copies):
-    """The choice of the array, the dry build and, of one object, the making share the layout."""
-    shapes = []
-
-    def counted(polyhedron, array, *rest, **more):
-        shapes.append(array)
-        return lay_out(polyhedron, array, *rest, **more)
-
-    monkeypatch.setattr(place, "lay_out", counted)
-    spec = tmp_path / "a.yaml"
-    spec.write_text(f"{{name: A, shape: {{cube: 40 mm}}, copies: {copies}}}")
-    url = f"sqlite:///{tmp_path / 'lab.db'}"
-    encode(read_specs([spec]), database=url, folder=tmp_path, formats=(), jobs=1)
-    assert len(shapes) == (1 if copies == 1 else 1 + copies)
+    assert said in one.warnings

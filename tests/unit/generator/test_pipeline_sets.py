@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import pickle
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from generator.database import cells as cells_module
-from generator.database.cells import taken_tiles
+from encoded_objects.base.document import Problem
 from generator.database.open import open_database
 from generator.database.read import read_layout
 from generator.database.transaction import read_transaction
 from generator.errors import DatabaseError
-from generator.layout import occupancy
-from generator.layout.occupancy import tiles_of
 from generator.pipeline import encode
 from generator.pipeline.files import parts_of
 from generator.pipeline.make import MakeJob, make_at, make_under_lock
@@ -35,34 +32,31 @@ objects:
 """
 
 
-def specs(folder: Path, text: str = SET):
+def specs(folder, text=SET):
     file = folder / "lab-set.yaml"
     file.write_text(text)
     return read_specs([file])
 
 
-def run(folder: Path, text: str = SET, **options):
+def run(folder, text=SET, **options):
     url = f"sqlite:///{folder / 'lab.db'}"
     return encode(specs(folder, text), folder=folder / "out", database=url, **options)
 
 
-def digests(folder: Path) -> dict[str, str]:
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
-    return {
-        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in files
-    }
+def digests(folder):
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder): hashlib.sha256(path.read_bytes()).digest() for path in files}
 
 
 @pytest.fixture(scope="module")
-def once(tmp_path_factory: pytest.TempPathFactory):
+def once(tmp_path_factory):
     """A set that was made here, with its database."""
     folder = tmp_path_factory.mktemp("set")
     return folder, run(folder, jobs=1, formats=("stl", "3mf"))
 
 
 @pytest.fixture
-def there(once, tmp_path: Path) -> Path:
+def there(once, tmp_path):
     """A copy of it."""
     shutil.copytree(once[0], tmp_path, dirs_exist_ok=True)
     return tmp_path
@@ -99,40 +93,6 @@ def test_a_changed_spec_in_a_set_is_refused_and_the_rest_stays(there):
     assert [made.reused for made in replaced.objects] == [False, True, True]
 
 
-class PlacesChosenError(Exception):
-    """Ends a run before anything is made."""
-
-
-def counted(folder: Path, copies: int, monkeypatch) -> tuple[int, int]:
-    """Return how many cells are worked on to place copies, and how often the database is read."""
-
-    def progress(what: str, _: float) -> None:
-        if what.startswith("making"):
-            raise PlacesChosenError
-
-    cells, reads = [], []
-    count = lambda rows, columns: cells.append(len(rows)) or tiles_of(rows, columns)  # noqa: E731
-    run(folder, "name: C\nshape: {cube: 22 mm}\n", formats=())
-    with monkeypatch.context() as patched:
-        patched.setattr(occupancy, "tiles_of", count)
-        read = lambda *given: reads.append(1) or taken_tiles(*given)  # noqa: E731
-        patched.setattr(cells_module, "taken_tiles", read)
-        text = f"name: D\nshape: {{cube: 22 mm}}\nprofile: large\ncopies: {copies}\n"
-        with pytest.raises(PlacesChosenError):
-            run(folder, text, jobs=1, progress=progress)
-    return sum(cells), len(reads)
-
-
-def test_placing_many_copies_costs_in_proportion_to_their_number(tmp_path, monkeypatch):
-    folders = [tmp_path / name for name in "ab"]
-    for folder in folders:
-        folder.mkdir()
-    few, some = (counted(f, n, monkeypatch) for f, n in zip(folders, (5, 20), strict=True))
-    assert few[0] > 0
-    assert some[0] == 4 * few[0]  # 16 times, were each placed beside a list of all before it
-    assert some[1] == few[1]  # the database is read for the set, not for each copy
-
-
 def cells_held(engine):
     """Every cell of A and B, as the database has them."""
     with read_transaction(engine) as connection:
@@ -160,19 +120,18 @@ def test_an_object_whose_cells_another_writer_took_is_placed_again(tmp_path):
     assert second.layout is not chosen[1].layout
     cells = cells_held(engine)
     assert len(set(cells)) == len(cells) == first.symbols + second.symbols
+    again = make_at(engine, jobs[0], chosen[0])  # another writer made it meanwhile
+    assert (again.reused, again.symbols) == (True, first.symbols)
 
 
 def test_a_dry_build_counts_while_the_array_is_empty(tmp_path):
     engine, jobs = two_jobs(tmp_path)
-    placed = [place_object(None, job.plan, replace=False) for job in jobs]
-    dry = [
-        replace(one, built=parts_of(job.plan, one.layout))
-        for one, job in zip(placed, jobs, strict=True)
-    ]
-    first, second = (
-        make_under_lock(engine, job, dry_build=placed)
-        for job, placed in zip(jobs, dry, strict=True)
-    )
+    dry = []
+    for job in jobs:
+        placed = place_object(None, job.plan, replace=False)
+        dry.append(replace(placed, built=parts_of(job.plan, placed.layout)))
+    first = make_under_lock(engine, jobs[0], dry_build=dry[0])
+    second = make_under_lock(engine, jobs[1], dry_build=dry[1])
     again = make_under_lock(engine, jobs[0], dry_build=dry[0])
     assert first.layout is dry[0].layout
     assert second.layout is not dry[1].layout  # the first one's cells were free then
@@ -182,38 +141,23 @@ def test_a_dry_build_counts_while_the_array_is_empty(tmp_path):
     assert len(set(cells)) == len(cells) == first.symbols + second.symbols
 
 
-def test_an_object_that_another_writer_made_meanwhile_keeps_its_cells(tmp_path):
-    engine, jobs = two_jobs(tmp_path)
-    make_under_lock(engine, jobs[1])  # moves what is free
-    with read_transaction(engine) as connection:
-        chosen = place_object(connection, jobs[0].plan, replace=False)
-    other = make_under_lock(engine, jobs[0])
-    mine = make_at(engine, jobs[0], chosen)
-    assert mine.reused
-    assert mine.symbols == other.symbols
-
-
-def test_errors_come_back_from_other_processes(tmp_path):
-    with pytest.raises(SpecError) as caught:
-        read_specs([tmp_path / "none.yaml"])
-    error = SpecError(caught.value.problems).__reduce__()
-    assert str(error[0](*error[1])) == str(caught.value)
+def test_errors_come_back_from_other_processes():
     tasks = [Task(str(k), int, (text,)) for k, text in enumerate(["1", "x", "3", "y"])]
-    for jobs in (1, 2):
-        with Workers(jobs) as workers, pytest.raises(ValueError, match="'x'"):
-            workers.done(tasks, no_progress)
+    with Workers(2) as workers, pytest.raises(ValueError, match="'x'"):
+        workers.done(tasks, no_progress)
+    error = SpecError([Problem("a cause", "a fix", file="c.yaml")])
+    assert str(pickle.loads(pickle.dumps(error))) == str(error)
 
 
-@pytest.mark.parametrize("copies", [1, 12])
-def test_a_refused_set_leaves_no_database(tmp_path, copies):
-    """A part of the second object cannot be made, or the array does not hold all copies."""
-    size = "[60 mm, 60 mm, 5 mm]" if copies == 1 else "[60 mm, 60 mm, 60 mm]"
-    path = tmp_path / "set.yaml"
-    path.write_text(
-        "objects:\n- {name: A, shape: {cube: 60 mm}}\n"
-        f"- {{name: B, shape: {{box: {size}}}, copies: {copies}}}\n"
-        + ("profile: one-touch\n" if copies > 1 else "")
-    )
+@pytest.mark.parametrize(
+    "second",
+    ["{name: B, shape: {box: [60, 60, 5]}}", "{name: B, shape: {cube: 60}, copies: 12}"],
+    ids=["cannot be made", "no room"],
+)
+def test_a_refused_set_leaves_no_database(tmp_path, second):
     with pytest.raises(SpecError):
-        encode(read_specs([path]), folder=tmp_path / "out", database=f"sqlite:///{tmp_path}/l.db")
-    assert [file.name for file in tmp_path.iterdir()] == ["set.yaml"]
+        run(
+            tmp_path,
+            f"objects:\n- {{name: A, shape: {{cube: 60}}}}\n- {second}\nprofile: one-touch\n",
+        )
+    assert [file.name for file in tmp_path.iterdir()] == ["lab-set.yaml"]

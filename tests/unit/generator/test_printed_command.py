@@ -14,15 +14,13 @@ import pytest
 from PIL import Image
 
 from generator.command import run
-from generator.errors import PrintError
 from generator.pipeline import printed_check
 from generator.printed import slicer
 from generator.printed.check import PrintedCheck
-from generator.printed.slicer import PrintProfile
 from generator.printed.survey import SymbolCheck, SymbolTile
 
 
-def tile(face: str, label: int, overlap: float, height: float, verdict: str) -> SymbolTile:
+def tile(face, label, overlap, height, verdict):
     check = SymbolCheck("Cube-F1", face, f"r0c{label}", label, overlap, 0.5, 13.5, 0.4, 0.2,
                         height, 1.0, (0.0, 0.0), verdict)  # fmt: skip
     designed = np.zeros((41, 41))
@@ -39,14 +37,14 @@ TILES = (
 
 
 @pytest.fixture
-def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[object]:
+def asked(tmp_path, monkeypatch):
     """What was asked of the simulated print; it answers with `TILES`."""
     monkeypatch.chdir(tmp_path)
     Path("c.yaml").write_text("name: Cube\nshape: {cube: 30 mm}\n")
-    calls: list[object] = []
+    calls = []
 
-    def check_parts(parts: object, profile: PrintProfile, **options: object) -> PrintedCheck:
-        calls.append((len(parts), profile.name, options["faults"].flow))  # type: ignore[arg-type]
+    def check_parts(parts, profile, **options):
+        calls.append((len(parts), profile.name, options["faults"].flow))
         return PrintedCheck(profile.name, TILES, ("F6 of Cube",), ())
 
     monkeypatch.setattr(printed_check, "find_slicer", lambda: "prusa-slicer")
@@ -54,30 +52,24 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[object]:
     return calls
 
 
-def test_a_table_of_symbols_and_a_picture_and_nothing_registered(
-    asked: list[object], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_table_of_symbols_and_a_picture_and_nothing_registered(asked, capsys):
     assert run(["c.yaml", "--printed-check", "-o", "seen"]) == 0
     out, err = capsys.readouterr()
     assert asked == [(6, "fdm-0.4-0.2", 1.0)]
     assert "Cube on fdm-0.4-0.2" in out
-    rows = [line.split() for line in out.splitlines() if line.split()[:1] in (["F1"], ["F2"])]
-    assert rows == [
-        ["F1", "0", "2", "0.970", "0.950", "0.40", "0.20", "1.00", "of", "1.00", "2"],
-        ["F2", "A^2", "2", "0.410", "0.200", "0.40", "0.20", "1.20", "of", "1.00", "1", "1"],
-    ]
+    rows = {" ".join(line.split()) for line in out.splitlines()}
+    assert "F1 0 2 0.970 0.950 0.40 0.20 1.00 of 1.00 2" in rows
+    assert "F2 A^2 2 0.410 0.200 0.40 0.20 1.20 of 1.00 1 1" in rows
     assert "2 of 4 symbols survive, 1 doubtful, 1 lost" in out
     assert "warning: symbols print 1.20 mm high, 1 mm was designed" in err
     assert "F6 of Cube" in err
     with Image.open("seen/Cube-printed.png") as picture:
         assert picture.size[0] > 800
-    assert not Path("lab.db").exists()
-    assert sorted(path.name for path in Path.cwd().rglob("*")) == [
-        "Cube-printed.png", "c.yaml", "seen",
-    ]  # fmt: skip
+    files = sorted(str(path) for path in Path().rglob("*.*"))
+    assert files == ["c.yaml", "seen/Cube-printed.png"]
 
 
-def test_json(asked: list[object], capsys: pytest.CaptureFixture[str]) -> None:
+def test_json(asked, capsys):
     options = ["--print-profile", "fdm-0.6-0.3", "--print-faults", "bad", "-o", "seen", "--json"]
     assert run(["c.yaml", "--printed-check", *options]) == 0
     assert asked == [(6, "fdm-0.6-0.3", 1.06)]
@@ -91,13 +83,10 @@ def test_json(asked: list[object], capsys: pytest.CaptureFixture[str]) -> None:
     assert (second["survives"], second["doubtful"], second["lost"]) == (0, 1, 1)
 
 
-def test_without_a_slicer_one_clear_line_and_exit_code_2(
-    asked: list[object], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("asked")
+def test_without_a_slicer_one_clear_line_and_exit_code_2(capsys, monkeypatch):
     monkeypatch.setattr(printed_check, "find_slicer", slicer.find_slicer)
     monkeypatch.setattr(slicer.shutil, "which", lambda _name: None)
-    with pytest.raises(PrintError):
-        slicer.find_slicer()
     assert run(["c.yaml", "--printed-check"]) == 2
     assert capsys.readouterr().err == (
         "error: PrusaSlicer is not installed\n"

@@ -15,7 +15,6 @@ from generator.errors import PrintError
 from generator.printed.gcode import (
     ROLES,
     ArcError,
-    Toolpath,
     chords,
     read_gcode,
     role_of,
@@ -27,7 +26,7 @@ SECTION = 0.2 * (0.45 - 0.2 * (1 - math.pi / 4))  #: of the beads in gcode/READM
 FILAMENT = math.pi * 1.75**2 / 4
 
 
-def widths(path: Toolpath) -> np.ndarray:
+def widths(path):
     laid = path.of_part
     h = path.height_mm[laid]
     return path.volume_mm3[laid] / path.length_mm[laid] / h + h * (1 - math.pi / 4)
@@ -41,7 +40,7 @@ def widths(path: Toolpath) -> np.ndarray:
         ("orca", {"outer wall", "top"}),
     ],
 )
-def test_every_dialect_gives_the_same_square_and_half_circle(name: str, roles: set[str]) -> None:
+def test_every_dialect_gives_the_same_square_and_half_circle(name, roles):
     path = read_gcode(FILES / f"{name}.gcode")
     laid = path.of_part
     assert path.dialect == name
@@ -60,7 +59,7 @@ def test_every_dialect_gives_the_same_square_and_half_circle(name: str, roles: s
     assert path.strokes()[laid].tolist() == [0] * 4 + [1] * int(half.sum())
 
 
-def test_prusaslicer_itself_says_the_widths_that_its_volumes_have() -> None:
+def test_prusaslicer_itself_says_the_widths_that_its_volumes_have():
     path = read_gcode(FILES / "prusaslicer.gcode")
     laid = path.of_part
     assert path.dialect == "prusaslicer"
@@ -87,7 +86,7 @@ def test_prusaslicer_itself_says_the_widths_that_its_volumes_have() -> None:
         "G28\nM83\nG1 X1 Y2 Z5\nG1 E-2\nG1 Z.2\nG1 E2\nG1 X11 E.5\nG1 Y12 E.5\nG1 X3 E-.3",
     ],
 )
-def test_coordinates_of_every_kind(text: str) -> None:
+def test_coordinates_of_every_kind(text):
     path = toolpath_of(text)
     laid = path.of_part
     shift = path.start_mm[laid][0] - [1, 2, 0.2]
@@ -97,43 +96,38 @@ def test_coordinates_of_every_kind(text: str) -> None:
     assert path.volume_mm3[laid] == pytest.approx([0.5 * FILAMENT] * 2, rel=1e-4)
 
 
-def test_filament_and_volumes() -> None:
+def test_filament_and_volumes():
     moves = "M83\nG1 X10 Z.2 E.5"
     assert toolpath_of(moves).volume_mm3[0] == pytest.approx(0.5 * FILAMENT)
-    thick = 0.5 * math.pi * 2.85**2 / 4
-    assert toolpath_of(moves + "\n; filament_diameter = 2.85,1.75").volume_mm3[0] == pytest.approx(
-        thick
-    )
+    thick = toolpath_of(moves + "\n; filament_diameter = 2.85,1.75")
+    assert thick.volume_mm3[0] == pytest.approx(0.5 * math.pi * 2.85**2 / 4)
     for volumetric in ("M200 D1.75\n", ";FLAVOR:Marlin(Volumetric)\n"):
         assert toolpath_of(volumetric + moves).volume_mm3[0] == pytest.approx(0.5)
 
 
-def test_heights_are_those_of_the_layers_where_no_comment_says_them() -> None:
+def test_heights_are_those_of_the_layers_where_no_comment_says_them():
     path = toolpath_of("M83\nG1 Z.3\nG1 X10 E1\nG1 Z2\nG1 X0 Z.5\nG1 X10 E1\nG1 Z.7\nG1 X0 E1")
     assert path.height_mm[path.of_part] == pytest.approx([0.3, 0.2, 0.2])
 
 
-def test_skirts_supports_and_the_machines_own_lines_are_no_part() -> None:
+def test_skirts_supports_and_the_machines_own_lines_are_no_part():
     text = "M83\nG1 Z.2\nG1 X60 E9\n;TYPE:{}\nG1 Y9 E1\n;TYPE:Perimeter\nG1 X5 E.4"
     for feature in ("Skirt/Brim", "Support material interface", "Wipe tower", "Custom"):
         path = toolpath_of(text.format(feature))
         assert path.of_part.tolist() == [False, False, False, True]
 
 
-@pytest.mark.parametrize(
-    ("feature", "role"),
-    [
+def test_features():
+    for feature, role in (
         ("Overhang perimeter", "overhang"), ("Top solid infill", "top"), ("SKIN", "solid"),
         ("FILL", "infill"), ("Internal Bridge", "bridge"), ("Gap infill", "gap fill"),
         ("WALL-INNER", "inner wall"), ("PRIME-TOWER", "support"),
         ("Floating vertical shell", "unknown"),
-    ],
-)  # fmt: skip
-def test_features(feature: str, role: str) -> None:
-    assert ROLES[role_of(feature)] == role
+    ):  # fmt: skip
+        assert ROLES[role_of(feature)] == role
 
 
-def test_arcs_stay_on_their_circle() -> None:
+def test_arcs_stay_on_their_circle():
     for clockwise, sweep in ((False, math.pi / 2), (True, 3 * math.pi / 2)):
         points = [(1.0, 0.0), *chords((1, 0), (0, 1), {"I": -1.0}, clockwise=clockwise)]
         length = sum(math.dist(a, b) for a, b in pairwise(points))
@@ -148,12 +142,9 @@ def test_arcs_stay_on_their_circle() -> None:
     full = chords((1, 0), (1, 0), {"I": -1.0}, clockwise=True)
     twice = chords((1, 0), (1, 0), {"I": -1.0, "P": 2}, clockwise=True)
     assert len(twice) == pytest.approx(2 * len(full), abs=1)
-
-
-@pytest.mark.parametrize("words", [{}, {"R": 0.5}, {"I": 3.0}])
-def test_arcs_that_lead_nowhere(words: dict[str, float]) -> None:
-    with pytest.raises(ArcError):
-        chords((1, 0), (0, 1), words, clockwise=False)
+    for words in ({}, {"R": 0.5}, {"I": 3.0}):
+        with pytest.raises(ArcError):
+            chords((1, 0), (0, 1), words, clockwise=False)
 
 
 @pytest.mark.parametrize(
@@ -166,39 +157,37 @@ def test_arcs_that_lead_nowhere(words: dict[str, float]) -> None:
         (";WIDTH:wide", 1, "'wide' is no number"),
     ],
 )
-def test_errors_say_file_and_line(text: str, line: int, says: str) -> None:
+def test_errors_say_file_and_line(text, line, says):
     with pytest.raises(PrintError, match=says) as caught:
         toolpath_of(text, "part.gcode")
     assert caught.value.place == f"part.gcode:{line}"
     assert caught.value.fix
 
 
-def test_files_that_hold_nothing(tmp_path: Path) -> None:
-    with pytest.raises(PrintError, match="nothing is printed in 2 lines"):
-        toolpath_of("G28\nG1 X5")
-    with pytest.raises(PrintError, match="cannot be read: No such file"):
-        read_gcode(tmp_path / "none.gcode")
-    (tmp_path / "b.bgcode").write_bytes(b"GCDE\x01\x00")
-    with pytest.raises(PrintError, match="binary"):
-        read_gcode(tmp_path / "b.bgcode")
-    with zipfile.ZipFile(tmp_path / "u.3mf", "w") as archive:
-        archive.writestr("3D/3dmodel.model", "<model/>")
-    with pytest.raises(PrintError, match="no plate"):
-        read_gcode(tmp_path / "u.3mf")
-    (tmp_path / "broken.3mf").write_bytes(b"PK\x03\x04broken")
-    with pytest.raises(PrintError, match="no plate"):
-        read_gcode(tmp_path / "broken.3mf")
+def test_files_that_hold_nothing_and_a_plate_of_bambu_studio(tmp_path):
+    def packed(member, text):
+        stored = io.BytesIO()
+        with zipfile.ZipFile(stored, "w") as archive:
+            archive.writestr(member, text)
+        return stored.getvalue()
 
-
-def test_a_plate_of_bambu_studio_is_opened(tmp_path: Path) -> None:
-    stored = io.BytesIO()
-    with zipfile.ZipFile(stored, "w") as archive:
-        archive.writestr("Metadata/plate_1.gcode", (FILES / "bambu.gcode").read_text())
-    (tmp_path / "tile.gcode.3mf").write_bytes(stored.getvalue())
+    for name, content, says in (
+        ("a.gcode", b"G28\nG1 X5", "nothing is printed in 2 lines"),
+        ("none.gcode", None, "cannot be read: No such file"),
+        ("b.bgcode", b"GCDE\x01\x00", "binary"),
+        ("u.3mf", packed("3D/3dmodel.model", "<model/>"), "no plate"),
+        ("broken.3mf", b"PK\x03\x04broken", "no plate"),
+    ):
+        if content is not None:
+            (tmp_path / name).write_bytes(content)
+        with pytest.raises(PrintError, match=says):
+            read_gcode(tmp_path / name)
+    plate = packed("Metadata/plate_1.gcode", (FILES / "bambu.gcode").read_text())
+    (tmp_path / "tile.gcode.3mf").write_bytes(plate)
     assert read_gcode(tmp_path / "tile.gcode.3mf").of_part.sum() > 10
 
 
-def test_volumes_that_contradict_the_widths_are_refused() -> None:
+def test_volumes_that_contradict_the_widths_are_refused():
     moves = "".join(f"G1 X{10 * (k % 2)} Y{k} E.35\n" for k in range(1, 13))
     text = "M83\nG1 Z.2\n;TYPE:Perimeter\n;WIDTH:0.45\n" + moves
     assert toolpath_of(text).of_part.sum() == 12

@@ -15,18 +15,7 @@ from generator.alphabet.outline import SymbolStyle, outlines
 from generator.errors import PrintError
 from generator.plane.polygon import points_inside
 from generator.printed import prints
-from generator.printed.gcode import toolpath_of
-from generator.printed.prints import (
-    FaceOnPart,
-    PrintJob,
-    left_to_print,
-    print_part,
-    print_plan,
-    surface_keys,
-    surface_path,
-    symbols_shift,
-)
-from generator.printed.slicer import SlicedPart
+from generator.printed.prints import FaceOnPart, PrintJob, print_plan, surface_keys, symbols_shift
 from generator.printed.surface import (
     UNIT_MM,
     PrintedSurface,
@@ -34,14 +23,23 @@ from generator.printed.surface import (
     read_surface,
     write_surface,
 )
-from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, SymbolTile, rings_at, survey_face
+from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, rings_at, survey_face
 from generator.solid.part import Embossing, turn
 
-SIZE = np.array([9.0, 6.0, 0.6])
+TIERS = outlines(alphabet_named("dense-4"), SymbolStyle())
+CENTRES = np.array([[5.0, 5.0], [12.0, 5.0], [5.0, 12.0], [12.0, 12.0]])
+ASIDE = (0.15, -0.1)
 
 
-def rough_surface(rng: np.random.Generator) -> PrintedSurface:
-    heights = rng.uniform(-2.5, 1.4, (40, 60)).astype(np.float32)
+def embossing(rotation=0.0):
+    T = np.eye(4)
+    T[2, 3] = 3.0
+    names = tuple(f"r{k}c0" for k in range(4))
+    return Embossing(0, 0, T, rotation, CENTRES, np.arange(4), names, TIERS, 7.0)
+
+
+def rough_surface():
+    heights = np.random.default_rng(1).uniform(-2.5, 1.4, (40, 60)).astype(np.float32)
     heights[:5] = -np.inf
     T = np.eye(4)
     T[:2, :2] = [[0.0, -1.0], [1.0, 0.0]]
@@ -49,46 +47,34 @@ def rough_surface(rng: np.random.Generator) -> PrintedSurface:
     return PrintedSurface(heights, (-0.5, 0.25), 0.05, T)
 
 
-def test_a_surface_reads_as_it_was_to_half_a_unit(tmp_path: Path) -> None:
-    rng = np.random.default_rng(1)
-    surface = rough_surface(rng)
-    write_surface(surface, tmp_path / "a")
+@pytest.mark.parametrize("moved", [(0.0, 0.0), (0.3, -0.2)])
+def test_a_surface_reads_as_it_was_and_is_moved_back(tmp_path, moved):
+    surface = rough_surface()
+    write_surface(surface, tmp_path / "a", moved_mm=moved)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "a.npy"]
     held = read_surface(tmp_path / "a")
-    points = rng.uniform(-5.0, 6.0, (4000, 2))
-    asked, found = surface.heights_mm(points), held.heights_mm(points)
+    assert held.moved_mm == moved
+    points = np.random.default_rng(3).uniform(-5.0, 6.0, (4000, 2))
+    asked, found = surface.heights_mm(points + moved), held.heights_mm(points)
     laid = np.isfinite(asked)
     assert 100 < laid.sum() < 4000
     assert (laid == np.isfinite(found)).all()
     assert np.abs(asked[laid] - found[laid]).max() <= UNIT_MM / 2 + 1e-9
     assert surface.top_mm <= held.top_mm <= surface.top_mm + UNIT_MM
     assert found.max() <= held.top_mm
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "a.npy"]
 
 
-def test_a_print_that_stands_aside_is_moved_back(tmp_path: Path) -> None:
-    surface = rough_surface(np.random.default_rng(2))
-    write_surface(surface, tmp_path / "a", moved_mm=(0.3, -0.2))
-    held = read_surface(tmp_path / "a")
-    points = np.random.default_rng(3).uniform(0.0, 3.0, (500, 2))
-    asked = surface.heights_mm(points + np.array((0.3, -0.2)))
-    assert np.isfinite(asked).any()
-    assert held.heights_mm(points) == pytest.approx(asked, abs=UNIT_MM)
-    assert held.moved_mm == (0.3, -0.2)
-
-
-def test_what_is_damaged_or_of_another_format_is_no_surface(tmp_path: Path) -> None:
+def test_what_is_damaged_or_of_another_format_is_no_surface(tmp_path):
     path = tmp_path / "a"
-    assert not is_written(path)
     with pytest.raises(PrintError, match="not there or cannot be read") as caught:
         read_surface(path)
     assert "--resume" in caught.value.fix
-    write_surface(rough_surface(np.random.default_rng(1)), path)
+    write_surface(rough_surface(), path)
     assert is_written(path)
     values = json.loads((tmp_path / "a.json").read_text())
-    (tmp_path / "a.json").write_text(json.dumps(values | {"format": 0}))
-    assert not is_written(path)
-    (tmp_path / "a.json").write_text("{")
-    assert not is_written(path)
+    for text in (json.dumps(values | {"format": 0}), "{"):
+        (tmp_path / "a.json").write_text(text)
+        assert not is_written(path)
     with pytest.raises(PrintError):
         read_surface(path)
     (tmp_path / "a.json").write_text(json.dumps(values))
@@ -96,55 +82,14 @@ def test_what_is_damaged_or_of_another_format_is_no_surface(tmp_path: Path) -> N
     assert not is_written(path)
 
 
-def wall_gcode() -> str:
-    """A block of SIZE in three layers, lines along x, its middle at (50, 50)."""
-    lines = ["M83"]
-    for k in (1, 2, 3):
-        lines.append(f"G1 Z{0.2 * k:.1f}")
-        for n in range(15):
-            y = 50 - SIZE[1] / 2 + 0.2 + 0.4 * n
-            lines += [f"G1 X{50 - SIZE[0] / 2 + 0.2} Y{y:.3f}", f"G1 X{50 + SIZE[0] / 2 - 0.2} E.3"]
-    return "\n".join(lines)
-
-
-@pytest.fixture
-def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> PrintJob:
-    """A block with a face on top; the slicer is left out."""
-    T_part_gcode = np.eye(4)
-    T_part_gcode[:2, 3] = -50.0
-    low = np.array([-SIZE[0] / 2, -SIZE[1] / 2, 0.0])
-    sliced = SlicedPart(toolpath_of(wall_gcode()), T_part_gcode, low, low + SIZE)
+def test_a_key_follows_from_what_decides_the_surface_alone(monkeypatch):
     monkeypatch.setattr(prints, "slicer_version", lambda: "test")
-    monkeypatch.setattr(prints, "slice_part", lambda *_args, **_options: sliced)
-    T = np.eye(4)
-    T[:3, 3] = (*low[:2], SIZE[2])
-    tiers = outlines(alphabet_named("dense-4"), SymbolStyle())
-    symbols = Embossing(0, 0, T, 0.0, np.zeros((0, 2)), np.zeros(0, np.int64), (), tiers, 7.0)
-    corners = np.array([(0.0, 0.0), (SIZE[0], 0.0), (SIZE[0], SIZE[1]), (0.0, SIZE[1])])
-    face = FaceOnPart("F1", corners, symbols)
-    return PrintJob("Block-F1", tmp_path / "b.stl", "ab" * 32, False, (face,))
-
-
-def test_a_part_is_printed_once_and_the_same_again(job: PrintJob, tmp_path: Path) -> None:
-    plan = print_plan("fdm-0.4-0.2", "usual", 3)
-    assert left_to_print(job, plan, tmp_path / "one")
-    for folder in ("one", "two"):
-        print_part(job, plan, tmp_path / folder)
-        assert not left_to_print(job, plan, tmp_path / folder)
-    (key,) = surface_keys(job, plan).values()
-    first, second = (surface_path(tmp_path / folder, key) for folder in ("one", "two"))
-    for suffix in (".npy", ".json"):
-        assert first.with_suffix(suffix).read_bytes() == second.with_suffix(suffix).read_bytes()
-    middle = np.array([[SIZE[0] / 2, SIZE[1] / 2]])
-    assert read_surface(first).heights_mm(middle) == pytest.approx([0.0], abs=0.12)
-    assert np.isneginf(read_surface(first).heights_mm(middle + SIZE[0])).all()
-
-
-def test_a_key_follows_from_what_decides_the_surface_alone(job: PrintJob) -> None:
+    face = FaceOnPart("F1", np.array([(0.0, 0.0), (9.0, 0.0), (9.0, 6.0)]), embossing())
+    job = PrintJob("Block-F1", Path("b.stl"), "ab" * 32, False, (face,))
     plan = print_plan("fdm-0.4-0.2", "usual", 3)
     known = surface_keys(job, plan)
     assert surface_keys(replace(job, file=Path("elsewhere.stl"), name="Other"), plan) == known
-    moved = replace(job.faces[0].embossing, T_part_facet=np.eye(4))
+    moved = replace(face.embossing, T_part_facet=np.eye(4))
     others = [
         surface_keys(job, print_plan("fdm-0.4-0.3", "usual", 3)),
         surface_keys(job, print_plan("fdm-0.4-0.2", "bad", 3)),
@@ -152,26 +97,12 @@ def test_a_key_follows_from_what_decides_the_surface_alone(job: PrintJob) -> Non
         surface_keys(job, print_plan("fdm-0.4-0.2", "usual", 4)),
         surface_keys(replace(job, sha256="cd" * 32), plan),
         surface_keys(replace(job, supports=True), plan),
-        surface_keys(replace(job, faces=(replace(job.faces[0], embossing=moved),)), plan),
+        surface_keys(replace(job, faces=(replace(face, embossing=moved),)), plan),
     ]
     assert len({keys["F1"] for keys in [known, *others]}) == 1 + len(others)
 
 
-TIERS = outlines(alphabet_named("dense-4"), SymbolStyle())
-CENTRES = np.array([[5.0, 5.0], [12.0, 5.0], [5.0, 12.0], [12.0, 12.0]])
-
-
-def embossing(rotation: float = 0.0) -> Embossing:
-    T = np.eye(4)
-    T[2, 3] = 3.0
-    names = tuple(f"r{k}c0" for k in range(4))
-    return Embossing(0, 0, T, rotation, CENTRES, np.arange(4), names, TIERS, 7.0)
-
-
-def surface(
-    labels: list[int], *, moved: tuple[float, float] = (0.0, 0.0), high: float = 1.0,
-    base: float = 0.0, rotation: float = 0.0,
-) -> PrintedSurface:  # fmt: skip
+def surface(labels=range(4), *, moved=(0.0, 0.0), high=1.0, base=0.0, rotation=0.0):
     """The exact CAD surface of some symbols, 17 x 17 mm, every .05 mm; -1 for none."""
     line = np.arange(0, 341) * 0.05
     x, y = np.meshgrid(line, line)
@@ -187,80 +118,66 @@ def surface(
     return PrintedSurface((heights + base).astype(np.float32), (0.0, 0.0), 0.05, np.eye(4))
 
 
-def survey(of: PrintedSurface, rotation: float = 0.0) -> list[SymbolTile]:
-    return survey_face(of, embossing(rotation), part="P", face="F1")
+def checks_of(of, rotation=0.0):
+    tiles = survey_face(of, embossing(rotation), part="P", face="F1")
+    return [tile.check for tile in tiles]
 
 
 @pytest.mark.parametrize("rotation", [0.0, math.radians(90), 0.3])
-def test_symbols_as_designed_survive(rotation: float) -> None:
-    for tile in survey(surface([0, 1, 2, 3], rotation=rotation), rotation):
-        check = tile.check
+def test_symbols_as_designed_survive(rotation):
+    for check in checks_of(surface(rotation=rotation), rotation):
         assert check.verdict == SURVIVES
         assert check.overlap > (0.95 if rotation == 0.3 else 0.98)  # steps of a turned grid
         assert check.rival_overlap < 0.8
         assert check.height_mm == pytest.approx(1.0, abs=1e-3)
         assert check.moved_mm == pytest.approx((0.0, 0.0), abs=0.02)
         assert (check.part, check.face) == ("P", "F1")
-        assert tile.deposited == pytest.approx(tile.designed, abs=1.0)
-
-
-def test_areas_are_those_of_the_outline_at_half_height() -> None:
-    check = survey(surface([0, 1, 2, 3]))[0].check
-    rings = rings_at(TIERS[0], 0.5)
-    x, y = rings[0].T
-    area = abs(float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)) / 2
-    assert check.area_mm2 == pytest.approx(area, rel=0.03)
-    assert check.lost_mm2 + check.widened_mm2 < 0.02 * area
-
-
-def test_a_symbol_aside_of_its_place_survives_and_says_how_far() -> None:
-    for tile in survey(surface([0, 1, 2, 3], moved=(0.15, -0.1), base=-0.1)):
-        assert tile.check.verdict == SURVIVES
-        assert tile.check.overlap > 0.97
-        assert tile.check.moved_mm == pytest.approx((0.15, -0.1), abs=0.012)
-
-
-def test_low_symbols_are_doubtful_and_lower_ones_lost() -> None:
-    for high, verdict in ((0.8, SURVIVES), (0.62, DOUBTFUL), (0.3, LOST)):
-        checks = [tile.check for tile in survey(surface([0, 1, 2, 3], high=high))]
-        assert {check.verdict for check in checks} == {verdict}
-        assert checks[0].height_mm == pytest.approx(high, abs=0.01)
-
-
-def test_another_symbol_in_its_place_is_lost() -> None:
-    swapped = [tile.check for tile in survey(surface([3, 1, 2, 0]))]
-    assert [check.verdict for check in swapped] == [LOST, SURVIVES, SURVIVES, LOST]
-    assert swapped[0].rival_overlap > 0.93
-    assert swapped[3].lost_mm2 > 4
-    assert swapped[0].widened_mm2 > 4
-
-
-def test_no_symbol_is_lost() -> None:
-    checks = [tile.check for tile in survey(surface([0, -1, -1, 3]))]
-    assert [check.verdict for check in checks] == [SURVIVES, LOST, LOST, SURVIVES]
-    assert checks[1].overlap == 0
-    assert checks[1].height_mm == 0
-
-
-def test_a_string_across_the_cell_moves_nothing() -> None:
-    strung = surface([0, 1, 2, 3])
-    line = np.arange(341) * 0.05
-    strung.heights[np.abs(line - 8.2) < 0.08] = 0.9  # from side to side, above symbols 0 and 1
-    check = survey(strung)[0].check
-    assert check.moved_mm == pytest.approx((0.0, 0.0), abs=0.02)
-    assert check.verdict == SURVIVES
-    assert check.widened_mm2 > 0.9
+        if not rotation:
+            rings = rings_at(TIERS[check.label], 0.5)
+            crosses = (x @ np.roll(y, -1) - np.roll(x, -1) @ y for x, y in (r.T for r in rings))
+            area = abs(float(sum(crosses))) / 2
+            assert check.area_mm2 == pytest.approx(area, rel=0.03)
+            assert check.lost_mm2 + check.widened_mm2 < 0.02 * area
 
 
 @pytest.mark.parametrize("rotation", [0.0, math.radians(90), 0.3])
-def test_the_middle_of_the_symbols_is_found_in_the_faces_frame(rotation: float) -> None:
-    moved = surface([0, 1, 2, 3], moved=(0.15, -0.1), base=0.2, rotation=rotation)
-    found = symbols_shift(moved, embossing(rotation))
-    assert found == pytest.approx((0.15, -0.1), abs=0.012)
+def test_symbols_aside_of_their_place_survive_and_say_how_far(rotation):
+    aside = surface(moved=ASIDE, base=-0.1, rotation=rotation)
+    assert symbols_shift(aside, embossing(rotation)) == pytest.approx(ASIDE, abs=0.012)
+    for check in checks_of(aside) if not rotation else ():
+        assert check.verdict == SURVIVES
+        assert check.overlap > 0.97
+        assert check.moved_mm == pytest.approx(ASIDE, abs=0.012)
 
 
-def test_symbols_that_are_gone_do_not_move_the_middle() -> None:
+def test_symbols_that_are_gone_do_not_move_the_middle():
     some = symbols_shift(surface([0, -1, -1, 3], moved=(0.2, 0.1)), embossing())
     assert some == pytest.approx((0.2, 0.1), abs=0.012)
-    assert (symbols_shift(surface([-1, -1, -1, -1]), embossing()) == 0).all()
-    assert (symbols_shift(surface([0, 1, 2, 3], base=-np.inf), embossing()) == 0).all()
+    assert (symbols_shift(surface([-1] * 4), embossing()) == 0).all()
+    assert (symbols_shift(surface(base=-np.inf), embossing()) == 0).all()
+
+
+@pytest.mark.parametrize(("high", "verdict"), [(0.8, SURVIVES), (0.62, DOUBTFUL), (0.3, LOST)])
+def test_low_symbols_are_doubtful_and_lower_ones_lost(high, verdict):
+    checks = checks_of(surface(high=high))
+    assert {check.verdict for check in checks} == {verdict}
+    assert checks[0].height_mm == pytest.approx(high, abs=0.01)
+
+
+def test_another_symbol_or_none_in_its_place_is_lost():
+    checks = checks_of(surface([3, 1, -1, 0]))
+    assert [check.verdict for check in checks] == [LOST, SURVIVES, LOST, LOST]
+    assert checks[0].rival_overlap > 0.93
+    assert checks[3].lost_mm2 > 4
+    assert checks[0].widened_mm2 > 4
+    assert (checks[2].overlap, checks[2].height_mm) == (0, 0)
+
+
+def test_a_string_across_the_cell_moves_nothing():
+    strung = surface()
+    line = np.arange(341) * 0.05
+    strung.heights[np.abs(line - 8.2) < 0.08] = 0.9  # from side to side, above symbols 0 and 1
+    check = checks_of(strung)[0]
+    assert check.moved_mm == pytest.approx((0.0, 0.0), abs=0.02)
+    assert check.verdict == SURVIVES
+    assert check.widened_mm2 > 0.9

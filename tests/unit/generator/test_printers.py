@@ -12,16 +12,15 @@ from generator.spec import ObjectSpec, SpecError, read_specs
 CUBE = "name: Cube\nshape: {cube: 60 mm}\n"
 
 
-def spec_of(folder: Path, text: str) -> ObjectSpec:
+def spec_of(folder: Path, printer: str) -> ObjectSpec:
     path = folder / "c.yaml"
-    path.write_text(CUBE + text)
+    path.write_text(f"{CUBE}print: {{printer: {printer}}}\n")
     return read_specs([path])[0]
 
 
 @pytest.mark.parametrize(
     ("text", "bed", "nozzle", "layer", "stroke"),
     [
-        ("prusa-mini", (180, 180), 0.4, 0.2, 0.8),
         ("{like: ender-3, layer: 0.15 mm, bed: 300 x 310 mm}", (300, 310), 0.4, 0.15, 0.8),
         ("{bed: [10 in, 200 mm], stroke: 0.9 mm}", (254, 200), 0.4, 0.2, 0.9),
         ("{like: ender-3, nozzle: 0.25 mm}", (220, 220), 0.25, 0.1, 0.5),
@@ -30,17 +29,16 @@ def spec_of(folder: Path, text: str) -> ObjectSpec:
 )
 def test_a_spec_names_or_describes_its_printer(tmp_path, text, bed, nozzle, layer, stroke) -> None:
     (tmp_path / "mine.yaml").write_text("like: voron-300\nlayer: 0.12 mm\n")
-    printer = spec_of(tmp_path, f"print: {{printer: {text}}}\n").printer
+    printer = spec_of(tmp_path, text).printer
     assert (printer.bed_mm, printer.nozzle_mm, printer.layer_mm) == (bed, nozzle, layer)
     assert printer.stroke_min_mm == stroke
 
 
 def test_own_printers_count_by_their_values_known_ones_by_their_names(tmp_path) -> None:
     def meaning(text: str) -> object:
-        return spec_of(tmp_path, f"print: {{printer: {text}}}\n").meaning["printer"]
+        return spec_of(tmp_path, text).meaning["printer"]
 
     assert meaning("fdm-0.4") == meaning("{like: fdm-0.4}") == "fdm-0.4"
-    assert meaning("ender-3-0.25") == "ender-3-0.25"
     assert meaning("{layer: 0.15 mm}") == meaning("{layer: 0.15}") != meaning("{layer: 0.16}")
 
 
@@ -57,7 +55,7 @@ def test_own_printers_count_by_their_values_known_ones_by_their_names(tmp_path) 
 def test_what_is_wrong_with_a_printer_is_said_where_it_stands(tmp_path, text, place, fix) -> None:
     (tmp_path / "mine.yaml").write_text("layr: 0.12 mm\n")
     with pytest.raises(SpecError) as caught:
-        spec_of(tmp_path, f"print: {{printer: {text}}}\n")
+        spec_of(tmp_path, text)
     (problem,) = caught.value.problems
     assert problem.place.endswith(place)
     assert fix in problem.fix
@@ -66,11 +64,10 @@ def test_what_is_wrong_with_a_printer_is_said_where_it_stands(tmp_path, text, pl
 @pytest.mark.parametrize(
     ("printer", "wall", "height"),
     [("fdm-0.4", 3.0, 1.0), ("{layer: 0.3 mm}", 3.0, 0.9), ("{layer: 0.28 mm}", 3.08, 1.12),
-     ("prusa-mk4-0.25", 3.0, 1.0), ("resin", 3.0, 1.0), ("fdm-0.8", 3.2, 0.8),
-     ("{layer: 0.3 mm, nozzle: 1.0 mm, stroke: 1.9 mm}", 3.9, 0.9)],
+     ("resin", 3.0, 1.0), ("{layer: 0.3 mm, nozzle: 1.0 mm, stroke: 1.9 mm}", 3.9, 0.9)],
 )  # fmt: skip
 def test_walls_and_symbols_are_whole_layers(tmp_path, printer, wall, height) -> None:
-    spec = spec_of(tmp_path, f"print: {{printer: {printer}}}\n")
+    spec = spec_of(tmp_path, printer)
     assert (spec.wall_mm, spec.style.height_mm) == (wall, height)
     assert spec.wall_mm >= 2 * spec.printer.stroke_min_mm
     layers = (spec.wall_mm - spec.printer.first_layer_mm) / spec.printer.layer_mm
@@ -78,12 +75,9 @@ def test_walls_and_symbols_are_whole_layers(tmp_path, printer, wall, height) -> 
 
 
 def test_layers_that_do_not_divide_what_was_asked_for_are_told(tmp_path) -> None:
-    path = tmp_path / "c.yaml"
-    path.write_text(CUBE + "print: {wall: 3.5 mm, printer: {layer: 0.3 mm}}\n")
-    (note,) = plan_object(read_specs([path])[0]).notes
+    (note,) = plan_object(spec_of(tmp_path, "{layer: 0.3 mm}, wall: 3.5 mm")).notes
     assert note == (
         "walls of 3.5 mm print 3.6 mm, symbols of 0.9 mm print 0.9 mm high at layers of 0.3 mm: "
         "wall 3.6 mm and height 0.9 mm are whole layers"
     )
-    path.write_text(CUBE + "symbols: {height: 1.2 mm}\nprint: {wall: 3.5 mm, printer: resin}\n")
-    assert plan_object(read_specs([path])[0]).notes == ()
+    assert plan_object(spec_of(tmp_path, "resin, wall: 3.5 mm")).notes == ()

@@ -10,8 +10,8 @@ from random_shapes import extruded
 
 from generator.errors import SolidError
 from generator.layout.placement import Layout
-from generator.plane.polygon import signed_area, triangle_areas
-from generator.polyhedron.shapes import box as solid_box
+from generator.plane.polygon import triangle_areas
+from generator.polyhedron.shapes import box
 from generator.polyhedron.winged import polyhedron
 from generator.printers import PRINTERS
 from generator.solid import (
@@ -21,7 +21,6 @@ from generator.solid import (
     top_inset_mm,
     top_insets_mm,
 )
-from generator.solid.marks import NameMark, Pen, name_places
 from generator.solid.plate import inset, mitre, regular, shared_insets
 from generator.solid.triangulate import triangulate_rings, without_slivers
 
@@ -31,23 +30,20 @@ SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
 
 
 @pytest.mark.parametrize("printer", PRINTERS.values(), ids=lambda p: p.name)
-@pytest.mark.parametrize(
-    "degrees", [5, 30, 60, 70.53, 89.9, 90, 90.1, 110, 179, 180, 200, 270, 350]
-)
-def test_sides_print_without_support_inside_the_bisecting_plane(printer, degrees):
-    theta = math.radians(degrees)
-    slope = 1 / math.tan(theta / 2)
+def test_sides_print_without_support_inside_the_bisecting_plane(printer):
     steepest = math.tan(printer.overhang_max_rad)
-    for wall in (1.0, 3.0, 8.0):
-        side = mitre(theta, wall, printer)
-        assert side.top_mm >= 0.0
-        assert side.back_mm - side.top_mm <= (wall - side.land_mm) * steepest + 1e-12
-        assert (side.land_mm > 0) == (degrees <= 90)
-        depth = np.linspace(0.0, wall, 50)
-        share = np.maximum(0.0, depth - side.land_mm) / (wall - side.land_mm)
-        stands_back = side.top_mm + share * (side.back_mm - side.top_mm)
-        apart = (stands_back - depth * slope) * math.sin(theta / 2)
-        assert apart.min() >= 0.07 - 1e-9  # half the gap: never beyond the bisecting plane
+    for degrees in (5, 30, 60, 70.53, 89.9, 90, 90.1, 110, 179, 180, 200, 270, 350):
+        theta = math.radians(degrees)
+        for wall in (1.0, 3.0, 8.0):
+            side = mitre(theta, wall, printer)
+            assert side.top_mm >= 0.0
+            assert side.back_mm - side.top_mm <= (wall - side.land_mm) * steepest + 1e-12
+            assert (side.land_mm > 0) == (degrees <= 90)
+            depth = np.linspace(0.0, wall, 50)
+            share = np.maximum(0.0, depth - side.land_mm) / (wall - side.land_mm)
+            stands_back = side.top_mm + share * (side.back_mm - side.top_mm)
+            apart = (stands_back - depth / math.tan(theta / 2)) * math.sin(theta / 2)
+            assert apart.min() >= 0.07 - 1e-9  # half the gap: never beyond the bisecting plane
 
 
 def test_mitre_of_a_cube_by_hand():
@@ -59,26 +55,14 @@ def test_mitre_of_a_cube_by_hand():
     assert top_inset_mm(1.5 * math.pi, 3.0, FDM) == 0.0
     assert mitre(1.5 * math.pi, 3.0, FDM).back_mm == pytest.approx(-2.9)
     assert math.isfinite(top_inset_mm(1e-12, 3.0, FDM))
-
-
-def test_symbols_keep_apart_at_reflex_edges():
-    assert symbol_clearance_mm(math.pi / 2, 1.0) == 0.0
-    assert symbol_clearance_mm(1.5 * math.pi, 1.0) == pytest.approx(1.0)
-    assert symbol_clearance_mm(math.radians(300), 1.0) == pytest.approx(math.sqrt(3))
-
-
-def test_inset_moves_each_edge_by_its_own_distance():
-    found = inset(SQUARE, np.array([1.0, 2.0, 3.0, -0.5]))
-    assert found == pytest.approx(np.array([[-0.5, 1], [8, 1], [8, 7], [-0.5, 7]]), abs=1e-14)
-    hole = SQUARE[::-1]  # clockwise: material outside, insets grow it
-    assert signed_area(inset(hole, np.ones(4))) == pytest.approx(-144.0)
+    clear = [symbol_clearance_mm(math.radians(angle), 1.0) for angle in (90, 270, 300)]
+    assert clear == pytest.approx([0.0, 1.0, math.sqrt(3)])  # symbols apart at reflex edges
 
 
 @pytest.mark.parametrize("bend", [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
 def test_inset_at_flat_corners_has_its_limit(bend):
     ring = np.array([[0.0, 0.0], [5.0, -bend], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
-    equal = inset(ring, np.ones(5))
-    assert equal[1] == pytest.approx([5.0, 1.0 - bend], abs=1e-6)
+    assert inset(ring, np.ones(5))[1] == pytest.approx([5.0, 1.0 - bend], abs=1e-6)
     insets = shared_insets(ring, np.array([1.0, 2.0, 1.0, 1.0, 1.0]))
     assert insets.tolist() == [2.0, 2.0, 1.0, 1.0, 1.0]
     assert inset(ring, insets)[1] == pytest.approx([5.0, 2.0 - bend], abs=1e-6)
@@ -86,29 +70,28 @@ def test_inset_at_flat_corners_has_its_limit(bend):
 
 
 def test_collapsed_and_crossing_insets_are_found():
-    def fine(distance):
-        return regular([SQUARE], [inset(SQUARE, np.full(4, distance))], 0.1)
-
-    assert fine(4.0)
-    assert not fine(4.99)
-    assert not fine(6.0)
     hole = np.array([[4.0, 4.0], [4.0, 6.0], [6.0, 6.0], [6.0, 4.0]])
-    rings = [SQUARE, hole]
-    for distance, wanted in ((1.9, True), (2.1, False)):
+    for rings, distance, wanted in (
+        ([SQUARE], 4.0, True), ([SQUARE], 4.99, False), ([SQUARE], 6.0, False),
+        ([SQUARE, hole], 1.9, True), ([SQUARE, hole], 2.1, False),
+    ):  # fmt: skip
         moved = [inset(ring, np.full(4, distance)) for ring in rings]
         assert regular(rings, moved, 0.1) == wanted
 
 
 def test_too_thick_walls_name_the_face_and_a_wall_that_fits():
-    thin = solid_box([60.0, 60.0, 8.0])
+    thin = box([60.0, 60.0, 8.0])
     with pytest.raises(SolidError, match=r"F2: .*set wall to 3.7 mm or less") as caught:
         panels(thin, EMPTY, (), 5.0, FDM)
     assert caught.value.place == "F2"
     assert len(panels(thin, EMPTY, (), 3.7, FDM).parts) == 6
     with pytest.raises(SolidError, match="print it whole"):
-        panels(solid_box([60.0, 60.0, 1.0]), EMPTY, (), 3.0, FDM)
+        panels(box([60.0, 60.0, 1.0]), EMPTY, (), 3.0, FDM)
     with pytest.raises(SolidError, match="wall nan"):
         panels(thin, EMPTY, (), math.nan, FDM)
+    for gap in (0.0, math.nan):
+        with pytest.raises(SolidError, match="set gap to more than 0"):
+            panels(thin, EMPTY, (), 3.0, FDM, gap_mm=gap)
 
 
 def test_collinear_edges_with_different_neighbours():
@@ -131,48 +114,12 @@ def test_points_on_a_line_are_kept_without_flat_triangles():
     outer = np.array([[0, 0], [1, 0], [2, 0], [3, 0], [3, 1], [3, 3], [1, 3], [0, 3], [0, 1.0]])
     hole = np.array([[1, 1], [1, 2], [2, 2], [2, 1.0]])
     found = triangulate_rings([outer, hole], np.arange(13), "plate")
-    p = np.concatenate([outer, hole])[found]
-    u, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    areas = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+    areas = triangle_areas(np.concatenate([outer, hole])[found])
     assert set(found.ravel()) == set(range(13))
     assert areas.min() > 1e-3
     assert areas.sum() == pytest.approx(8.0)
     with pytest.raises(SolidError, match="plate"):
         triangulate_rings([outer, hole + np.array([1.5, 0.0])], np.arange(13), "plate")
-
-
-TEXTS = [
-    # box, what its backs say in the order of faces; the sixth as the first
-    ((60.0, 60.0, 60.0), "COURSE BLOCK-12", [["COURSE", "BLOCK-12"]] * 5),
-    ((60.0, 60.0, 60.0), "\u7acb", [["K7M"]] * 5),
-    ((60.0, 40.0, 20.0), "Bracket-12",
-     [["BRACKET-12"], ["K7M"], ["K7M"], ["K7M"], ["K7M"]]),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("size", "name", "texts"), TEXTS)
-def test_every_back_says_object_and_face_beside_its_edges(size, name, texts):
-    made = panels(solid_box(size), EMPTY, (), 3.0, FDM, name=name, code="K7M")
-    assert made.warnings == ()
-    for face, (part, words) in enumerate(zip(made.parts, texts, strict=False), 1):
-        said = [e.names[0].rpartition(" figure")[0] for e in part.embossings]
-        assert [text for text in said if text.isdecimal()] == said[:4]
-        lines = words if words[-1].endswith(f"F{face}") else [*words, f"F{face}"]
-        assert said[4:] == lines
-
-
-def test_a_code_goes_before_numbers_and_what_finds_no_room_is_told():
-    made = panels(solid_box((40.0, 14.0, 14.0)), EMPTY, (), 3.0, FDM, name="Tiny", code="K7M")
-    said = [{e.names[0].rpartition(" figure")[0] for e in p.embossings} for p in made.parts]
-    assert said[2] == {"8"}  # a back of 8 x 8 mm
-    assert "mark by hand" in made.warnings[-1]
-    assert made.warnings[-1].count("F") == sum(
-        not any("F" in text for text in texts) for texts in said
-    )
-    larger = panels(solid_box((60.0, 40.0, 12.0)), EMPTY, (), 3.0, FDM, name="Tiny", code="K7M")
-    said = [{e.names[0].rpartition(" figure")[0] for e in p.embossings} for p in larger.parts]
-    assert all(any("F" in text for text in texts) for texts in said)
-    assert [w.split(" the ")[0] for w in larger.warnings] == ["no room for"]
 
 
 OFF_MM = 5e-7  #: of a point from a line of 10 mm: less than 32 bits hold at 20 mm
@@ -186,25 +133,31 @@ def test_a_triangle_thinner_than_stl_holds_is_flipped_away():
     assert triangle_areas(points[found]).sum() == pytest.approx(25.0 + 5.0 * OFF_MM, rel=1e-12)
 
 
+def backs(solid, name, code):
+    """Return what stands on each back, and the warnings."""
+    made = panels(solid, EMPTY, (), 3.0, FDM, name=name, code=code)
+    said = [{e.names[0].rpartition(" figure")[0] for e in part.embossings} for part in made.parts]
+    return said, made.warnings
+
+
+def test_a_code_goes_before_numbers_and_what_finds_no_room_is_told():
+    said, warnings = backs(box((40.0, 14.0, 14.0)), "Tiny", "K7M")
+    assert said[2] == {"8"}  # a back of 8 x 8 mm
+    assert "mark by hand" in warnings[-1]
+    unnamed = sum(not any("F" in text for text in texts) for texts in said)
+    assert warnings[-1].count("F") == unnamed
+    said, warnings = backs(box((60.0, 40.0, 12.0)), "Tiny", "K7M")
+    assert all(any("F" in text for text in texts) for texts in said)
+    assert [w.split(" the ")[0] for w in warnings] == ["no room for"]
+    said, warnings = backs(box((60.0, 60.0, 60.0)), "\u7acb", "K7M")
+    assert [texts & {"K7M", f"F{k}"} for k, texts in enumerate(said, 1)] == [
+        {"K7M", f"F{k}"} for k in range(1, 7)
+    ]
+
+
 def test_backs_of_narrow_legs_bear_a_code():
     legs = [(0, 0), (60, 0), (60, 12), (12, 12), (12, 40), (0, 40)]
-    bracket = extruded([np.array(legs, float)], 60.0)  # its ends are the faces 0 and 1
-    made = panels(bracket, EMPTY, (), 3.0, FDM, name="Bracket", code="AB12")
-    assert not [warning for warning in made.warnings if "mark by hand" in warning]
-    on_ells = [{e.names[0].split(" figure")[0] for e in part.embossings} for part in made.parts[:2]]
-    named = [{text.replace(" ", "") for text in texts if "AB12" in text} for texts in on_ells]
-    assert named == [{"AB12F1"}, {"AB12F2"}]
-
-
-def test_a_name_in_a_leg_keeps_clear_of_its_sides():
-    ring = np.array([(0.0, 0), (53.8, 0), (53.8, 5.8), (5.8, 5.8), (5.8, 33.8), (0, 33.8)])
-    pen = Pen(0.8, 0.8, 0.8)
-    block = next(name_places(NameMark((((("AB12 F1"),),),)), [ring], [pen], ()))
-    (box,) = block
-    assert pen.clear <= box.centre[1] - box.half[1]
-    assert box.centre[1] + box.half[1] <= 5.8 - pen.clear
-
-
-def test_no_room_is_no_place():
-    ring = np.array([(0.0, 0), (20, 0), (20, 5.0), (0, 5.0)])
-    assert not list(name_places(NameMark(((("AB12 F1",),),)), [ring], [Pen(0.8, 0.8, 0.8)], ()))
+    said, warnings = backs(extruded([np.array(legs, float)], 60.0), "Bracket", "AB12")
+    assert not [warning for warning in warnings if "mark by hand" in warning]
+    named = [{text.replace(" ", "") for text in texts if "AB12" in text} for texts in said[:2]]
+    assert named == [{"AB12F1"}, {"AB12F2"}]  # its ends are the faces 0 and 1

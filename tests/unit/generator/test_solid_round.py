@@ -1,4 +1,4 @@
-"""Symbols on round faces: closed, of the right volume and height, as cylinders and cones too."""
+"""Symbols on flat and round faces: closed, of the right volume, or refused."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference.laid_symbols import is_closed, layout_on_round_face, mesh_volume
+from reference.laid_symbols import filled, is_closed, layout_on_round_face, mesh_volume
 
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.errors import SolidError
+from generator.layout.placement import Layout
 from generator.plane.polygon import signed_area
 from generator.polyhedron.development import development
-from generator.polyhedron.shapes import cone, cylinder
+from generator.polyhedron.shapes import cone, cube, cylinder
 from generator.polyhedron.winged import Face
 from generator.printers import printer_named
 from generator.solid import (
@@ -29,50 +30,51 @@ from generator.solid import (
     triangles,
     volume,
 )
-from generator.solid.analytic import (
-    analytic_faces,
-    bend_problem,
-)
+from generator.solid.analytic import analytic_faces, bend_problem
 from generator.solid.measure import symbol_volume
 from generator.solid.wrapped import NUDGE_MM, Knife, strip_of
 
 STYLE = SymbolStyle()
 TIERS = outlines(alphabet_named("dense-4"), STYLE)
-
-
-SOLIDS = {"cylinder": cylinder(60, 80), "cone": cone(80, 80, 40), "pointed": cone(80, 70)}
-EXACT_MM3 = {
-    "cylinder": math.pi * 30**2 * 80,
-    "cone": math.pi * 80 / 3 * (40**2 + 40 * 20 + 20**2),
-    "pointed": math.pi * 70 / 3 * 40**2,
-}
+CYLINDER = cylinder(60, 80)
 CENTRES = [(20.0, 12.0), (27.3, 14.0), (40.0, 30.0), (12.0, 24.5), (33.0, 16.0)]
+LABELS = [0, 1, 2, 3, 1]
 
 
-@pytest.mark.parametrize("kind", SOLIDS)
-def test_wrapped_symbols_make_one_closed_part(kind):
-    solid = SOLIDS[kind]
-    layout = layout_on_round_face(solid, CENTRES, [0, 1, 2, 3, 1], 0.3)
-    part = emboss_whole(solid, layout, TIERS, "Part")
+def part_of(solid, centres=(), labels=(), rotation=0.0):
+    return emboss_whole(solid, layout_on_round_face(solid, centres, labels, rotation), TIERS, "P")
+
+
+@pytest.mark.parametrize(
+    ("solid", "exact"),
+    [
+        (CYLINDER, math.pi * 30**2 * 80),
+        (cone(80, 80, 40), math.pi * 80 / 3 * (40**2 + 40 * 20 + 20**2)),
+        (cone(80, 70), math.pi * 70 / 3 * 40**2),
+    ],
+    ids=["cylinder", "cone", "pointed"],
+)
+def test_wrapped_symbols_make_one_closed_part(solid, exact):
+    plain, part = part_of(solid), part_of(solid, CENTRES, LABELS, 0.3)
+    assert volume(plain) + round_volume(plain) == pytest.approx(exact, rel=1e-9)
+    (face,) = plain.analytic
+    assert face.closed
+    assert face.facets == solid.surfaces[0].facets
     prove_closed(part)
-    mesh = triangles(part)
-    assert is_closed(mesh)
-    assert part.symbols == 5
-    assert mesh_volume(mesh) == pytest.approx(volume(part), rel=1e-12)
+    meshes = [triangles(part), body_mesh(part), *symbol_meshes(part)]
+    assert all(map(is_closed, meshes))
+    whole, *pieces = map(mesh_volume, meshes)
+    assert whole == pytest.approx(volume(part), rel=1e-12)
+    assert sum(pieces) == pytest.approx(volume(part), rel=1e-12)
     # Symbols spread as they rise: by z / r of the width around the face at most.
-    body, (symbols,) = body_mesh(part), symbol_meshes(part)
-    assert is_closed(body)
-    assert is_closed(symbols)
-    assert mesh_volume(body) + mesh_volume(symbols) == pytest.approx(volume(part), rel=1e-12)
-    flat = sum(symbol_volume(TIERS[label]) for label in (0, 1, 2, 3, 1))
-    plain = volume(emboss_whole(solid, layout_on_round_face(solid, [], []), TIERS, ""))
-    assert flat < volume(part) - plain < flat * (1 + 1.0 / 20)
+    flat = sum(symbol_volume(TIERS[label]) for label in LABELS)
+    assert flat < volume(part) - volume(plain) < flat * (1 + 1.0 / 20)
 
 
 @given(st.floats(5.0, 180.0), st.floats(6.0, 70.0), st.floats(-math.pi, math.pi), st.integers(0, 3))
 @settings(max_examples=40, deadline=None)
 def test_pieces_of_a_symbol_cover_it_wherever_it_stands(x, y, rotation, label):
-    strip = strip_of(development(SOLIDS["cylinder"], SOLIDS["cylinder"].surfaces[0]))
+    strip = strip_of(development(CYLINDER, CYLINDER.surfaces[0]))
     R = np.array([[np.cos(rotation), -np.sin(rotation)], [np.sin(rotation), np.cos(rotation)]])
     centre = np.array([x, y])
     rings = [[ring @ R.T + centre for ring in tier] for tier in TIERS[label].rings]
@@ -89,11 +91,10 @@ def test_pieces_of_a_symbol_cover_it_wherever_it_stands(x, y, rotation, label):
 
 
 def test_corners_on_a_line_are_moved_off_it():
-    solid = SOLIDS["cylinder"]
-    d = development(solid, solid.surfaces[0])
+    d = development(CYLINDER, CYLINDER.surfaces[0])
     # A symbol upright on a line: edges of its strokes would run along other lines, too.
     on_line = [(float(d.low[k][0]) + 1e-12, 8.0 * k) for k in range(2, 7)]
-    part = emboss_whole(solid, layout_on_round_face(solid, on_line, [0, 1, 2, 3, 0]), TIERS, "Part")
+    part = part_of(CYLINDER, on_line, [0, 1, 2, 3, 0])
     prove_closed(part)
     mesh = triangles(part)
     assert is_closed(mesh)
@@ -102,40 +103,52 @@ def test_corners_on_a_line_are_moved_off_it():
 
 
 def test_a_symbol_over_the_seam_is_refused():
-    solid = SOLIDS["cylinder"]
-    with pytest.raises(SolidError, match="reaches over the side"):
-        emboss_whole(solid, layout_on_round_face(solid, [(2.0, 30.0)], [0]), TIERS, "Part")
-    with pytest.raises(SolidError, match="lies beside its face"):
-        emboss_whole(solid, layout_on_round_face(solid, [(-2.0, 30.0)], [0]), TIERS, "Part")
+    for x, said in ((2.0, "reaches over the side"), (-2.0, "lies beside its face")):
+        with pytest.raises(SolidError, match=said):
+            part_of(CYLINDER, [(x, 30.0)], [0])
 
 
 def test_a_hole_that_is_too_narrow_is_told():
     printer = printer_named("fdm-0.4")
-    convex = development(SOLIDS["cylinder"], SOLIDS["cylinder"].surfaces[0])
-    assert bend_problem(convex, TIERS, STYLE, printer) == ""
+    convex = development(CYLINDER, CYLINDER.surfaces[0])
     hole = dataclasses.replace(convex, bends=-convex.bends)  # the same facets seen from inside
+    assert bend_problem(convex, TIERS, STYLE, printer) == ""
     assert bend_problem(hole, TIERS, STYLE, printer) == ""
-    thin = dataclasses.replace(STYLE, stroke_mm=0.82)
-    assert "narrows strokes to 0.79 mm" in bend_problem(hole, TIERS, thin, printer)
-    high = dataclasses.replace(STYLE, height_mm=31.0)
-    assert "meet in its middle" in bend_problem(hole, TIERS, high, printer)
-
-
-@pytest.mark.parametrize("name", SOLIDS)
-def test_volume_of_the_body_is_that_of_the_round_solid(name):
-    solid = SOLIDS[name]
-    part = emboss_whole(solid, layout_on_round_face(solid, [], []), TIERS, name)
-    assert volume(part) + round_volume(part) == pytest.approx(EXACT_MM3[name], rel=1e-9)
-    (face,) = part.analytic
-    assert face.closed
-    assert face.facets == solid.surfaces[0].facets
+    for change, said in (({"stroke_mm": 0.82}, "narrows strokes to 0.79 mm"),
+                         ({"height_mm": 31.0}, "meet in its middle")):  # fmt: skip
+        assert said in bend_problem(hole, TIERS, replace(STYLE, **change), printer)
 
 
 def test_a_rim_on_several_faces_keeps_its_facets():
-    solid = cylinder(60, 80)
-    top = solid.faces[-1].loops[0]
+    top = CYLINDER.faces[-1].loops[0]
     half = len(top) // 2
     split = [Face("F3", ((*top[: half + 1],),)), Face("F4", ((*top[half:], top[0]),))]
-    bent = replace(solid, faces=(*solid.faces[:-1], *split))
+    bent = replace(CYLINDER, faces=(*CYLINDER.faces[:-1], *split))
     (surface,) = bent.surfaces
     assert analytic_faces(bent, {}, TIERS, {surface.carrier: surface.facets}) == ()
+
+
+def test_flat_symbols_beyond_an_edge_or_on_each_other_and_open_bodies_are_found():
+    solid = cube(60.0)
+    face = filled(solid, 7.0, 4.0).faces[0]
+
+    def changed(**change):
+        return emboss_whole(solid, Layout("faces", 7.0, (replace(face, **change),)), TIERS, "P")
+
+    def with_centres(change):
+        centres = face.centres_mm.copy()
+        centres[0] += change
+        return changed(centres_mm=centres)
+
+    prove_closed(with_centres((0.01, 0.0)))  # off the lattice, but free
+    with pytest.raises(SolidError, match="reaches over the edge"):
+        prove_closed(with_centres((-4.0, 0.0)))
+    with pytest.raises(SolidError, match="overlap"):
+        prove_closed(with_centres(face.centres_mm[1] - face.centres_mm[0] + 0.3))
+    with pytest.raises(SolidError, match="overlap"):
+        triangles(with_centres((-4.0, 0.0)))
+    with pytest.raises(SolidError, match="symbol 4 on an alphabet of 4"):
+        changed(labels=face.labels + 1)
+    plain = emboss_whole(solid, Layout("faces", 7.0, ()), TIERS, "P")
+    with pytest.raises(SolidError, match="not closed"):
+        prove_closed(replace(plain, facets=plain.facets[:-1]))

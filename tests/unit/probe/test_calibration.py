@@ -19,7 +19,7 @@ from probe.calibration import (
     read_calibration,
     write_calibration,
 )
-from probe.calibration.fit import FittedLaw, fit_laws, law_s, shrink_laws
+from probe.calibration.fit import FittedLaw, shrink_laws
 from probe.calibration.load import average_frames
 from probe.circuit import Electronics, Noise, fsr_of
 from probe.errors import CalibrationError
@@ -53,17 +53,6 @@ def test_an_average_leaves_spikes_out_and_knows_slow_noise():
     np.testing.assert_allclose(average_frames(plain).sigma, 3 / 20, rtol=0.5)
     slow = np.repeat(plain[:20], 20, axis=0)
     assert np.median(average_frames(slow).sigma) > 3 * np.median(average_frames(plain).sigma)
-
-
-def test_the_covariance_is_the_scatter_of_repeated_fits():
-    rng = np.random.default_rng(0)
-    force = np.repeat(np.array([0.1, 0.2, 0.5, 1.0, 2.0])[:, None], 3000, axis=1)
-    clean = law_s(force, np.full(3000, 1e-4), np.full(3000, 1.0), np.full(3000, 0.03))
-    found = fit_laws(force, clean * (1 + 0.01 * rng.standard_normal(clean.shape)),
-                   0.01 * clean, clean > 0, np.zeros(3000, bool))  # fmt: skip
-    for values, index in ((np.log(found.gain_s), 0), (found.exponent, 1)):
-        expected = np.sqrt(np.median(found.covariance[:, index, index]))
-        assert values.std() == pytest.approx(expected, rel=0.35)
 
 
 def test_the_condition_of_every_tactel_is_found():

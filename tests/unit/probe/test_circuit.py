@@ -22,23 +22,13 @@ from probe.circuit.reading import scan_shares, shares
 from probe.errors import CircuitError
 
 
-def law(force, **changes):
-    fsr = replace(fsr_of(), **changes)
-    return fsr, conductances(fsr, np.full((16, 16), float(force)))
-
-
-def test_the_thesis_s_two_decades_from_1_to_100_newton_per_square_centimetre():
-    area = 0.15875**2
-    low = law(1 * area)[1][0][0, 0]
-    high = law(100 * area)[1][0][0, 0]
+def test_any_force_stays_below_the_series_resistance_and_two_decades_are_those_of_the_thesis():
+    per_n_cm2 = np.full((16, 16), 0.15875**2)
+    low, high = (conductances(fsr_of(), n * per_n_cm2)[0][0, 0] for n in (1, 100))
     assert 80 < high / low < 200
-
-
-def test_the_series_resistance_bounds_any_force():
+    fsr = replace(fsr_of(), hysteresis=0.0)
     for force in (1e3, 1e9, 1e300):
-        fsr, (g, _) = law(force, hysteresis=0.0)
-        assert np.isfinite(g).all()
-        assert g[0, 0] <= 1 / 500 + fsr.leak_s
+        assert conductances(fsr, force * per_n_cm2)[0].max() <= 1 / 500 + fsr.leak_s
 
 
 def test_hysteresis_is_bounded_and_does_not_know_the_rate():
@@ -95,28 +85,19 @@ def exact_resistances(g, digits=50):
         )
 
 
-def scenes(decades):
-    rng = np.random.default_rng(decades)
-    x = np.arange(16) - 7.5
-    radius = np.hypot(x, x[:, None])
-    hidden = np.full((16, 16), 10.0**-decades)
-    hidden[[2, 2, 9], [2, 9, 2]] = 1
-    return {
-        "even in decades": 10 ** rng.uniform(-decades, 0, (16, 16)),
-        "washer": np.where((radius > 2.2) & (radius < 4.8), 1.0, 10.0**-decades),
-        "hidden corner": hidden,
-    }
+HIDDEN = np.full((16, 16), 1e-6)
+HIDDEN[[2, 2, 9], [2, 9, 2]] = 1  # three corners, behind which the fourth is hidden
+EVEN = 10 ** np.random.default_rng(6).uniform(-6, 0, (16, 16))
 
 
-@pytest.mark.parametrize("name", scenes(6))
-def test_six_decades_of_conductance_against_fifty_digits(name):
-    g = 1e-4 * scenes(6)[name]
-    error = effective_resistances(g) / exact_resistances(g) - 1
+@pytest.mark.parametrize("g", [HIDDEN, EVEN], ids=["hidden corner", "even in decades"])
+def test_six_decades_of_conductance_against_fifty_digits(g):
+    error = effective_resistances(1e-4 * g) / exact_resistances(1e-4 * g) - 1
     assert np.abs(error).max() <= 1e-13  # asked: 1.7e-10
 
 
 def test_driven_rows_agree_with_the_whole_network():
-    g, row, column = scenes(4)["even in decades"], 0.05, 0.2
+    g, row, column = EVEN, 0.05, 0.2
     laplacian = np.zeros((32, 32))
     laplacian[:16, 16:], laplacian[16:, :16] = -g, -g.T
     np.fill_diagonal(laplacian, np.r_[g.sum(1) + 1 / row, g.sum(0) + 1 / column])
@@ -149,18 +130,6 @@ def test_each_ideal_readout_by_its_formula():
         expected = np.clip(np.rint(share * 1023), 0, 1023)
         np.testing.assert_array_equal(read(replace(IDEAL, readout=readout), forces), expected)
     assert (expected == 1023).any()
-
-
-def test_the_tactel_before_is_seen_as_much_as_the_settling_leaves_and_columns_couple():
-    share = np.zeros((16, 16))
-    share[4, 15] = 1.0
-    rest = np.exp(-2.0)
-    seen = scan_shares(share, replace(IDEAL, settling_s=10e-6, tau_s=5e-6))
-    assert [seen[4, 15], seen[5, 0]] == pytest.approx([1 - rest, (1 - rest) * rest])
-    assert seen[4, 14] == pytest.approx(0, abs=1e-12)
-    seen = scan_shares(share, replace(IDEAL, coupling=-1e-3))
-    assert seen[9, 15] == pytest.approx(-1e-3)
-    assert seen[9, 14] == 0
 
 
 READOUTS = ["floating", "grounded", "virtual"]
@@ -217,10 +186,8 @@ def test_what_lies_under_the_noise_is_lost_and_what_does_not_is_not(readout):
 
 def test_a_hidden_tactel_of_floating_rows_is_named():
     """Behind three pressed corners the fourth shows its neighbours, not itself."""
-    g = np.full((16, 16), 1e-8)
-    g[[2, 2, 9], [2, 9, 2]] = 1e-4
     e = board_of("floating", bits=16)
-    found = invert_readings(digitised(g, e, 1), e)
+    found = invert_readings(digitised(1e-4 * HIDDEN, e, 1), e)
     assert found.lost[9, 9]
     assert not found.lost[2, 2]
 

@@ -15,7 +15,6 @@ from probe.command import run
 from probe.command.calibrated import board_from, loads_given
 from probe.errors import CalibrationError, CircuitError
 from probe.frame import frame_from, median_filter
-from probe.recording.read import Recording
 
 FORCES = (0, 40, 100, 200, 400)
 
@@ -135,17 +134,6 @@ def test_bias_warns_of_drift_with_code_1(asked, bench):
     assert "warning: " in err
     assert "calibrate again" in err
     assert json.loads(asked(*words, "--json")[1])["shift_counts"] > 20
-
-
-def test_touch_i_is_the_same_among_any_number_of_touches(asked, tmp_path):
-    given = ["simulate", "washer", "--overlay", "pad", "--accuracy", "footprint", "--noise",
-             "quiet", "--png", tmp_path / "a.png"]  # fmt: skip
-    for n in (1, 3):
-        assert asked(*given, "--touches", n, "-o", tmp_path / f"{n}.h5", "--replace")[0] == 0
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
-    few, many = (Recording(tmp_path / f"{n}.h5").block().counts for n in (1, 3))
-    assert (few[0] == many[0]).all()
-    assert not (many[0] == many[1]).all()
 
 
 def test_boards_from_text():

@@ -124,17 +124,6 @@ def test_forces_of_every_size_are_borne_or_refused(exponent):
     assert found.forces_n / force == pytest.approx(small.forces_n / 1e-3, rel=1e-3, abs=1e-5)
 
 
-def test_edge_of_a_face_and_ten_degrees():
-    sensor, ten = pad(), math.radians(10.0)
-    edge = layer(half_plane(), sensor, Touch(3.0, 0.0, 0.0, 30.0, wrist=WristStiffness(1e5, 1e5)))
-    assert edge.forces_n[:, :7].sum() > 0.97 * 30  # matter where x <= -3 mm: 6.1 columns
-    assert edge.forces_n[:, 9:].sum() < 0.01 * 30
-    stiff = WristStiffness(1e9, 1e9)
-    tilted = layer(FlatPlate(), sensor, Touch(0, 0, 0, 10.0, ten, 0.0, stiff), cells_per_tactel=4)
-    assert tilted.tilt_x_rad == pytest.approx(ten, rel=1e-4)
-    assert tilted.forces_n[8:].sum() > 0.99 * 10  # the plate's lower side is at the bottom
-
-
 HERE = Touch(0, 0, 0, 10.0)
 
 

@@ -7,9 +7,9 @@ import pytest
 from reference.indenters import Formula, half_plane, sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from probe.contact.contract import Touch, WristStiffness, heights_under
-from probe.contact.plate import Columns, PlatePose, rest
-from probe.contact.tabs import SKIN, tabs, tabs_at_rest, tip_laws
+from probe.contact.contract import Touch, WristStiffness
+from probe.contact.plate import PlatePose
+from probe.contact.tabs import SKIN, tabs
 from probe.contact.tips import NUMBERS, Tips, rings, tip_points
 from probe.errors import ContactError
 from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, RoughSurface, TiltedPlane, Washer
@@ -76,20 +76,6 @@ def test_forces_and_moments_balance(name, tilt):
     assert moment_y == pytest.approx(-(found.forces_n * x).sum(), abs=80 * 0.64)
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_what_is_left_out_changes_nothing(name):
-    touch = Touch(0.7, -0.4, 0.3, 60.0, 0.02, 0.01)
-    points, drop = tip_points(SENSOR, Tips())
-    heights = heights_under(SCENES[name], touch, points) - drop
-    skin, column = tip_laws(SENSOR.overlay, 19)
-    columns = Columns(column, np.arange(256) * 19, np.arange(4864) // 19, np.zeros(256))
-    whole = rest(points.reshape(-1, 2), heights.ravel(), skin, touch, columns=columns)
-    found, forces = tabs_at_rest(points, heights, SENSOR.overlay, touch)
-    assert found.pose.z_mm == pytest.approx(whole.pose.z_mm, abs=2e-6)
-    assert found.pose.tilt_x_rad == pytest.approx(whole.pose.tilt_x_rad, abs=1e-6)
-    np.testing.assert_allclose(forces, whole.forces_n.reshape(256, 19).sum(axis=1), atol=4e-5)
-
-
 def test_points_that_were_not_foreseen_to_touch_are_taken_in(monkeypatch):
     touch = Touch(0.0, 0.0, 0.0, 200.0)
     right = tabs(half_plane(floor_mm=-0.3), SENSOR, touch)
@@ -147,18 +133,6 @@ def test_a_free_plate_finds_its_own_tilt():
     assert found.tilt_y_rad == pytest.approx(-0.05, abs=1e-6)
     assert found.tilt_x_rad == pytest.approx(-0.03, abs=1e-6)
     np.testing.assert_allclose(found.forces_n, 80 / 256, rtol=1e-3)
-
-
-def test_a_longer_tab_bears_more_and_a_domed_one_gives_way():
-    lengths = np.zeros((16, 16))
-    lengths[3, 5] = 0.1
-    found = pressed(FlatPlate(), tips=Tips(lengths_mm=lengths))
-    rest_of_them = np.delete(found.forces_n.ravel(), 3 * 16 + 5)
-    assert found.forces_n[3, 5] > 1.2 * rest_of_them.max()
-    domed = pressed(FlatPlate(), tips=Tips(dome_mm=0.2))
-    plain = pressed(FlatPlate())
-    assert domed.z_mm < plain.z_mm
-    np.testing.assert_allclose(domed.forces_n, 80 / 256, rtol=1e-3)
 
 
 def test_tabs_that_all_stand_off_by_the_same_are_a_sensor_moved():

@@ -23,7 +23,7 @@ from probe.command import run
 from probe.errors import PortError, ProbeError
 from probe.frame import Frame, frame_from
 from probe.port.address import Address
-from probe.port.flexitac import MARKER, PAUSE_LEAST_S, MarkedImages
+from probe.port.flexitac import MARKER, MarkedImages
 from probe.port.serial_line import _explain_refusal
 from probe.port.software import SoftwareProbe, endless_frames
 from probe.port.url import GROUP, address_of, open_port, typed_port
@@ -35,10 +35,7 @@ from probe.recording.read import Recording
     ("url", "target", "options"),
     [
         ("serial:///dev/ttyACM0?baud=500000", "/dev/ttyACM0", {"baud": "500000"}),
-        ("sim:", "", {}),
-        ("sim:out/cube.stl?seed=3", "out/cube.stl", {"seed": "3"}),
         ("sim:lab.db#Cube/top?rate=5&seed=1", "lab.db#Cube/top", {"rate": "5", "seed": "1"}),
-        ("sim:sqlite:///lab.db#Cube/1", "sqlite:///lab.db#Cube/1", {}),
         ("sim:postgresql://h/d?sslmode=require#Cube/1", "postgresql://h/d?sslmode=require#Cube/1",
          {}),
         ("file:touch.h5?speed=0&loop=1", "touch.h5", {"speed": "0", "loop": "1"}),
@@ -85,34 +82,6 @@ def test_without_permission_the_group_is_named(tmp_path):
     refused = _explain_refusal(address_of(f"serial://{device}"), OSError(errno.EACCES, "no"), 9600)
     assert f"no permission to open {device}" in refused.cause
     assert "usermod -a -G" in refused.fix
-
-
-def test_bytes_go_both_ways_until_the_device_goes(line):
-    master, url = line
-    port = open_port(url)
-    assert port.url == url
-    assert port.read(0.01) == b""
-    os.write(master, b"\x00\x01\x11\x13\r\n\xff")  # what a line must not change
-    assert port.read(1.0) == b"\x00\x01\x11\x13\r\n\xff"
-    port.write(b"s\r")
-    assert os.read(master, 10) == b"s\r"
-    os.close(master)
-    with pytest.raises(PortError, match="went away"):
-        port.read(1.0)
-    port.close()
-    port.close()
-
-
-@pytest.fixture
-def line():
-    """Yield the master of a pty, and the URL of its other end."""
-    master, slave = pty.openpty()
-    tty.setraw(master)
-    name = os.ttyname(slave)
-    os.close(slave)
-    yield master, f"serial://{name}"
-    with suppress(OSError):  # the test may have closed it
-        os.close(master)
 
 
 IDENT = IdentPacket(0, 0, name="test")
@@ -263,17 +232,6 @@ def test_jumps_are_announced():
     ]  # fmt: skip
 
 
-def test_a_late_reader_makes_the_device_wait():
-    port = SoftwareProbe("sim:", frames(1000), IDENT, speed=1.0)
-    port.write(b"s")
-    packets(port)
-    time.sleep(0.7)
-    assert len(packets(port)) == 1  # not the seventy that were due
-    port.write(b"t")
-    (statistics,) = packets(port)
-    assert statistics.transmit_waits == 1
-
-
 def test_a_recording_repeats_with_rising_numbers_and_times():
     seen = list(islice(endless_frames(lambda: iter([frame(7, 5), frame(9, 25)])), 5))
     assert [f.seq for f in seen] == [0, 2, 3, 5, 6]
@@ -314,24 +272,6 @@ def test_images_come_out_of_any_pieces(pieces):
     assert marked.sure
 
 
-def still_image():
-    """Return an image with the marker in it."""
-    image = np.zeros(LENGTH, np.uint8)
-    image[100:102], image[200] = (0xAA, 0x55), 7
-    return image
-
-
-def test_a_marker_inside_images_that_stand_still_is_told_by_the_pauses():
-    image = still_image()
-    marked, found = MarkedImages(LENGTH), []
-    block = MARKER + image.tobytes()
-    for part in [block[300:], *[block] * 20]:
-        found += marked.feed(part[:400], quiet_s=2 * PAUSE_LEAST_S)
-        found += marked.feed(part[400:])
-    assert len(found) >= 15
-    assert all(one == image.tobytes() for one in found)
-
-
 def test_lost_and_added_bytes_cost_the_images_that_they_are_in():
     images = images_of(60)
     stream = bytearray(stream_of(images))
@@ -351,6 +291,13 @@ def sending_images(images):
         return (MARKER + images[seq % len(images)].tobytes())[0 if seq else 50 :]
 
     return sending(block, greeted=False)
+
+
+def still_image():
+    """Return an image with the marker in it."""
+    image = np.zeros(LENGTH, np.uint8)
+    image[100:102], image[200] = (0xAA, 0x55), 7
+    return image
 
 
 @pytest.mark.parametrize("images", [images_of(9), still_image()[None]], ids=["changing", "still"])

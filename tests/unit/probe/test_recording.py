@@ -13,11 +13,10 @@ import pytest
 from recorded import frames, record, same
 
 from probe.errors import RecordingError
-from probe.frame import Frame, frame_from
+from probe.frame import Frame
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.recording.repair import repair
-from probe.recording.table import export_csv
 
 COUNTS = np.random.default_rng(3).integers(0, 1024, (600, 16, 16)).astype(np.uint16)
 
@@ -78,6 +77,10 @@ def test_flushed_frames_are_read_while_others_are_written(tmp_path):
         assert all(map(same, Recording(path, live=True).frames(), frames(100)))
         assert len(Recording(path, live=True)) == 100
     assert len(Recording(path, live=True)) == 100
+    with Recorder(tmp_path / "slow.h5", flush_s=0.05) as recorder:
+        for frame in frames(12):  # 11 periods of 1/220 s are 0.05 s
+            recorder.append(frame)
+        assert len(Recording(tmp_path / "slow.h5", live=True)) == 12
 
 
 def test_a_series_is_read_while_its_next_file_is_blank(tmp_path):
@@ -151,66 +154,27 @@ def test_values_that_are_no_counts_are_refused_and_where(tmp_path, bad):
     assert len(list(Recording(path).frames(0, 256))) == 256
 
 
-def test_a_table_that_cannot_be_made_leaves_nothing(tmp_path):
-    path = record(tmp_path / "touch.h5", frames(10)).files[0]
-    (tmp_path / "old.csv").write_text("old")
-    with pytest.raises(RecordingError, match="make the folder first"):
-        export_csv(path, tmp_path / "no" / "touch.csv")
-    content = bytearray(path.read_bytes())
-    with h5py.File(path) as file:
-        content[file["frames"].id.get_chunk_info(0).byte_offset + 100] ^= 1
-    path.write_bytes(content)
-    with pytest.raises(RecordingError, match="damaged"):
-        export_csv(path, tmp_path / "old.csv")
-    assert (tmp_path / "old.csv").read_text() == "old"
-    assert names(tmp_path) == ["old.csv", "touch.h5"]
-
-
-IMAGES = np.random.default_rng(3).integers(0, 65536, (200, 6, 5)).astype(np.uint16)
-HEAD = {
-    "version": 1, "tool_version": "0", "piece": 1, "shape": [6, 5], "sensor": "", "more": {},
-    "calibration": "", "units": "counts", "sensor_type": "",
-}  # fmt: skip
-
-
-@pytest.fixture
-def journal(tmp_path):
-    """The part file of a writer that was killed after 200 frames, every third with a pose."""
-    path = tmp_path / "written" / "touch.h5"
-    path.parent.mkdir()
-    recorder = Recorder(path, sensor="bench 1", attributes={"force_n": np.float64(80), "of": "a"})
-    for i, counts in enumerate(IMAGES):
-        recorder.append(
-            frame_from(
-                counts, t_ns=i * 10**6, seq=i, wrist=[1, 2, 3, i], pose=np.eye(4) if i % 3 else None
-            )
-        )
-    recorder.flush()
-    left = tmp_path / "touch.part.h5"
-    left.write_bytes(path.with_name("touch.part.h5").read_bytes())
-    recorder.close()
-    assert [*path.parent.iterdir()] == [path]
-    return left
-
-
-def size_of(journal):
-    """Bytes of its head and of a record."""
-    length = struct.unpack_from("<I", journal.read_bytes(), 8)[0]
-    return 16 + length, 2 * 30 + 8 + 16 + 128 + 4
-
-
-def test_a_damaged_record_costs_its_block(journal):
-    start, size = size_of(journal)
-    content = bytearray(journal.read_bytes())
-    content[start + 70 * size + 5] ^= 8
+def test_a_damaged_record_of_a_journal_costs_its_block(tmp_path):
+    given, journal = frames(200), tmp_path / "touch.part.h5"
+    with Recorder(tmp_path / "written.h5") as recorder:
+        for frame in given:
+            recorder.append(frame)
+        recorder.flush()
+        content = bytearray((tmp_path / "written.part.h5").read_bytes())
+    content[content.index(given[70].counts.tobytes())] ^= 8
     journal.write_bytes(content)
     with pytest.raises(RecordingError, match=r"damaged: cannot read it; .*`repair`"):
         list(Recording(journal).frames())
     result = repair(journal)
     assert (result.frames, result.lost) == (136, 64)
-    kept = journal.with_name("touch.damaged.h5")
-    assert kept.read_bytes() == content
+    assert journal.with_name("touch.damaged.h5").read_bytes() == content
     assert Recording(result.path).origin.more["frames_lost"] == 64
+
+
+HEAD = {
+    "version": 1, "tool_version": "0", "piece": 1, "shape": [6, 5], "sensor": "", "more": {},
+    "calibration": "", "units": "counts", "sensor_type": "",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -244,7 +208,7 @@ def test_a_disk_without_space_for_hdf5_leaves_the_journal(tmp_path, monkeypatch)
         raise RecordingError("cannot write it: No space left on device", fix="free some space")
 
     recorder = Recorder(tmp_path / "touch.h5")
-    recorder.append(frame_from(IMAGES[0], t_ns=0, seq=0))
+    recorder.append(frames(1)[0])
     monkeypatch.setattr("probe.recording.record.write_hdf5", refuse)
     with pytest.raises(RecordingError, match="free some space, then run `repair`"):
         recorder.close()

@@ -7,9 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from encoded_objects.base.sensor_type import SensorType
 from probe.arm import Arm, forward, inverse
-from probe.contact.contract import Touch
 from probe.errors import ContactError, PoseError, SurfaceError
 from probe.scan import (
     ApproachLimits,
@@ -122,17 +120,6 @@ def test_a_face_that_is_not_convex_and_one_with_a_hole():
     )
     assert not any(np.hypot(*(place - 60)) < 20 for place in around.places_mm)
     assert around.cover.max() < 1
-
-
-@pytest.mark.parametrize("theta", [0.3, math.pi])
-def test_cover_is_the_area_under_the_sensor(theta):
-    ell = np.array([(0, 0), (50, 0), (50, 20), (20, 20), (20, 50), (0, 50)], float)
-    plan = raster([ell], theta_rad=theta, least_cover=0)
-    grid = SensorType(rows=160, columns=160, pitch_mm=0.15875).centres_mm().reshape(-1, 2)
-    for place, cover in zip(plan.places_mm, plan.cover, strict=True):
-        x, y = Touch(*place, theta, 1.0).on_surface(grid).T
-        inside = (x >= 0) & (y >= 0) & (x <= 50) & (y <= 50) & ((x <= 20) | (y <= 20))
-        assert inside.mean() == pytest.approx(cover, abs=0.01)
 
 
 def test_tilts_are_those_of_the_contact_models():

@@ -85,16 +85,6 @@ def test_which_type_images_are_of():
         choose_sensor_type("fsr-8x8", "", (16, 16), "touch.h5")
 
 
-def test_an_overlay_is_taken_as_usual():
-    flexitac = sensor_type_named("flexitac-12x32")
-    pad = flexitac.with_overlay("pad")
-    assert pad.overlay == Overlay(kind="pad")
-    assert replace(pad, overlay=flexitac.overlay) == flexitac
-    assert flexitac.with_overlay("tab") is flexitac
-    assert SensorType(overlay=Overlay(kind="pad")).with_overlay("tab") == SensorType()
-    assert pad.with_overlay("tab").overlay.tab_diameter_mm == pytest.approx(1.2666 * 2 / 1.5875)
-
-
 def test_frames_of_another_shape_are_not_recorded(tmp_path):
     with Recorder(tmp_path / "a.h5") as recorder:
         recorder.append(frame_from(np.zeros((8, 8)), t_ns=0, seq=0))

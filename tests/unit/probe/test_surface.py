@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 import shapely
-from reference.indenters import block
+from reference.indenters import block, nib_region
 from reference.mesh_heights import heights_by_numpy, heights_over
-from shapely.geometry import MultiPoint
 
 from probe.errors import SurfaceError
 from probe.surface import indenters
@@ -18,36 +15,9 @@ from probe.surface.face import (
     list_lookup,
     template,
 )
-from probe.surface.mesh import mesh
+from probe.surface.mesh import mesh, sort_numbers
 from probe.surface.polygon import polygon
 from probe.surface.symbols import Relief, emboss, outline
-
-ALL = [
-    indenters.FlatPlate(),
-    indenters.TiltedPlane(0.05, -0.1),
-    indenters.RaisedStrip(),
-    indenters.Cross(),
-    indenters.Washer(),
-    indenters.RoughSurface(seed=3),
-]
-
-
-@pytest.mark.parametrize("surface", ALL, ids=lambda surface: type(surface).__name__)
-def test_no_height_exceeds_the_top_and_none_is_nan(surface):
-    heights = surface.heights_mm(np.random.default_rng(1).uniform(-150, 150, (20_000, 2)))
-    assert heights.shape == (20_000,)
-    assert not np.isnan(heights).any()
-    assert heights.max() <= surface.top_mm < math.inf
-    assert surface.heights_mm(np.zeros((0, 2))).shape == (0,)
-
-
-def test_rough_surface_is_its_seed_with_the_stated_rms():
-    points = np.random.default_rng(0).uniform(-400, 400, (40_000, 2))
-    one, again, other = (indenters.RoughSurface(n, 0.2).heights_mm(points) for n in (5, 5, 6))
-    assert np.array_equal(one, again)
-    assert not np.array_equal(one, other)
-    assert one.std() == pytest.approx(0.2, rel=0.05)
-
 
 SQUARE = np.array([[0.0, 0], [10, 0], [10, 10], [0, 10]])
 HOLE = np.array([[4.0, 4], [4, 6], [6, 6], [6, 4]])
@@ -64,14 +34,6 @@ def test_frames_move_the_part_under_the_sensor():
     part = mesh(block((0, 0, 0), (1, 2, 3)), T)
     assert part.top_mm == 7.0
     assert part.heights_mm(np.array([[6.5, 7.0], [4.9, 7.0]])).tolist() == [7.0, -np.inf]
-
-
-def test_filled_loops_cover_their_area_once():
-    points, triangles = np.concatenate([SQUARE, HOLE]), triangulate([SQUARE, HOLE])
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    areas = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    assert areas.min() > 0
-    assert areas.sum() / 2 == pytest.approx(96.0)
 
 
 @pytest.mark.parametrize("width", [3.0, 1e-7])
@@ -92,6 +54,14 @@ def test_bins_hold_every_triangle_that_points_lie_under(width):
             for u, v in zip(x, y, strict=True)]  # fmt: skip
     assert np.isfinite(over).mean() > 0.4
     assert np.array_equal(part.heights_mm(points), np.minimum(over, part.top_mm))
+
+
+@pytest.mark.parametrize("most", [1, 1 << 17, 1 << 50])
+def test_numbers_are_sorted_as_numpy_sorts_them(most):
+    numbers = np.random.default_rng(2).integers(0, most, 4000)
+    numbers = np.concatenate([numbers, numbers[::3]])
+    assert np.array_equal(sort_numbers(numbers), np.argsort(numbers, kind="stable"))
+    assert len(sort_numbers(numbers[:0])) == 0
 
 
 def scattered(rng):
@@ -155,15 +125,6 @@ def test_no_height_is_missed_by_more_than_the_tolerance(cells, tolerance):
     assert len(triangles) <= 2 * cells**2
 
 
-def test_a_slope_is_two_triangles_and_a_corner_of_it_a_few():
-    row, column = np.indices((17, 17)).astype(float)
-    assert len(mesh_heights(0.3 * row - 0.2 * column, 1e-9)) == 2
-    raised = np.zeros((17, 17))
-    raised[0, 0] = 1.0
-    # Halved from the whole square down to the smallest triangle at that corner, and no further.
-    assert len(mesh_heights(raised, 0.1)) == 2 + 2 * 8
-
-
 @pytest.mark.parametrize("tolerance", [0.0, 0.2])
 def test_the_body_is_closed_and_holds_what_lies_below_the_heights(tolerance):
     heights = scene(16, np.random.default_rng(8))
@@ -196,20 +157,9 @@ RELIEFS = [
 ]
 
 
-def region(glyph, stroke):
-    """Union of the nib's hulls, by shapely."""
-    turns = (np.arange(8) + 0.5) * math.pi / 4
-    nib = stroke / 2 / math.cos(math.pi / 8) * np.stack([np.cos(turns), np.sin(turns)], 1)
-    hulls = [
-        MultiPoint(np.concatenate([UNIT * np.array(a) + nib, UNIT * np.array(b) + nib])).convex_hull
-        for a, b in glyph
-    ]
-    return shapely.union_all(hulls)
-
-
 def heights_by_levels(glyph, relief, x, y):
     """Height by level sets: a point stands at z where the outline, moved to z, holds it."""
-    body, (away, at) = region(glyph, relief.stroke_mm), relief.profile()
+    body, (away, at) = nib_region(glyph, relief.stroke_mm, UNIT), relief.profile()
     found = np.zeros(len(x))
     for d in np.linspace(away[0], away[-1], 400):
         grown = body.buffer(d, join_style="mitre", mitre_limit=20.0)
@@ -231,6 +181,20 @@ def test_heights_are_those_of_the_moved_outline(label, relief):
     step = 1.01 * steepest * (away[-1] - away[0]) / 399 + 1e-9
     assert (np.abs(ours - theirs) <= step).all()
     assert (theirs > 0).mean() > 0.15
+
+
+@pytest.mark.parametrize("relief", RELIEFS)
+def test_table_gives_the_exact_heights(relief):
+    symbols = emboss(GLYPHS, UNIT, relief)
+    known = template(symbols, PITCH)
+    rng = np.random.default_rng(3)
+    labels = rng.integers(-1, len(GLYPHS), 60_000)
+    right, down = rng.random((2, 60_000))
+    exact = np.zeros(60_000)
+    on = labels >= 0
+    x, y = (right - 0.5) * PITCH, (0.5 - down) * PITCH
+    exact[on] = symbols.heights_mm(labels[on], x[on], y[on])
+    assert np.abs(known.heights_mm(labels, right, down) - exact).max() < 1e-12
 
 
 WALL = np.array([[[0.0, 0, 0], [1, 0, 0], [1, 0, 5]]])

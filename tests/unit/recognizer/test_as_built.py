@@ -24,11 +24,6 @@ from recognizer.as_built.touches import measure_prints
 from recognizer.as_built.verdict import AS_DESIGNED, CORRECTED, PRINT_AGAIN, judge_print
 from recognizer.errors import AsBuiltError
 from recognizer.touch.as_built import (
-    APART_SD,
-    ASIDE_SD_MM,
-    DESIGNED,
-    SCALE_SD,
-    SKEW_SD_RAD,
     UNUSUAL,
     PrintedFace,
     TouchScale,
@@ -167,26 +162,6 @@ def test_a_pose_that_is_read_becomes_the_pose_on_the_print(scale_x, scale_y, ske
     np.testing.assert_allclose(T_part_face @ found, T_part_probe, atol=1e-9)
 
 
-def test_a_pose_is_as_unsure_as_the_print_where_it_is_far_from_the_middle():
-    T_part_face = np.eye(4)
-    T_part_face[:3, 3] = -30, -30, 3
-    spread = np.diag([1e-3**2, 2e-3**2, 3e-3**2, 0.1**2])
-    face = PrintedFace(print_with(covariance=spread), T_part_face)
-    pose = np.eye(4)
-    pose[:2, 3] = 30, 30  # the middle
-    own = np.diag([1e-4, 1e-4, 1e-6])
-    floor = np.diag([ASIDE_SD_MM**2] * 2 + [0])  # backlash, shifted layers
-    same, covariance = face.pose(pose, own)
-    np.testing.assert_allclose(same, pose, atol=1e-12)
-    np.testing.assert_allclose(covariance, own + floor + np.diag([0, 0, 1.5e-3**2]), atol=1e-12)
-    pose[:2, 3] = 50, 20
-    _, covariance = face.pose(pose, own)  # 20 mm along x, -10 mm along y
-    covariance -= floor
-    assert covariance[0, 0] == pytest.approx(1e-4 + 0.02**2 + 0.03**2, rel=1e-4)
-    assert covariance[1, 1] == pytest.approx(1e-4 + 0.02**2, rel=1e-4)
-    assert covariance[0, 2] == pytest.approx(0.03 * 1.5e-3, rel=1e-4)  # both of the skew
-
-
 def at_rest(x=0.0, y=0.0, turn=0.0):
     pose = np.eye(4)
     pose[:2, :2], pose[:2, 3] = turned(turn)[:2, :2], (x, y)
@@ -195,68 +170,6 @@ def at_rest(x=0.0, y=0.0, turn=0.0):
 
 def felt(excess, sigma=1e-3, expected=1e9, with_pose=(0.0, 0.0, 0.0)):
     return TouchScale(excess, np.array([*with_pose, sigma**2]), expected)
-
-
-def test_prints_that_nobody_measured_come_out_as_designed_more_or_less():
-    usual = usual_print()
-    assert (usual.scale_x, usual.scale_y, usual.skew_rad, usual.touches) == (1.0, 1.0, 0.0, 0)
-    mean, apart = np.array([0.5, 0.5, 0, 0]), np.array([1, -1, 0, 0])
-    assert apart @ usual.covariance @ apart == pytest.approx(2 * APART_SD**2 / 2)
-    assert mean @ usual.covariance @ mean == pytest.approx(SCALE_SD**2 + APART_SD**2 / 4)
-    assert usual.covariance[2, 2] == pytest.approx(SKEW_SD_RAD**2)
-
-
-def test_what_a_touch_feels_of_the_scale_moves_its_place_towards_the_middle():
-    face = PrintedFace(print_with(covariance=np.diag([4e-6, 4e-6, 1e-12, 1])), np.eye(4))
-    pose, none = at_rest(20.0, -10.0, 0.3), np.zeros((3, 3))
-    # the mean of both scales is known to .002 / root 2, and felt to .001
-    share = 2e-6 / (2e-6 + 1e-6)
-    found, covariance = face.pose(pose, none, felt(0.003))
-    scale = 1 - share * 0.003
-    assert found[:2, 3] == pytest.approx((20 * scale, -10 * scale), abs=2e-4)
-    np.testing.assert_allclose(found[:3, :3], pose[:3, :3], atol=1e-9)
-    # what is left of the mean, and of the difference, which no touch tells
-    left, apart = (1 - share) * 2e-6, 2e-6
-    floor = ASIDE_SD_MM**2
-    assert covariance[0, 0] == pytest.approx(floor + 20**2 * (left + apart), rel=0.01)
-    assert covariance[1, 1] == pytest.approx(floor + 10**2 * (left + apart), rel=0.01)
-    assert covariance[0, 1] == pytest.approx(-20 * 10 * (left - apart), rel=0.02)
-
-
-def test_what_the_fit_expected_of_the_scale_is_taken_off():
-    """An expectation of its own as sharp as what it felt: it felt twice as much, half as surely."""
-    face = PrintedFace(print_with(covariance=np.diag([4e-6, 4e-6, 1e-12, 1])), np.eye(4))
-    pose, none = at_rest(20.0, -10.0), np.zeros((3, 3))
-    sigma = math.sqrt(0.5e-6)
-    found, covariance = face.pose(pose, none, felt(0.0015, sigma, expected=1e-3))
-    plain, expected = face.pose(pose, none, felt(0.003, 1e-3))
-    np.testing.assert_allclose(found, plain, atol=1e-9)
-    np.testing.assert_allclose(covariance, expected, rtol=1e-6)
-    # a fit that felt nothing but what it expected tells nothing
-    same, _ = face.pose(pose, none, felt(0.0015, 1e-3, expected=1e-3))
-    np.testing.assert_allclose(same, pose, atol=1e-9)
-
-
-def test_a_place_that_hangs_on_the_scale_moves_with_it():
-    """At an edge a lattice that is felt too large is felt aside: both are one error."""
-    sure = PrintedFace(print_with(covariance=np.full((4, 4), 1e-18)), np.eye(4))
-    covariance = np.diag([4e-4, 1e-4, 1e-6])
-    touch = felt(0.004, 1e-3, with_pose=(1e-5, 0.0, 1e-7))  # 10 mm, .1 rad for each unit of scale
-    found, told = sure.pose(at_rest(0.0, 0.0), covariance, touch)
-    assert found[:2, 3] == pytest.approx((-0.04, 0.0), abs=1e-6)  # the print is as designed
-    assert math.atan2(found[1, 0], found[0, 0]) == pytest.approx(-0.0004, rel=1e-3)
-    left = covariance - np.outer((1e-5, 0, 1e-7), (1e-5, 0, 1e-7)) / 1e-6
-    floor = np.diag([ASIDE_SD_MM**2] * 2 + [0.0])
-    np.testing.assert_allclose(told, left + floor, atol=1e-9)
-
-
-def test_of_a_part_as_designed_nothing_is_allowed_for():
-    """Its scale is known to be 1: what was felt of it moves the place, and leaves no spread."""
-    T_part_face = at_rest(-30.0, 5.0)
-    own = np.diag([4e-4, 1e-4, 1e-6])
-    found, covariance = PrintedFace(DESIGNED, T_part_face).pose(at_rest(20.0, 10.0), own, felt(0.0))
-    np.testing.assert_allclose(found, at_rest(20.0, 10.0), atol=1e-9)
-    np.testing.assert_allclose(covariance, own, atol=1e-12)
 
 
 def test_a_touch_that_shows_an_unusual_scale_widens_its_ellipse_and_stays():
@@ -270,12 +183,6 @@ def test_a_touch_that_shows_an_unusual_scale_widens_its_ellipse_and_stays():
         grown = covariance[0, 0] / known[0, 0]
         assert 1.0 <= grown <= wider
         assert (grown > 1.0) == (wider > 1.0)
-
-
-def test_an_answer_says_what_it_takes_the_part_for():
-    faces = (DESIGNED, usual_print(), print_with())
-    said = [PrintedFace(one, np.eye(4)).part for one in faces]
-    assert said == ["as designed", "not measured", "as built"]
 
 
 def test_a_reader_that_knows_parts_as_designed_is_surer_of_the_same_place(tmp_path):
@@ -365,15 +272,10 @@ def image_felt(reader, matrix, touch, name="Cube", seq=0):
     return TouchImage(seq, 0, 1, 100 * forces, np.zeros(4), None)
 
 
-@pytest.mark.parametrize(
-    "matrix",
-    [np.diag([0.98, 1.0]), np.diag([1.0, 1.02]), np.array([[1.0, 0.015], [0.0, 1.0]]),
-     np.diag([0.988, 0.994])],
-)  # fmt: skip
+@pytest.mark.parametrize("matrix", [np.diag([0.98, 1.0]), np.array([[1.0, 0.015], [0.0, 0.99]])])
 def test_a_touch_tells_scales_and_skew_of_the_print(reader, matrix):
-    touches = [
-        image_felt(reader, matrix, Touch(18.0, 21.5, turn, 80.0)) for turn in (0.3, 1.9, -2.2, -0.8)
-    ]
+    at = [Touch(18.0, 21.5, turn, 80.0) for turn in (0.3, 1.9, -2.2, -0.8)]
+    touches = [image_felt(reader, matrix, touch) for touch in at]
     found = np.mean([one.strain for one in measure_prints(reader, touches)], axis=0)
     E = (matrix.T @ matrix - np.eye(2)) / 2
     np.testing.assert_allclose(found, (E[0, 0], E[1, 1], E[0, 1]), atol=0.0015)

@@ -61,13 +61,6 @@ def scan(lab):
     return Scan(lab.url, "Cube", "F2", seed=3)
 
 
-def off_mm(poses, true):
-    """Rms distance of merged touches from where they were, up to a common shift."""
-    away = (poses - relative_pose(true[0], true))[:, :2]
-    away -= away.mean(axis=0)
-    return float(np.sqrt((away**2).sum(axis=1).mean()))
-
-
 # --- merging ----------------------------------------------------------------------------
 
 
@@ -106,24 +99,16 @@ def test_touches_lie_where_they_were_felt():
     assert not image.defined.all()
 
 
-def test_products_find_steps_to_a_quarter_of_a_tactel():
-    quarter = SENSOR.pitch_mm / 4
-    believed = np.array([[0.0, 0, 0], [16 * quarter, 0, 0]])
+def test_products_find_steps_to_a_quarter_of_a_tactel_where_something_is_felt_in_common():
+    step = 4 * SENSOR.pitch_mm
     blob = np.zeros((16, 16))
     blob[6:9, 9:11] = 1.0
     blob[10:12, 8:10] = 0.8
-    moved_blob = np.roll(blob, -4, axis=1)
-    wrong = np.array([[0, 0, 0], [2 * quarter, quarter, 0]])
-    found = merge_touches(SENSOR, [blob, moved_blob], believed + wrong)
-    assert found.poses[1, :2] == pytest.approx([16 * quarter, 0.0], abs=1e-9)
-
-
-def test_where_nothing_is_felt_in_common_the_belief_stays():
-    blob = np.zeros((16, 16))
-    blob[6:9, 0:2] = 1.0
-    poses = np.array([[0.0, 0, 0], [6.3, 0.2, 0]])
-    found = merge_touches(SENSOR, [blob, np.roll(blob, 12, axis=1)], poses)
-    assert found.poses == pytest.approx(relative_poses(poses))
+    wrong = np.array([[0.0, 0, 0], [step + SENSOR.pitch_mm / 2, SENSOR.pitch_mm / 4, 0]])
+    found = merge_touches(SENSOR, [blob, np.roll(blob, -4, axis=1)], wrong)
+    assert found.poses[1, :2] == pytest.approx([step, 0.0], abs=1e-9)
+    apart = merge_touches(SENSOR, [np.roll(blob, -9, axis=1), np.roll(blob, 5, axis=1)], wrong)
+    assert apart.poses == pytest.approx(relative_poses(wrong))
 
 
 def test_bad_tactels_are_filled_by_other_touches():
@@ -138,19 +123,11 @@ def test_bad_tactels_are_filled_by_other_touches():
     assert np.abs(found.image.values - pattern(at[..., 0], at[..., 1]))[inner].max() < 0.3
 
 
-def test_bounded_errors_do_not_add_up(scan):
-    # this arm is better than quarter steps
-    for placing, most in (("product", 1.6), ("bounded", 0.5), ("believed", 0.3)):
-        merged = merge_touches(SENSOR, scan.readings, scan.believed, placing)
-        assert off_mm(merged.poses, scan.true) < most * SENSOR.pitch_mm
-
-
 # --- reading ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("placing", ["product", "bounded"])
-def test_a_scan_names_object_face_and_place(lab, scan, placing):
-    found = read_scan(lab, SENSOR, scan.readings, scan.believed, placing)
+def test_a_scan_names_object_face_and_place(lab, scan):
+    found = read_scan(lab, SENSOR, scan.readings, scan.believed, "bounded")
     answer = found.recognition
     assert (answer.object, answer.face) == ("Cube", "F2")
     assert found.grid.window.shape == (6, 6)
@@ -159,42 +136,14 @@ def test_a_scan_names_object_face_and_place(lab, scan, placing):
     turned = math.atan2(answer.T_face_probe[1, 0], answer.T_face_probe[0, 0])
     assert abs(math.remainder(turned - theta, math.tau)) < math.radians(2)
     assert answer.margin > 10
-    face = next(
-        encoded
-        for encoded in map(lab.arrays[0].face, range(len(lab.arrays[0].faces)))
-        if (encoded.object, encoded.face) == ("Cube", "F2")
-    )
-    at = transform_points(scan.true[0], np.array([[s.x_mm, s.y_mm] for s in found.symbols]))
-    right = wrong = 0
-    for centre, label in zip(face.centres_mm, face.labels, strict=True):
-        near = np.linalg.norm(at - centre, axis=1) < 4
-        named = {found.symbols[k].label for k in np.flatnonzero(near)} - {-1}
-        right += label in named
-        wrong += bool(named) and label not in named
-    assert wrong == 0
-    assert right >= 28
-
-
-def test_an_answer_comes_before_the_scan_is_over_and_never_a_wrong_one(lab, scan):
-    first = None
-    for number in [1, *range(15, len(scan.readings), 15), len(scan.readings)]:
-        some = scan.readings[:number], scan.believed[:number]
-        found = read_scan(lab, SENSOR, *some, "bounded").recognition
-        if found:
-            assert (found.object, found.face) == ("Cube", "F2")
-            first = first or number
-    assert first is not None
-    assert 30 <= first <= len(scan.readings)
 
 
 def test_no_contact_and_blank_surfaces_are_told(lab):
     empty = tactile_image(np.zeros((60, 60)), step_mm=0.4)
     assert read_classically(lab, empty).recognition.reason == NO_CONTACT
     rows, columns = np.indices((100, 100))
-    ridges = tactile_image(1.0 * (columns % 25 < 5), step_mm=0.4)
-    assert not read_classically(lab, ridges).recognition
-    plane = tactile_image(1.0 + rows / 50, step_mm=0.4)
-    assert not read_classically(lab, plane).recognition
+    for blank in (1.0 * (columns % 25 < 5), 1.0 + rows / 50):  # ridges, a tilted plane
+        assert not read_classically(lab, tactile_image(blank, step_mm=0.4)).recognition
 
 
 def test_an_object_of_another_lab_is_not_taken_for_one_of_ours(lab, make_lab):

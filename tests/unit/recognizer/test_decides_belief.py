@@ -2,33 +2,22 @@
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import recognizer.touch.evidence
-from encoded_objects.base.sensor_type import SensorType
-from generator.alphabet import SymbolStyle, alphabet_named
 from recognizer.touch.evidence import (
     VerifiedHypothesis,
-    null_log_likelihood,
     symbols_to_name,
-    unworn_labels_at,
     weigh_cells,
 )
 from recognizer.touch.hypothesis import Hypothesis
-from recognizer.touch.options import Effort, ReaderOptions
-from recognizer.touch.prepare import PreparedLab, cell_share
+from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW
-from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.fit import fit_lattices
 from recognizer.touch.verdict import (
-    CONTRADICTION,
-    STRONG_CONTRADICTION,
     Evidence,
     is_encoded,
-    least_explained,
     least_margin,
     may_count_border,
     reject_chance,
@@ -77,41 +66,39 @@ def test_each_bound_of_belief_from_both_sides(changed, believed):
 
 
 @pytest.mark.parametrize(
-    ("changed", "margin", "reason"),
+    ("changed", "margin", "given", "reason"),
     [
-        ({}, 13.0, ""), ({}, 12.9, AMBIGUOUS), ({}, math.inf, ""),
+        ({}, 13.0, {}, ""), ({}, 12.9, {}, AMBIGUOUS), ({}, math.inf, {}, ""),
         # the first condition that fails is the reason
-        ({"log_likelihood_ratio": 2.99}, 9.0, NOT_ENCODED),
-        # of a scan: half of the touches are too few
-        ({"touches": 4, "agreeing": 3}, FOURTEEN, ""),
-        ({"touches": 4, "agreeing": 2}, FOURTEEN, TOO_FEW),
-        ({"touches": 4, "agreeing": 2, "contradictions": 2}, FOURTEEN, NOT_ENCODED),
+        ({"log_likelihood_ratio": 2.99}, 9.0, {}, NOT_ENCODED),
+        # of a scan: half of the touches are too few; one touch alone is one that agrees
+        ({"touches": 4, "agreeing": 3}, FOURTEEN, {}, ""),
+        ({"touches": 4, "agreeing": 2}, FOURTEEN, {}, TOO_FEW),
+        ({"touches": 4, "agreeing": 2, "contradictions": 2}, FOURTEEN, {}, NOT_ENCODED),
+        ({"touches": 2}, FOURTEEN, {}, TOO_FEW), ({"agreeing": 0}, FOURTEEN, {}, ""),
+        # more nats may be asked for
+        *(({"log_likelihood_ratio": ratio, "best_ratio": best}, FOURTEEN, {"least_ratio": 8.0}, why)
+          for ratio, best, why in (
+              (8.0, 8.0, ""), (7.9, 8.0, TOO_FEW), (2.9, 8.0, NOT_ENCODED), (2.9, 7.9, TOO_FEW))),
+        # of many cells a share may contradict
+        *(({"inliers": 60, "contradictions": wrong}, FOURTEEN, given, why)
+          for wrong, given, why in (
+              (3, {"wrong_share": 0.05}, ""), (4, {"wrong_share": 0.05}, NOT_ENCODED),
+              (3, {}, NOT_ENCODED))),
     ],
 )  # fmt: skip
-def test_each_reason_in_its_order(changed, margin, reason):
-    assert reject_reason(replace(GOOD, **changed), margin, 13.0) == reason
+def test_each_reason_in_its_order(changed, margin, given, reason):
+    assert reject_reason(replace(GOOD, **changed), margin, 13.0, **given) == reason
 
 
-def test_the_bounds_are_those_that_are_given():
+def test_bounds_of_margins_and_of_chance():
     strict = ReaderOptions(margin=12.0, margin_by_few=16.0)
     assert [least_margin(bits, strict) for bits in (21.9, 22.0)] == [16.0, 12.0]
     assert [may_count_border(GOOD, margin, strict) for margin in (16.0, 15.9)] == [True, False]
-
-
-@pytest.mark.parametrize(
-    ("ratio", "best", "reason"),
-    [(8.0, 8.0, ""), (7.9, 8.0, TOO_FEW), (2.9, 8.0, NOT_ENCODED), (2.9, 7.9, TOO_FEW)],
-)
-def test_more_nats_may_be_asked_for(ratio, best, reason):
-    found = replace(GOOD, log_likelihood_ratio=ratio, best_ratio=best)
-    assert reject_reason(found, FOURTEEN, TEN, least_ratio=8.0) == reason
-
-
-@pytest.mark.parametrize(("wrong", "reason"), [(3, ""), (4, NOT_ENCODED)])
-def test_of_many_cells_a_share_may_contradict(wrong, reason):
-    found = replace(GOOD, inliers=60, contradictions=wrong)
-    assert reject_reason(found, FOURTEEN, TEN, wrong_share=0.05) == reason
-    assert reject_reason(found, FOURTEEN, TEN) == NOT_ENCODED
+    assert [reject_margin(margin, 3.0) for margin in (3.0, 2.99)] == ["", AMBIGUOUS]
+    found = [reject_chance(doubt, 1e-4) for doubt in (1e-4, 1.01e-4, 1.0, 1.01)]
+    assert found == ["", BY_CHANCE, BY_CHANCE, TOO_FEW]
+    assert [reject_chance(doubt, 3.0) for doubt in (3.0, 3.01)] == ["", TOO_FEW]
 
 
 CUBE = ("Cube", "F1")
@@ -131,33 +118,6 @@ def test_the_answer_of_several_touches(confirmed, outliers, sd_mm, reason):
     assert reject_joined(CUBE, confirmed, outliers, 3, sd_mm) == reason
 
 
-def test_limits_of_margins_are_reached_but_for_rounding():
-    assert (TEN, FOURTEEN) == (10.0 - 1e-4, 14.0 - 1e-4)
-
-
-def test_one_touch_alone_is_one_that_agrees():
-    few = replace(GOOD, touches=2)
-    assert reject_reason(few, FOURTEEN, TEN) == TOO_FEW  # one of two: no more than half
-    assert reject_reason(replace(few, agreeing=2), FOURTEEN, TEN) == ""
-    assert reject_reason(replace(GOOD, agreeing=0), FOURTEEN, TEN) == ""
-    assert [reject_margin(margin, 3.0) for margin in (3.0, 2.99)] == ["", AMBIGUOUS]
-
-
-def test_evidence_of_cells_alone_is_that_of_an_image_without_fault():
-    """As a scan has it; cells contradict by 8 nats, strongly by 10."""
-    assert Evidence(20.0, 12, 24.0, 0) == Evidence(
-        20.0, 12, 24.0, 0, 0, 0, 1.0, 0.0, math.inf, 1, 1
-    )
-    assert (CONTRADICTION, STRONG_CONTRADICTION) == (8.0, 10.0)
-
-
-def test_chance_and_what_an_image_must_explain():
-    found = [reject_chance(doubt, 1e-4) for doubt in (1e-4, 1.01e-4, 1.0, 1.01)]
-    assert found == ["", BY_CHANCE, BY_CHANCE, TOO_FEW]
-    assert [reject_chance(doubt, 3.0) for doubt in (3.0, 3.01)] == ["", TOO_FEW]
-    assert (least_explained(21.9), least_explained(22.0)) == (0.72, 0.58)
-
-
 @pytest.mark.parametrize(
     ("changed", "margin", "counts"),
     [
@@ -167,44 +127,6 @@ def test_chance_and_what_an_image_must_explain():
 )  # fmt: skip
 def test_the_border_counts_for_a_place_that_lacks_only_symbols(changed, margin, counts):
     assert may_count_border(replace(GOOD, **changed), margin, LIMITS) is counts
-
-
-@pytest.mark.parametrize(("tactels", "share"), [(3.0, 1.0), (math.sqrt(8.0), 1.0), (2.0, 0.25)])
-def test_few_tactels_on_a_symbol_count_whole(tactels, share):
-    sensor = SimpleNamespace(pitch_mm=2.0)
-    styles = [SimpleNamespace(style=SimpleNamespace(pitch_mm=2 * t)) for t in (tactels, 9.0)]
-    assert cell_share(SimpleNamespace(arrays=styles), sensor) == pytest.approx(share)
-
-
-@pytest.mark.parametrize(("across", "share"), [(16, 1.0), (8, (49 / 9 / 8) ** 2)])
-def test_on_few_tactels_to_a_symbol_each_tactel_of_a_cell_counts_more(across, share):
-    """Limits of tactels on a cell hold for 8 on a symbol; 8 x 8 at 3 mm has 49 / 9 on 7 mm."""
-    sensor = SensorType(rows=across, columns=across, pitch_mm=3.0 if across == 8 else 1.6)
-    style = SymbolStyle(pitch_mm=7.0, height_mm=1.2, stroke_mm=1.4)
-    array = SimpleNamespace(alphabet=alphabet_named("dense-4"), style=style)
-    lab = PreparedLab(SimpleNamespace(arrays=[array]), sensor)
-    forces = np.random.default_rng(4).uniform(1.0, 90.0, (across, across))
-    signal = Signal(forces, np.ones_like(forces), contact=True, newtons=False)
-    (prepared,) = lab.prepared
-    image = lab.image(signal, prepared)
-    assert image.cell_share == pytest.approx(share)
-    counted, plain = (
-        fit_lattices(one, prepared.bank, Effort(), with_covariance=False)
-        for one in (image, replace(image, cell_share=1.0))
-    )
-    for one, other in zip(counted, plain, strict=True):
-        np.testing.assert_allclose(one.seen, other.seen / share)
-        np.testing.assert_array_equal(one.scores, other.scores)
-        assert 0 < other.seen.sum() <= across**2
-
-
-def one_cell(small, scores, seen=20.0, held=2, order=4):
-    """What a cell says of a place that holds label `held` there; None: no symbol."""
-    cells = {(5, 5): (0, held)} if held is not None else {(0, 0): (0, 1)}
-    lab = small.Lab(cells, order=order)
-    fit = small.fit_of([(0, 0)], [scores], seen)
-    found = weigh_cells(lab.embossed, fit, Hypothesis(0, 5, 5, 0, 0.0))
-    return bool(found.worn[0]), bool(found.seen[0]), bool(found.agree[0]), float(found.against[0])
 
 
 @pytest.mark.parametrize(
@@ -223,41 +145,18 @@ def one_cell(small, scores, seen=20.0, held=2, order=4):
         ([-9, -9, 0, -9, 1.1e-4], 20, 2, (True, True, False, -1.1e-4)),
         # another symbol is likelier
         ([0, -9, -4.5, -9, -9], 20, 2, (False, True, False, 4.5)),
-        ([0, -9, -4.5, -9, -4.4], 20, 2, (True, True, False, 4.4)),
+        ([0, -9, -4.5, -9, -4.4], 20, 2, (True, True, False, 4.4)),  # sharing no stroke
         # no symbol is registered: what speaks against it is the likeliest one
         ([-1, -9, -2, -9, 0], 20, None, (False, True, False, -1.0)),
         ([0, -9, -2, -9, -7.5], 20, None, (False, True, False, 7.5)),
     ],
 )
 def test_what_one_cell_says(small, scores, seen, held, truth):
-    worn, seen_, agree, against = one_cell(small, scores, seen, held)
-    assert (worn, seen_, agree) == truth[:3]
-    assert against == pytest.approx(truth[3])
-
-
-@pytest.mark.parametrize(("share", "agrees"), [(0.51, True), (0.49, False)])
-def test_a_cell_agrees_whose_symbol_is_likelier_than_all_else_together(small, share, agrees):
-    others = np.log(np.array([0.1, 0.2, 0.3, 0.4]) * (1 - share))
-    scores = [others[0], others[1], math.log(share), others[2], others[3]]
-    assert one_cell(small, scores - np.max(scores))[2] is agrees
-
-
-def test_labels_that_a_place_shows_where_they_are_not_worn_away(small):
-    lab = small.two_faces()
-    place = Hypothesis(0, 4, 4, 0, 0.0)
-    cells = np.array([[(i, j) for i in range(-3, 5)] for j in range(-3, 4)])
-    worn = np.array([(0, 0), (1, -2), (0, 3)])
-    found = unworn_labels_at(lab.embossed, place, worn)(cells)
-    assert found.shape == cells.shape[:2]
-    shown = lab.shows(4, 4, 0, cells.reshape(-1, 2).tolist())
-    gone = {tuple(cell) for cell in worn.tolist()}
-    truth = [
-        -1 if label == 4 or tuple(cell) in gone else label
-        for cell, label in zip(cells.reshape(-1, 2).tolist(), shown, strict=True)
-    ]
-    assert found.ravel().tolist() == truth
-    none = unworn_labels_at(lab.embossed, place, worn[:0])(cells).ravel()
-    assert none.tolist() == [-1 if label == 4 else label for label in shown]
+    lab = small.Lab({(5, 5): (0, held)} if held is not None else {(0, 0): (0, 1)})
+    fit = small.fit_of([(0, 0)], [scores], seen)
+    found = weigh_cells(lab.embossed, fit, Hypothesis(0, 5, 5, 0, 0.0))
+    assert (found.worn[0], found.seen[0], found.agree[0]) == truth[:3]
+    assert found.against[0] == pytest.approx(truth[3])
 
 
 @pytest.mark.parametrize(
@@ -268,17 +167,6 @@ def test_how_many_symbols_name_one_of_so_many_cells(small, keys, order, symbols)
     held = {(r, c): (0, 0) for r in range(9) for c in range(10)}
     lab = small.Lab(dict(list(held.items())[:keys]), order=order)
     assert symbols_to_name(lab.embossed) == symbols
-
-
-def test_an_image_of_no_registered_place_shows_anything_with_the_same_probability(small):
-    lab = small.two_faces()  # 48 registered cells
-    scores = np.random.default_rng(1).normal(size=(3, 5)) * 3
-    fit = small.fit_of([(0, 0), (1, 0), (0, 1)], scores, value=-77.0)
-    mean = 1.0
-    for cell in scores:
-        mean *= sum(math.exp(one) for one in cell) / 5
-    # a place has the prior 1 / 48: in nats over one place
-    assert null_log_likelihood(lab.embossed, fit) == pytest.approx(math.log(mean * 48) - 77.0)
 
 
 def verified(small, fit, place, score=0.0, lab=None):
@@ -312,10 +200,8 @@ def test_what_speaks_for_a_place(small, monkeypatch):
     assert found.explained == 0.77
     assert found.contradictions == 4  # 8.1, 9.9, 10.0 and 10.1
     assert found.strong_contradictions == 1  # 10.1
-    assert (found.inliers, found.bits) == (
-        7,
-        14.0,
-    )  # of sixteen: one is worn, seven speak otherwise, one is hardly seen
+    # of sixteen one is worn, seven speak otherwise, one is hardly seen
+    assert (found.inliers, found.bits) == (7, 14.0)
     assert found.worn == 1
     assert found.stroke_excess == 0.7
     each = np.log(np.exp(scores).sum(axis=1) / 5)
@@ -324,29 +210,26 @@ def test_what_speaks_for_a_place(small, monkeypatch):
 
 
 def test_two_hypotheses_are_one_place_up_to_a_cell(small):
-    lab = small.two_faces()
+    lab, here = small.two_faces(), Hypothesis(0, 5, 4, 0, 0.0)  # of 11 x 13 cells
 
-    def of(place, lab=lab, **moved):
-        return verified(small, small.fit_of([(0, 0)], [[0.0] * 5], **moved), place, lab=lab)
+    def of(lab=lab, x_mm=0.0, y_mm=0.0, **moved):
+        fit = small.fit_of([(0, 0)], [[0.0] * 5], x_mm=x_mm, y_mm=y_mm)
+        return verified(small, fit, replace(here, **moved), lab=lab)
 
-    here = Hypothesis(0, 5, 4, 0, 0.0)
-    one = of(here)
-    assert one.index == (5, 4)
-    for a, b, near in (  # on 11 x 13 cells
-        ((5, 5), (5, 5), True), ((5, 5), (6, 6), True), ((5, 5), (4, 6), True),
-        ((5, 5), (7, 5), False), ((5, 5), (3, 5), False), ((5, 5), (5, 7), False),
-        ((5, 5), (5, 3), False), ((0, 0), (10, 12), True), ((10, 12), (0, 0), True),
-        ((2, 9), (3, 8), True), ((2, 9), (4, 9), False), ((2, 9), (2, 7), False),
-        ((0, 0), (9, 0), False), ((0, 0), (0, 11), False), ((5, 5), (7, 7), False),
+    for a, b, near in (
+        ((5, 5), (6, 6), True), ((5, 5), (4, 6), True), ((5, 5), (7, 5), False),
+        ((5, 5), (3, 5), False), ((5, 5), (5, 7), False), ((5, 5), (5, 3), False),
+        ((0, 0), (10, 12), True), ((10, 12), (0, 0), True), ((2, 9), (4, 9), False),
+        ((2, 9), (2, 7), False), ((0, 0), (9, 0), False), ((0, 0), (0, 11), False),
     ):  # fmt: skip
-        first, other = (of(replace(here, row=row, column=column)) for row, column in (a, b))
+        first, other = (of(row=row, column=column) for row, column in (a, b))
         assert first.same_place(other) is near
-    assert not one.same_place(of(replace(here, face=1)))
-    assert not one.same_place(of(here, lab=small.two_faces()))
-    assert one.same_place(of(replace(here, row=7), y_mm=8.0))  # (5, 4) is still under the centre
-    assert not one.same_place(of(here, x_mm=15.0))
-    assert one.coincides(of(replace(here, fit=3, score=-9.0)))
-    assert one.coincides(of(replace(here, row=6), y_mm=one.fit.y_mm + 7.0))
-    assert not one.coincides(of(replace(here, row=6)))  # a pitch beside
-    assert not one.coincides(of(replace(here, face=1)))
-    assert not one.coincides(of(here, lab=small.two_faces()))
+    one = of()
+    assert one.index == (5, 4)
+    assert one.same_place(of(row=7, y_mm=8.0))  # (5, 4) is still under the centre
+    for other in (of(face=1), of(lab=small.two_faces()), of(x_mm=15.0)):
+        assert not one.same_place(other)
+    assert one.coincides(of(fit=3, score=-9.0))
+    assert one.coincides(of(row=6, y_mm=7.0))
+    for other in (of(row=6), of(face=1), of(lab=small.two_faces())):
+        assert not one.coincides(other)

@@ -9,23 +9,13 @@ import numpy as np
 import pytest
 
 import recognizer.touch.chance
-from probe.contact.contract import Touch
-from probe.contact.press import press
-from probe.simulate.registered import registered_surface
 from recognizer.touch.chance import (
-    LEAST_SHARE,
     chance_of_match,
     expected_by_border,
     expected_matches,
     place_bits,
-    share_of_borders,
-    tip_share,
 )
 from recognizer.touch.hypothesis import Hypothesis, bounded_scores
-from recognizer.touch.lab import open_lab
-from recognizer.touch.pose import face_pose
-from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import read_touch
 
 SEEN = [(i, j) for j in range(3) for i in range(3)]
 
@@ -35,32 +25,6 @@ def counted(scores, held):
     own = sum(row[k] for row, k in zip(scores, held, strict=True))
     sums = [sum(combination) for combination in itertools.product(*scores)]
     return sum(value >= own - 1e-9 for value in sums) / len(sums)
-
-
-@pytest.mark.parametrize(("order", "cells"), [(2, 5), (4, 3), (8, 2)])
-def test_clear_symbols_are_one_in_the_number_of_kinds_each(order, cells):
-    held = np.arange(cells) % order
-    scores = np.where(np.arange(order) == held[:, None], 0.0, -8.0)
-    assert chance_of_match(scores, held) == pytest.approx(float(order) ** -cells)
-
-
-@pytest.mark.parametrize(
-    ("scores", "chance"),
-    [
-        ([[0.0, -8, -8, -8]], 1 / 4),
-        ([[0.0, -0.1, -8, -8]], 2 / 4),  # nearer than the grain: it scores as well
-        ([[0.0, -0.3, -8, -8]], 1 / 4),
-        ([[0.0, 0.5, -8, -8]], 2 / 4),  # another one is likelier
-        ([[0.0, 0.5, 0.6, 0.7]], 1.0),
-        ([[0.0, -8, -8, -8], [0.0, 0, 0, 0]], 1 / 4),  # a cell that says nothing
-        # the likelier symbol of one cell makes up for a lesser one of the other
-        ([[0.0, 4.0, -8, -8], [0.0, -3.0, -8, -8]], 3 / 16),
-        ([[0.0, 4.0, -8, -8], [0.0, -5.0, -8, -8]], 2 / 16),
-    ],
-)
-def test_a_soft_cell_counts_as_many_symbols_as_score_as_well(scores, chance):
-    held = np.zeros(len(scores), np.int64)
-    assert chance_of_match(np.array(scores), held) == pytest.approx(chance)
 
 
 def test_without_a_symbol_everything_matches():
@@ -81,26 +45,6 @@ def test_it_is_the_share_of_all_combinations_and_never_less(seed, monkeypatch):
     assert found[1] <= 5 * truth
 
 
-def test_random_labs_match_as_often_as_it_says(small):
-    rng = np.random.default_rng(7)
-    held = {(r, c): (0, int(rng.integers(4))) for r in range(11) for c in range(13)}
-    lab = small.Lab(held, dense=True)  # all round: every place sees nine symbols
-    place = Hypothesis(0, 5, 5, 0, 0.0)
-    scores = -rng.exponential(3.0, (9, 5))
-    scores[:, 4] = -8.0
-    labels = np.array(lab.shows(5, 5, 0, SEEN))
-    scores[np.arange(9), labels] = 0.0
-    scores[3, (labels[3] + 1) % 4] = 1.5  # another symbol is likelier there
-    scores -= scores.max(axis=1, keepdims=True)
-    fit = small.fit_of(SEEN, scores)
-    doubt = expected_matches([lab.embossed], lab.embossed, fit, place)
-    bounded = bounded_scores(fit)[:, :4]
-    own = bounded[np.arange(9), labels].sum()
-    drawn = rng.integers(4, size=(400_000, 9))
-    as_well = (bounded[np.arange(9), drawn].sum(axis=1) >= own).mean() * 143
-    assert 0.9 * as_well <= doubt <= 2.5 * as_well
-
-
 def doubt_of(small, lab, row=4, column=4, arrays=None, **changed):
     """Of a touch that shows beyond doubt what a place of the first face of a lab holds."""
     labels = lab.shows(row, column, 0, SEEN)
@@ -117,18 +61,9 @@ def square(small, side, order=4, **changed):
 
 
 def test_places_times_chance(small):
-    assert doubt_of(small, square(small, 8)) == pytest.approx(64 / 4**9)
-    assert doubt_of(small, square(small, 8, order=2)) == pytest.approx(64 / 2**9)
-    assert doubt_of(small, square(small, 8, dense=True)) == pytest.approx(64 / 4**9)
-
-
-def test_it_rises_with_what_is_registered_and_falls_with_what_is_seen(small):
-    found = [doubt_of(small, square(small, side)) for side in (8, 10, 14)]
-    assert found == pytest.approx([64 / 4**9, 100 / 4**9, 196 / 4**9])
-    lab = square(small, 8)
-    soft = np.full(9, 20.0)
-    soft[4] = 0.0  # of this cell nothing is seen
-    assert doubt_of(small, lab, seen=soft) == pytest.approx(64 / 4**8)
+    for side, order, dense in ((8, 4, False), (10, 4, False), (8, 2, False), (8, 4, True)):
+        lab = square(small, side, order=order, dense=dense)
+        assert doubt_of(small, lab) == pytest.approx(side**2 / order**9)
 
 
 def test_all_arrays_that_are_embossed_alike_count(small):
@@ -231,74 +166,19 @@ def sure_touch(small, lab, row, column):
     return small.fit_of(SEEN, small.sure_of(lab.shows(row, column, 0, SEEN), lab.order)), place
 
 
-def test_corners_count_in_a_corner_and_edges_at_an_edge(small, by_border):
-    lab = square(small, 8)
-    assert by_border(lab, *sure_touch(small, lab, 4, 4)) == pytest.approx(36 / 4**9)
-    assert by_border(lab, *sure_touch(small, lab, 4, 7)) == pytest.approx(6 / 4**3)
-    assert by_border(lab, *sure_touch(small, lab, 0, 7)) == pytest.approx(1 / 4)
-
-
-def test_borders_count_in_arrays_that_are_embossed_alike_and_small_enough(
+def test_corners_count_in_a_corner_edges_at_an_edge_and_arrays_that_are_embossed_alike(
     small, by_border, monkeypatch
 ):
     lab, other = square(small, 8), square(small, 10)
+    assert by_border(lab, *sure_touch(small, lab, 4, 7)) == pytest.approx(6 / 4**3)
+    assert by_border(lab, *sure_touch(small, lab, 0, 7)) == pytest.approx(1 / 4)
     larger = SimpleNamespace(pitch_mm=8.0, height_mm=1.2, stroke_mm=1.4)
     both = [lab.embossed, replace(other.embossed, style=lab.embossed.style)]
     unlike = [lab.embossed, replace(other.embossed, style=larger)]
-    letters = [lab.embossed, replace(both[1], alphabet="letters-4")]
+    unlike.append(replace(both[1], alphabet="letters-4"))
     fit, place = sure_touch(small, lab, 4, 4)
     assert by_border(lab, fit, place, both) == pytest.approx((36 + 64) / 4**9)
     assert by_border(lab, fit, place, unlike) == pytest.approx(36 / 4**9)
-    assert by_border(lab, fit, place, letters) == pytest.approx(36 / 4**9)
     for large, told in ((163, math.inf), (164, 100 / 4**9)):
         monkeypatch.setattr(recognizer.touch.chance, "LARGE_LAB", large)
         assert by_border(lab, fit, place, both) == pytest.approx(told)
-
-
-TIP_MM = 1.2666
-
-
-@pytest.mark.parametrize(
-    ("inside", "share"), [(-2, 0), (-1, 0), (0, 0.5), (1, 1), (3, 1), (0.5, 0.8045), (-0.5, 0.1955)]
-)
-def test_share_of_a_round_tip_over_a_line(inside, share):
-    assert tip_share(np.array([float(inside)]))[0] == pytest.approx(share, abs=1e-4)
-
-
-@pytest.fixture(scope="module")
-def reader(make_lab):
-    return Reader(open_lab(make_lab("{name: Box, shape: {box: [61 mm, 52 mm, 40 mm]}}") / "lab.db"))
-
-
-def touched(reader, x, y, force_n=80.0):
-    """What the sensor feels, and the place that is right, as the reader finds it."""
-    lab = reader.lab
-    surface = registered_surface(lab.url, "Box", "F1").surface
-    forces = press(surface, reader.sensor, Touch(x, y, 0.2, force_n=force_n)).forces_n
-    best = read_touch(reader, reader.signal(100 * forces)).best
-    pose = face_pose(best.embossed, lab.arrays[0].face(0), best.hypothesis, best.fit)
-    assert pose[:2, 3] == pytest.approx((x, y), abs=0.2)
-    return best
-
-
-def test_at_an_edge_the_face_ends_where_it_should(reader):
-    best = touched(reader, 30.0, 5.0)
-    share = share_of_borders(best, TIP_MM)
-    assert share == pytest.approx(LEAST_SHARE)
-    # the same image, a symbol nearer to the edge or farther from it
-    place, away = best.hypothesis, round(math.cos(best.fit.theta_rad)) == 0
-    for step in (-1, 1):
-        moved = replace(place, row=place.row + step * (not away), column=place.column + step * away)
-        other = replace(best, hypothesis=moved)
-        assert share_of_borders(other, TIP_MM) > 2 * share
-
-
-def test_amid_a_face_and_without_tips_no_border_is_told(reader):
-    best = touched(reader, 30.0, 26.0)
-    assert share_of_borders(best, TIP_MM) == 1.0
-    assert share_of_borders(touched(reader, 30.0, 5.0), 0.0) == 1.0
-
-
-def test_round_faces_have_no_border():
-    found = SimpleNamespace(face=SimpleNamespace(round=object()))
-    assert share_of_borders(found, TIP_MM) == 1.0

@@ -1,15 +1,11 @@
 """Parts made to be mistaken for registered ones: what is drawn, and what a reader must see."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from probe.simulate.registered import registered_surface
 from probe.simulate.world.surfaces import exchange_symbols, seat_panel, seats_of
 from probe.surface.polygon import polygon
-from recognizer.touch import evidence
-from recognizer.touch.evidence import weigh_cells
 
 SQUARE = polygon([np.array([[0.0, 0], [60, 0], [60, 60], [0, 60]])])
 OBLONG = polygon([np.array([[0.0, 0], [60, 0], [60, 40], [0, 40]])])
@@ -51,13 +47,3 @@ def test_exchanged_symbols_are_others_and_no_more(lab_database):
     everywhere = [grid.ravel() for grid in np.indices((16, 16))]
     differ = found.label_at(*everywhere) != held.label_at(*everywhere)
     assert differ.sum() <= 2
-
-
-def test_a_symbol_that_shows_another_letter_is_not_worn_away(monkeypatch):
-    """A letter exchanged for one that shares no stroke: no symbol at all fits better than it."""
-    monkeypatch.setattr(evidence, "labels_of", lambda *_: np.array([0, 0]))
-    scores = np.array([[-40.0, 0.0, -35.0], [-40.0, -30.0, 0.0]])  # two letters, and none
-    fit = SimpleNamespace(scores=scores, cells=np.zeros((2, 2), int), seen=np.array([10.0, 10.0]))
-    found = weigh_cells(SimpleNamespace(array=SimpleNamespace(order=2)), fit, None)
-    assert found.worn.tolist() == [True, True]
-    assert found.against.tolist() == [35.0, -30.0]

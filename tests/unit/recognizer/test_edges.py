@@ -6,18 +6,14 @@ import math
 import numpy as np
 import pytest
 
-from encoded_objects.base.sensor_type import Overlay, SensorType
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
 from recognizer.thesis.edge_fit import (
-    BLURS_MM,
-    REACH_MM,
     face_edges,
-    response_at,
-    responses,
 )
 from recognizer.thesis.edges import (
     EdgePoints,
@@ -61,14 +57,7 @@ def test_points_lie_on_the_step_of_an_image():
     assert points.normals == pytest.approx(np.tile([1.0, 0.0], (40, 1)), abs=1e-9)
 
 
-def test_no_points_in_nothing_and_beside_what_is_undefined():
-    assert len(edge_points(tactile_image(np.zeros((16, 16)), step_mm=1.0))) == 0
-    values, known = np.ones((16, 16)), np.ones((16, 16), bool)
-    values[:, :8], known[:, :8] = 0, False
-    assert len(edge_points(tactile_image(values, step_mm=1.0, defined=known))) == 0
-
-
-@pytest.mark.parametrize("degrees", range(-180, 180, 60))
+@pytest.mark.parametrize("degrees", range(-180, 180, 120))
 def test_line_through_points_and_its_covariance(degrees):
     rng, angle = np.random.default_rng(degrees + 180), math.radians(degrees)
     normed = []
@@ -95,16 +84,8 @@ def test_longest_segment_is_taken_first_and_noise_is_none():
     lengths = [segment.edge.length_mm for segment in found]
     assert lengths == sorted(lengths, reverse=True)
     assert segments(joined(short).chosen(np.arange(2))) == []
-
-
-def test_line_between_two_parallel_edges_is_none():
-    """Points whose slopes look against each other never share a line."""
-    rng = np.random.default_rng(2)
-    left = on_line(0.0, -3.0, np.linspace(-8, 8, 20), rng)
-    right = on_line(math.pi, -3.0, np.linspace(-8, 8, 20), rng)
-    found = segments(joined(left, right))
-    assert len(found) == 2
-    assert {round(abs(segment.edge.angle_rad), 1) for segment in found} == {0.0, 3.1}
+    against = EdgePoints(long.at_mm, -long.normals)  # slopes that look against each other
+    assert len(segments(joined(long, against))) == 2
 
 
 # --- production rules -------------------------------------------------------------------
@@ -134,19 +115,6 @@ def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
 
 
 # --- response ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", ["tab", "pad"])
-def test_response_rises_from_nothing_to_all(kind):
-    table = responses(SensorType(overlay=Overlay(kind=kind)))
-    assert len(table) == len(BLURS_MM)
-    assert (np.diff(table, axis=1) > -1e-12).all()
-    for row in table:
-        assert response_at(row, np.array([-REACH_MM - 1, REACH_MM + 1])) == pytest.approx(
-            [0, 1], abs=1e-4
-        )
-    sharp = response_at(table[0], np.array([-0.5, 0.0, 0.5]))
-    assert 0 < sharp[0] < 0.4 < sharp[1] < 0.66 < sharp[2]
 
 
 # --- simulated touches ------------------------------------------------------------------
@@ -185,13 +153,11 @@ def test_an_edge_is_found_to_a_fraction_of_the_thesis_error():
         rough = classical_edges(image)
         classical.append(min(worst_mm(edge, angle, offset) for edge in rough))
         edges = face_edges(image, SENSOR)
-        if not edges:
-            continue
-        ours.append(worst_mm(edges[0], angle, offset))
-        error = np.array(
-            [math.remainder(edges[0].angle_rad - angle, math.tau), edges[0].offset_mm - offset]
-        )
-        inside += error @ np.linalg.solve(edges[0].covariance, error) < 9.2  # 99 %
+        for edge in edges[:1]:
+            ours.append(worst_mm(edge, angle, offset))
+            turn = math.remainder(edge.angle_rad - angle, math.tau)
+            error = np.array([turn, edge.offset_mm - offset])
+            inside += error @ np.linalg.solve(edge.covariance, error) < 9.2  # 99 %
     assert len(ours) >= 18
     assert np.sqrt(np.mean(np.square(ours))) < THESIS_MM / 6
     assert np.median(ours) < THESIS_MM / 12
@@ -213,20 +179,6 @@ def test_a_corner_is_found_with_both_edges():
     assert np.median(errors) < 0.3
 
 
-def test_where_the_face_goes_round_a_corner_both_sides_of_it_are_felt():
-    loop = [[0, 0], [80, 0], [80, 40], [40, 40], [40, 80], [0, 80]]
-    rng = np.random.default_rng(7)
-    found = 0
-    for touch, image in touches(loop, [(37, 37), (36, 40), (39, 36), (38, 38)], rng):
-        edges = face_edges(image, SENSOR)
-        if vertices(edges):
-            lines = truth(touch, (80, 40), (40, 40)), truth(touch, (40, 40), (40, 80))
-            off = [min(worst_mm(edge, *line) for edge in edges) for line in lines]
-            assert max(off) < 0.5
-            found += 1
-    assert found >= 2
-
-
 def test_no_edge_in_an_even_image_or_where_the_face_reaches_everywhere():
     inside = touches(SQUARE, [(40, 40), (30, 50), (50, 35)], np.random.default_rng(8))
     even = [touch_image(SENSOR, np.full((16, 16), level)) for level in (0.0, 5.0)]
@@ -234,11 +186,20 @@ def test_no_edge_in_an_even_image_or_where_the_face_reaches_everywhere():
         assert face_edges(image, SENSOR) == ()
 
 
+def test_where_the_face_goes_round_a_corner_both_sides_of_it_are_felt():
+    loop = [[0, 0], [80, 0], [80, 40], [40, 40], [40, 80], [0, 80]]
+    rng, found = np.random.default_rng(7), 0
+    for touch, image in touches(loop, [(37, 37), (36, 40), (39, 36), (38, 38)], rng):
+        edges = face_edges(image, SENSOR)
+        if vertices(edges):
+            lines = truth(touch, (80, 40), (40, 40)), truth(touch, (40, 40), (40, 80))
+            assert max(min(worst_mm(edge, *line) for edge in edges) for line in lines) < 0.5
+            found += 1
+    assert found >= 2
+
+
 def test_dead_tactels_are_left_out():
-    rng = np.random.default_rng(9)
-    ((touch, image),) = touches(SQUARE, [(3, 40)], rng)
-    values, trust = image.values.copy(), np.ones((16, 16))
-    for r, c in rng.integers(0, 16, (6, 2)):
-        values[r, c], trust[r, c] = 0.0, 0.0
-    edge = face_edges(touch_image(SENSOR, values, trust), SENSOR)[0]
+    ((touch, image),) = touches(SQUARE, [(3, 40)], np.random.default_rng(9))
+    trust = (np.random.default_rng(2).random((16, 16)) > 0.03).astype(float)
+    edge = face_edges(touch_image(SENSOR, image.values * trust, trust), SENSOR)[0]
     assert worst_mm(edge, *truth(touch, (0, 80), (0, 0))) < 0.5

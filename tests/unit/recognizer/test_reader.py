@@ -14,9 +14,7 @@ from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
 from recognizer.errors import TouchError
 from recognizer.touch.lab import open_lab
-from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     BY_CHANCE,
@@ -27,7 +25,6 @@ from recognizer.touch.recognition import (
     RunnerUp,
     refusal,
 )
-from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.template import psi, template_of
 
 
@@ -46,48 +43,6 @@ def reader(url):
 
 def felt(url, name, face, touch):
     return tabs(registered_surface(url, name, face).surface, SensorType(), touch).forces_n
-
-
-@pytest.mark.parametrize(("name", "face"), [("Cube", "F1"), ("Cube", "F6"), ("Tetra", "F2")])
-def test_a_clean_touch_is_placed(url, reader, name, face):
-    touch = Touch(32.0, 24.0, 0.7, 80.0)
-    forces = felt(url, name, face, touch)
-    for newtons in (True, False):
-        image = forces if newtons else 100 * forces
-        found = recognise(reader, signal_of(image, floor=0.0, newtons=newtons), 5)
-        assert (found.object, found.face, found.seq) == (name, face, 5)
-        T = found.T_face_probe
-        assert T[:2, 3] == pytest.approx([32.0, 24.0], abs=0.05)
-        assert math.atan2(T[1, 0], T[0, 0]) == pytest.approx(0.7, abs=0.003)
-        assert found.margin > 20
-        scene = registered_surface(url, name, face)
-        assert found.T_object_probe == pytest.approx(scene.T_object_surface @ T)
-
-
-def test_the_index_of_windows_lists_every_window(reader):
-    encoding = reader.lab.arrays[0]
-    order = encoding.array.order
-    for windows in encoding.windows:
-        down, right = windows.shape
-        assert (np.diff(windows.codes) >= 0).all()
-        for code, cell in list(zip(windows.codes, windows.cells, strict=True))[::97]:
-            row, column = divmod(int(encoding.keys[cell]), encoding.array.columns)
-            rows, columns = np.mgrid[row : row + down, column : column + right]
-            held, labels = encoding.at(rows % encoding.array.rows, columns % encoding.array.columns)
-            assert (held == encoding.owners[cell]).all()
-            digits = labels.ravel().astype(int).tolist()
-            assert int("".join(map(str, digits)), order) == code
-            assert cell in windows.at(int(code))
-
-
-def test_a_large_array_is_looked_up_like_a_small_one(reader):
-    encoding = reader.lab.arrays[0]
-    sparse = replace(encoding, dense=None, known={})
-    rng = np.random.default_rng(2)
-    rows = rng.integers(encoding.array.rows, size=500)
-    columns = rng.integers(encoding.array.columns, size=500)
-    for one, other in zip(encoding.at(rows, columns), sparse.at(rows, columns), strict=True):
-        assert (one == other).all()
 
 
 def test_a_print_keeps_the_middle_of_its_symbols(reader):
@@ -191,11 +146,3 @@ def test_every_reason_has_a_way_out():
     assert chance.as_json()["doubt"] == 0.0312
     assert math.isnan(doubt.x_mm)
     assert math.isnan(doubt.theta_deg)
-
-
-def test_a_reader_decides_by_its_settings(reader, counts):
-    strict = ReaderOptions(margin=1e6, margin_by_few=1e6)
-    assert replace(reader, options=strict).read(counts).reason in ("", AMBIGUOUS)
-    deaf = ReaderOptions(contact_counts=1e6)
-    assert replace(reader, options=deaf).read(counts).reason == NO_CONTACT
-    assert replace(reader, options=deaf).prepared[0][1] is reader.prepared[0][1]  # not made anew

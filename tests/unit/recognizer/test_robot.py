@@ -11,7 +11,6 @@ from probe.errors import PoseError
 from probe.wrist import Wrist, counts_of, distances_at
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.robot import (
-    MOVED_CHANCE,
     ObjectPose,
     Seating,
     carried_pose,
@@ -172,7 +171,13 @@ def test_an_object_that_lies_still_is_not_taken_for_moved():
     number = 400
     alarms = sum(fuse_poses(drawn(rng, 2 + k % 4)).moved for k in range(number))
     assert alarms <= 4  # MOVED_CHANCE of them, .4
-    assert MOVED_CHANCE == 1e-3
+
+
+@pytest.mark.parametrize(("by", "noticed"), [(0.99, False), (1.01, True)])
+def test_a_move_is_noticed_from_one_in_a_thousand_on(by, noticed):
+    step = by * math.sqrt(22.458 * 2 * SPREAD[0, 0])  # chi2 of six freedoms, both poses off
+    poses = [ObjectPose(T, SPREAD) for T in (BASE, moved(BASE, np.array([step, 0, 0, 0, 0, 0])))]
+    assert fuse_poses(poses).moved is noticed
 
 
 def test_one_pose_fused_is_itself():

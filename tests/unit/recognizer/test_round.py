@@ -15,7 +15,13 @@ from probe.contact.press import press
 from probe.surface.face import endless_face
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.curvature import guess_curvatures
-from recognizer.touch.symbols.image import Image, bend_image, image_of_signal, normalize_image
+from recognizer.touch.symbols.image import (
+    Image,
+    bend_image,
+    image_of_signal,
+    normalize_image,
+    pressing_of,
+)
 
 SENSOR = SensorType()
 INK = 0.35  # about the mean response of the symbols of the default alphabet
@@ -40,6 +46,19 @@ class Rolled:
         return self.face.heights_mm(points_mm) - self.bend.falls_mm(points_mm)
 
 
+def test_how_an_overlay_presses_by_its_kind():
+    tab, pad = SENSOR, SENSOR.with_overlay("pad")
+    area = math.pi * (tab.overlay.tab_diameter_mm / 2) ** 2
+    for sensor, each in ((tab, area), (pad, pad.pitch_mm**2)):
+        law = pressing_of(sensor, 0.9)
+        assert law.hardens is (sensor is tab)
+        assert law.scale == pytest.approx(sensor.overlay.young_mpa * each / 3)
+        assert law.symbol == pytest.approx(0.9 / sensor.overlay.height_mm)
+        depths = np.array([0.1, 0.4])
+        np.testing.assert_allclose(law.depth(law.force(depths)), depths)
+    np.testing.assert_allclose(law.force(np.array([-0.5, 0.1, 0.4])), [0.0, 0.3, 1.2])
+
+
 def test_a_very_wide_bend_is_no_bend():
     flat = image(np.random.default_rng(1).uniform(0, 2, (16, 16)))
     gain = np.array([[0.1, 0.4, 0.1, -0.05], [0.0, 0.6, 0.0, 0.0]])
@@ -47,29 +66,6 @@ def test_a_very_wide_bend_is_no_bend():
     for name in ("psi", "press", "bare", "contact", "measure"):
         plain = getattr(normalize_image(flat, gain), name)
         assert getattr(round_one, name) == pytest.approx(plain, rel=1e-4, abs=1e-5)
-
-
-def test_shares_are_gains_of_one_image():
-    flat = image(np.random.default_rng(2).uniform(0, 2, (16, 16)))
-    gain = np.array([0.1, 0.5, 0.1, 0.0])
-    shares = (0.6, 1.0)
-    several = normalize_image(
-        bend_image(flat, SENSOR, Bend(40, 0.4), shares), np.tile(gain, (2, 1))
-    )
-    for k, share in enumerate(shares):
-        alone = normalize_image(bend_image(flat, SENSOR, Bend(40, 0.4), (share,)), gain[None])
-        assert (several.psi[k] == alone.psi[0]).all()
-        assert several.measure[k] == pytest.approx(alone.measure[0], rel=1e-12)
-
-
-def test_beside_the_strip_nothing_is_expected():
-    flat = image(np.ones((16, 16)))
-    felt = normalize_image(
-        bend_image(flat, SENSOR, Bend(20.0, math.pi / 2)), np.array([[0.0, 0.4, 0, 0]])
-    )
-    across = np.abs(SENSOR.centres_mm().reshape(-1, 2)[:, 0])
-    assert (felt.contact[0][across > 9] == 0).all()
-    assert (felt.contact[0][across < 4] == 1).all()
 
 
 @pytest.mark.parametrize("radius", [20.0, 40.0, 80.0])

@@ -15,7 +15,7 @@ from probe.simulate.registered import registered_surface
 from recognizer.errors import SensorStateError, WiringError
 from recognizer.scan.session import Scan
 from recognizer.sensor import learn
-from recognizer.sensor.file import read_state, state_entry, state_words, write_state
+from recognizer.sensor.file import read_state, state_words, write_state
 from recognizer.sensor.learn import LEAST_TOUCHES, answering_of, learn_sensor
 from recognizer.sensor.wiring import find_mounting, wiring_hint, wiring_named
 from recognizer.touch.lab import open_lab
@@ -40,30 +40,20 @@ def pressed(n=40, seed=2):
     return images
 
 
-def test_a_tactel_that_never_rises_is_dead_and_one_that_never_falls_is_hot():
-    found = answering_of(pressed())
-    assert sorted(map(tuple, np.argwhere(found.dead).tolist())) == DEAD
-    assert sorted(map(tuple, np.argwhere(found.hot).tolist())) == HOT
-    assert not found.offset.any()
+def places_of(flags):
+    return sorted(map(tuple, np.argwhere(flags).tolist()))
 
 
-def test_a_raised_tactel_that_still_answers_keeps_its_offset():
+def test_dead_tactels_never_rise_hot_ones_never_fall_and_raised_ones_keep_an_offset():
     images = pressed()
     images[:, 8, 3] += 50.0
     found = answering_of(images)
-    assert not found.hot[8, 3]
-    assert not found.dead[8, 3]
+    assert (places_of(found.dead), places_of(found.hot)) == (DEAD, HOT)
+    assert places_of(found.offset) == [(8, 3)]
     assert found.offset[8, 3] == pytest.approx(50.0, rel=0.15)
-    assert np.count_nonzero(found.offset) == 1
-
-
-def test_nothing_is_said_of_few_touches_or_of_what_no_touch_loaded():
-    few = answering_of(pressed(LEAST_TOUCHES - 1))
-    assert not few.dead.any()
-    assert not few.hot.any()
-    enough = answering_of(pressed(LEAST_TOUCHES))
+    few, enough = (answering_of(pressed(count)) for count in (LEAST_TOUCHES - 1, LEAST_TOUCHES))
+    assert not (few.dead | few.hot).any()
     assert enough.dead[3, 4]
-    images = pressed()
     images[:, :, 8:] = 0.0  # every touch hung over an edge
     assert not answering_of(images).dead[:, 12:].any()
 
@@ -79,22 +69,6 @@ def test_a_floating_network_is_inverted_up_to_a_scale():
     assert (invert_floating(beyond) >= 0).all()  # of no network
 
 
-def test_a_state_corrects_readings_of_its_unit_alone():
-    plain = unknown_state(SENSOR)
-    gain, offset = np.ones((16, 16)), np.zeros((16, 16))
-    gain[2, 3], offset[4, 5] = 2.0, 7.0
-    state = replace(plain, gain=gain, offset=offset)
-    readings = np.full((16, 16), 10.0)
-    assert state.correct(readings, newtons=False)[4, 5] == 3.0
-    assert state.correct(readings, newtons=True)[4, 5] == 10.0
-    assert state.level(readings, newtons=False)[2, 3] == 5.0
-    assert state.level(readings, newtons=True)[2, 3] == 10.0
-    with pytest.raises(ValueError, match="read-only"):
-        state.gain[0, 0] = 1.0
-    with pytest.raises(SensorStateError, match="gain of a sensor"):
-        replace(plain, gain=np.ones((4, 4)))
-
-
 def state_of(**changed):
     rng = np.random.default_rng(3)
     dead, hot = np.zeros((2, 16, 16), bool)
@@ -104,6 +78,18 @@ def state_of(**changed):
         gain=np.exp(rng.normal(0, 0.1, (16, 16))), aside_mm=rng.normal(0, 0.08, (16, 16, 2)),
         aside_deviation_mm=np.full((16, 16, 2), 0.03), drift=-3.5, **changed,
     )  # fmt: skip
+
+
+def test_a_state_corrects_readings_of_its_unit_alone():
+    gain, offset = np.ones((16, 16)), np.zeros((16, 16))
+    gain[2, 3], offset[4, 5] = 2.0, 7.0
+    state = replace(unknown_state(SENSOR), gain=gain, offset=offset)
+    readings = np.full((16, 16), 10.0)
+    for newtons, corrected, level in ((False, 3.0, 5.0), (True, 10.0, 10.0)):
+        assert state.correct(readings, newtons=newtons)[4, 5] == corrected
+        assert state.level(readings, newtons=newtons)[2, 3] == level
+    with pytest.raises(SensorStateError, match="gain of a sensor"):
+        replace(state, gain=np.ones((4, 4)))
 
 
 def test_a_state_is_read_as_it_was_written(tmp_path):
@@ -119,6 +105,17 @@ def test_a_state_is_read_as_it_was_written(tmp_path):
     write_state(found, again)
     assert again.read_bytes() == path.read_bytes()
     assert sorted(tmp_path.iterdir()) == [again, path]
+    for changes in (None, (), ("quarter",), ("transpose", "quarter", "quarter")):
+        write_state(replace(state, mounting=changes), path)
+        assert read_state(path).mounting == changes
+    with pytest.raises(SensorStateError, match="cannot be written"):
+        write_state(state, tmp_path / "no" / "folder.json")
+    for part in (
+        "left finger, 50 touches", "1 of 256 tactels never answer", "1 of 256 tactels read high",
+        "the network is inverted", "0.08 mm aside", "drifted by -3.5 counts",
+    ):  # fmt: skip
+        assert part in state_words(state)
+    assert "too few" in state_words(unknown_state(SENSOR))
 
 
 @pytest.mark.parametrize(
@@ -133,37 +130,24 @@ def test_a_state_is_read_as_it_was_written(tmp_path):
         ({"drift": 10**400}, "damaged"),
         ({"tactels": ["x" * 16] * 16}, "damaged"),
         ({"sensor": "right finger"}, "not of 'left finger'"),
+        *(
+            ({"mounting": wrong}, "is damaged")
+            for wrong in (["sideways"], "columns", [["rows"]], 3, ["quarter"] * 4)
+        ),
+        ("text", "is no JSON"),
+        (None, "cannot be read"),
     ],
 )
 def test_what_is_no_state_of_this_sensor_is_refused(tmp_path, change, words):
     path = tmp_path / "left.json"
     write_state(state_of(), path)
-    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    if change is None:
+        path.unlink()
+    else:
+        known = json.loads(path.read_text())
+        path.write_text(change if change == "text" else json.dumps(known | change))
     with pytest.raises(SensorStateError, match=words):
         read_state(path, sensors=("left finger",))
-
-
-def test_files_that_are_none_are_refused(tmp_path):
-    with pytest.raises(SensorStateError, match="cannot be read"):
-        read_state(tmp_path / "none.json")
-    (tmp_path / "text.json").write_text("text")
-    with pytest.raises(SensorStateError, match="is no JSON"):
-        read_state(tmp_path / "text.json")
-    with pytest.raises(SensorStateError, match="cannot be written"):
-        write_state(state_of(), tmp_path / "no" / "folder.json")
-
-
-def test_a_person_is_told_what_was_learned():
-    words = state_words(state_of(floating=True))
-    for part in (
-        "left finger, 50 touches", "1 of 256 tactels never answer", "1 of 256 tactels read high",
-        "the network is inverted", "0.08 mm aside", "drifted by -3.5 counts",
-    ):  # fmt: skip
-        assert part in words
-    told = state_entry(state_of())
-    assert told["dead"].tolist() == [[1, 2]]
-    assert told["tips_known"] == 254
-    assert "too few" in state_words(unknown_state(SENSOR))
 
 
 @pytest.fixture(scope="module")
@@ -211,34 +195,6 @@ def test_touches_tell_gains_and_where_tips_stand(reader, felt, monkeypatch):
         Reader(reader.lab, SensorType(rows=8), state=state)
 
 
-@pytest.mark.parametrize(
-    ("way", "flip"),
-    [
-        (np.fliplr, "columns"),
-        (np.transpose, "columns"),
-        (lambda image: 1023 - image, "values"),
-        (lambda image: np.roll(image, 8, axis=1), "column-halves"),
-        (lambda image: np.roll(image, 8, axis=0), "row-halves"),
-    ],
-)
-def test_a_way_of_wiring_is_said_when_refused_touches_agree(reader, felt, way, flip):
-    images = [way(image) for image in felt[0][:2]]
-    assert not any(reader.read(image) for image in images)
-    hint = wiring_hint(reader, images)
-    assert hint.startswith("2 of 2 touches that were refused are recognised so: ")
-    assert f"`--flip {flip}`" in hint
-    assert wiring_hint(reader, images[:1]).startswith(
-        "one touch says it alone, so it may be chance"
-    )
-    undone = wiring_named(flip).apply(images[0], 1023)
-    assert reader.read(undone).object == "Cube"
-
-
-def test_nothing_is_said_where_no_way_of_wiring_helps(reader):
-    flat = 8 + 100 * np.exp(np.random.default_rng(3).normal(0, 0.1, (2, 16, 16)))
-    assert wiring_hint(reader, list(np.rint(flat))) == ""
-
-
 def test_flips_are_read_from_an_option():
     image = np.array([[0, 1], [2, 3]])
     assert wiring_named("").apply(image, 3).tolist() == image.tolist()
@@ -252,19 +208,39 @@ def test_flips_are_read_from_an_option():
 
 
 @pytest.mark.parametrize(
+    ("way", "flip"),
+    [
+        (np.transpose, "columns"),
+        (lambda image: 1023 - image, "values"),
+        (lambda image: np.roll(image, 8, axis=0), "row-halves"),
+        (lambda image: 8 + (image > 50) * 0, ""),  # of no image
+    ],
+)
+def test_a_way_of_wiring_is_said_when_refused_touches_agree(reader, felt, way, flip):
+    images = [way(image) for image in felt[0][:2]]
+    assert not any(reader.read(image) for image in images)
+    hint = wiring_hint(reader, images)
+    assert bool(hint) == bool(flip)
+    if hint:
+        assert hint.startswith("2 of 2 touches that were refused are recognised so: ")
+        assert f"`--flip {flip}`" in hint
+        alone = wiring_hint(reader, images[:1])
+        assert alone.startswith("one touch says it alone, so it may be chance")
+        assert reader.read(wiring_named(flip).apply(images[0], 1023)).object == "Cube"
+
+
+@pytest.mark.parametrize(
     ("way", "changes"),
     [
         (lambda image: image, ()),
         (np.rot90, ("quarter", "quarter", "quarter")),
-        (lambda image: np.rot90(image, 2), ("quarter", "quarter")),
-        (lambda image: np.rot90(image, 3), ("quarter",)),
-        (np.fliplr, ("columns",)),
         (np.flipud, ("rows",)),
-        (np.transpose, ("transpose",)),
         (lambda image: np.rot90(image.T, 2), ("transpose", "quarter", "quarter")),
     ],
 )
-def test_a_placed_touch_tells_the_mounting(reader, way, changes):
+def test_a_placed_touch_tells_the_mounting_and_answers_say_that_it_was_checked(
+    reader, way, changes
+):
     surface = registered_surface(reader.lab.url, "Cube", "F1").surface
     forces = press(surface, SENSOR, Touch(29.0, 31.0, np.radians(-12), 70.0)).forces_n
     image = way(np.rint(8 + 150 * forces))
@@ -273,28 +249,9 @@ def test_a_placed_touch_tells_the_mounting(reader, way, changes):
     assert found.turn_deg == pytest.approx(-12, abs=1)
     assert found.answer.x_mm == pytest.approx(29.0, abs=0.3)
     assert ("read with --flip" in str(found)) is bool(changes)
-    assert isinstance(find_mounting(reader, image, ("Cube", "F2")), Recognition)
-
-
-def test_the_file_keeps_how_the_sensor_is_mounted(reader, tmp_path):
-    path = tmp_path / "sensor.json"
-    for changes in (None, (), ("quarter",), ("transpose", "quarter", "quarter")):
-        write_state(replace(unknown_state(SENSOR), mounting=changes), path)
-        assert read_state(path).mounting == changes
-    document = json.loads(path.read_text())
-    for wrong in (["sideways"], "columns", [["rows"]], 3, ["quarter"] * 4):
-        path.write_text(json.dumps(document | {"mounting": wrong}))
-        with pytest.raises(SensorStateError, match="is damaged"):
-            read_state(path)
-
-
-def test_answers_say_whether_the_mounting_was_checked(reader):
-    surface = registered_surface(reader.lab.url, "Cube", "F1").surface
-    forces = press(surface, SENSOR, Touch(29.0, 31.0, np.radians(-12), 70.0)).forces_n
-    counts = np.rint(8 + 150 * forces)
-    plain = reader.read(counts)
-    assert (plain.object, plain.mounting) == ("Cube", "unchecked")
-    checked = replace(reader, state=replace(unknown_state(SENSOR), mounting=()))
-    assert checked.read(counts).as_json() == plain.as_json() | {"mounting": "checked"}
-    assert Scan(checked).add(counts).mounting == "checked"
-    assert replace(reader, state=unknown_state(SENSOR)).read(counts).mounting == "unchecked"
+    if not changes:
+        assert isinstance(find_mounting(reader, image, ("Cube", "F2")), Recognition)
+        checked = replace(reader, state=replace(unknown_state(SENSOR), mounting=()))
+        plain = reader.read(image).as_json()
+        assert checked.read(image).as_json() == plain | {"mounting": "checked"}
+        assert Scan(checked).add(image).mounting == "checked"

@@ -5,17 +5,14 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from scipy.ndimage import percentile_filter
-from scipy.signal import fftconvolve
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import SymbolStyle, alphabet_named
 from generator.alphabet.strokes import Glyph
 from recognizer.touch import prepare
 from recognizer.touch.prepare import template_and_bank
-from recognizer.touch.symbols.image import _percentiles_around
 from recognizer.touch.symbols.search import bank_of
-from recognizer.touch.symbols.template import _convolved, template_of
+from recognizer.touch.symbols.template import template_of
 
 CASE = (alphabet_named("dense-4"), SymbolStyle(), SensorType())
 
@@ -39,22 +36,6 @@ def test_kept_as_worked_out(tmp_path, monkeypatch):
         assert not kept.rimmed.flags.writeable
         monkeypatch.setattr(prepare, "template_of", None)  # the second time it is read
     template_and_bank.cache_clear()
-
-
-@pytest.mark.parametrize("shape", [((141, 141), (25, 25)), ((40, 40), (67, 67)), ((9, 12), (4, 5))])
-def test_convolution_as_of_scipy(shape):
-    draw = np.random.default_rng(1)
-    values, weights = (draw.random(size) for size in shape)
-    assert np.array_equal(_convolved(values, weights), fftconvolve(values, weights, mode="same"))
-
-
-@pytest.mark.parametrize("around", [1, 2, 3, 4, 5])
-def test_percentiles_as_of_scipy(around):
-    forces = np.random.default_rng(2).integers(0, 9, (12, 32)).astype(float)
-    shares = (20.0, 50.0, 80.0)
-    expected = [percentile_filter(forces, s, size=around, mode="nearest") for s in shares]
-    found = _percentiles_around(forces, around, shares)
-    assert np.array_equal(found, np.reshape(expected, (3, -1)))
 
 
 STYLE = SymbolStyle(pitch_mm=7.0, height_mm=1.0, stroke_mm=1.4)
