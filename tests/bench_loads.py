@@ -78,10 +78,6 @@ class Load:
             line.close()
 
 
-def half_open(load: Load) -> None:
-    load.connect(800)
-
-
 def dripping_heads(load: Load) -> None:
     load.connect(400, CLOCK)
     for line in load.lines:
@@ -109,40 +105,10 @@ def uploads(load: Load) -> None:
         load.ask(1, "POST", f"/api/recordings?name={name}.h5", content=content)
 
 
-def replays(load: Load) -> None:
-    load.ask(8, "POST", "/api/replay", json={"name": "long.h5"})
-
-
 def playing(load: Load) -> None:
     write_zeros(load.folder / "recordings" / "short.h5", 20_000)
     httpx.post(f"http://{load.host}/api/replay", json={"name": "short.h5"}, timeout=60.0)
     load.connect(20, UPGRADE)
-
-
-def promises(load: Load) -> None:
-    load.ask(40, "GET", "/api/promise/Cube")
-
-
-def example(load: Load) -> None:
-    load.ask(4, "POST", "/api/example")
-
-
-def making(load: Load) -> None:
-    body = {"name": "Can", "spec": LARGE, "keep": False}
-    load.ask(4, "POST", "/api/make", json=body)
-    load.ask(20, "POST", "/api/make/try", json=body)
-
-
-def touches(load: Load) -> None:
-    load.ask(60, "POST", "/api/touch", json=TOUCH)
-
-
-def loads(load: Load) -> None:
-    load.ask(60, "POST", "/api/load", json={"newtons": 100})
-
-
-def sockets(load: Load) -> None:
-    load.connect(300, UPGRADE)  # which never read
 
 
 def messages(load: Load) -> None:
@@ -165,21 +131,35 @@ def downloads(load: Load) -> None:
     load.connect(200, "GET /api/recordings/large.h5 HTTP/1.1\r\nHost: {0}\r\n\r\n")
 
 
-def pictures(load: Load) -> None:
-    load.ask(20, "GET", "/api/objects/Cube/picture.svg")
-    load.ask(20, "GET", "/api/objects/Cube")
+def asking(*works: tuple[int, str, str], **more: object) -> Callable[[Load], None]:
+    """Return a load of requests: on how many threads, method, path."""
+
+    def start(load: Load) -> None:
+        for work in works:
+            load.ask(*work, **more)
+
+    return start
 
 
-def silent(load: Load) -> None:
-    load.connect(1, UPGRADE)
+def connecting(count: int, first: str = "") -> Callable[[Load], None]:
+    """Return a load of lines that send `first`, and never read."""
+    return lambda load: load.connect(count, first)
 
 
+MAKE = {"name": "Can", "spec": LARGE, "keep": False}
 LOADS: dict[str, Callable[[Load], None]] = {
-    "nothing": lambda _: None, "half-open": half_open, "dripping heads": dripping_heads,
-    "dripping bodies": dripping_bodies, "dripping uploads": dripping_uploads,
-    "uploads": uploads, "replays": replays, "playing": playing, "promises": promises,
-    "example": example, "making": making, "touches": touches, "loads": loads, "sockets": sockets,
-    "messages": messages, "downloads": downloads, "pictures": pictures, "silent port": silent,
+    "nothing": lambda _: None, "half-open": connecting(800), "dripping heads": dripping_heads,
+    "dripping bodies": dripping_bodies, "dripping uploads": dripping_uploads, "uploads": uploads,
+    "replays": asking((8, "POST", "/api/replay"), json={"name": "long.h5"}), "playing": playing,
+    "promises": asking((40, "GET", "/api/promise/Cube")),
+    "example": asking((4, "POST", "/api/example")),
+    "making": asking((4, "POST", "/api/make"), (20, "POST", "/api/make/try"), json=MAKE),
+    "touches": asking((60, "POST", "/api/touch"), json=TOUCH),
+    "loads": asking((60, "POST", "/api/load"), json={"newtons": 100}),
+    "sockets": connecting(300, UPGRADE), "messages": messages, "downloads": downloads,
+    "pictures": asking((20, "GET", "/api/objects/Cube/picture.svg"),
+                       (20, "GET", "/api/objects/Cube")),
+    "silent port": connecting(1, UPGRADE),
 }  # fmt: skip
 EMPTY = ("example",)  #: loads of a server without objects
 
@@ -193,10 +173,10 @@ class Meter:
 
     def _watch(self) -> None:
         while not self.ended.wait(0.05):
-            self.top_mb = max(self.top_mb, sum(map(_memory_mb, family(self.pid))))
+            self.top_mb = max(self.top_mb, sum(map(memory_mb, family(self.pid))))
 
     def cpu_s(self) -> float:
-        return sum(map(_cpu_s, family(self.pid)))
+        return sum(map(cpu_s, family(self.pid)))
 
 
 def family(pid: int) -> list[int]:
@@ -209,14 +189,14 @@ def family(pid: int) -> list[int]:
     return known
 
 
-def _memory_mb(pid: int) -> float:
+def memory_mb(pid: int) -> float:
     with suppress(OSError, IndexError):
         text = Path(f"/proc/{pid}/status").read_text()
         return int(text.split("VmRSS:")[1].split()[0]) / 1024
     return 0.0
 
 
-def _cpu_s(pid: int) -> float:
+def cpu_s(pid: int) -> float:
     with suppress(OSError):
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")

@@ -148,21 +148,3 @@ def made(page):
     with zipfile.ZipFile(download.value.path()) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     return download.value.suggested_filename, files
-
-
-def press_known_loads(page, loads_n=(80, 200, 600)):
-    """Calibrate step by step, without a load and with each; the last one is left on the sensor."""
-    page.get_by_test_id("calibrate").click()
-    page.get_by_test_id("guide-loads").fill(", ".join(map(str, loads_n)))
-    page.get_by_test_id("guide-seconds").fill("1")
-    page.get_by_test_id("guide-start").click()
-    steps = len(loads_n) + 1
-    for step in range(steps):
-        expect(page.get_by_test_id("guide-ask")).to_contain_text(f"{step + 1} of {steps}")
-        page.get_by_test_id("guide-load").click()
-        page.get_by_test_id("guide-read").click()
-        expect(page.locator("#guide-felt li")).to_have_count(step + 1)
-    page.get_by_test_id("guide-finish").click()
-    expect(page.locator("#guide-result:not(:empty), #guide #error:not([hidden])")).to_contain_text(
-        "tactels are sound"
-    )

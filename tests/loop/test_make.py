@@ -1,4 +1,4 @@
-"""From spec to files and database, and back: what is printed is what is registered."""
+"""From spec to files and database: what is printed is what is registered."""
 
 from __future__ import annotations
 
@@ -13,24 +13,13 @@ from generator.database.read import read_object
 from generator.database.transaction import read_transaction
 from generator.pipeline import encode
 from generator.spec import read_specs
+from probe.simulate.target import part_surface
 
-ROOT = Path(__file__).parents[2]
-SPECS = ROOT / "fixtures" / "specs"
-GOLDEN = json.loads((ROOT / "fixtures" / "golden.json").read_text())
-
-
-def made(folder: Path, text: str, **options: object):
-    spec = folder / "spec.yaml"
-    spec.write_text(text)
-    url = f"sqlite:///{folder / 'lab.db'}"
-    return encode(read_specs([spec]), folder=folder / "out", database=url, **options)
-
-
-def registered(folder: Path, name: str):
-    with read_transaction(
-        open_database(f"sqlite:///{folder / 'lab.db'}", writable=False)
-    ) as connection:
-        return read_object(connection, name)
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+GOLDEN = json.loads((FIXTURES / "golden.json").read_text())
+# "0" of the thesis is an L, "1" a stem, a step and two branches: these nodes tell them apart.
+NODES = np.array([(-1, 1), (-1, -1), (1, -1), (0, -1), (0, 0), (1, 0), (-1, 0)])
+RAISED = {0: [1, 1, 1, 1, 0, 0, 1], 1: [1, 1, 0, 1, 1, 1, 0]}
 
 
 def thesis_array() -> np.ndarray:
@@ -46,63 +35,21 @@ def thesis_array() -> np.ndarray:
     return array
 
 
-def triangles_of(stl: Path) -> np.ndarray:
-    """Read (m, 3, 3) triangles of a binary STL, mm."""
-    data = stl.read_bytes()[84:]
-    kind = np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
-    return np.frombuffer(data, kind)["v"].astype(float)
-
-
-def is_raised(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Whether the part's highest level lies over points (n, 2)."""
-    top = triangles[:, :, 2].max()
-    flat = triangles[np.ptp(triangles[:, :, 2], axis=1) < 1e-4]
-    flat = flat[np.abs(flat[:, 0, 2] - top) < 1e-4][:, :, :2]
-    a, b, c = (flat[:, i] for i in range(3))
-
-    def side(p, q):
-        d, e = q - p, points[:, None, :] - p
-        return d[:, 0] * e[:, :, 1] - d[:, 1] * e[:, :, 0]
-
-    return ((side(a, b) >= 0) & (side(b, c) >= 0) & (side(c, a) >= 0)).any(axis=1)
-
-
-# "0" of the thesis is an L, "1" a stem, a step and two branches: these nodes tell them apart.
-NODES = np.array([(-1, 1), (-1, -1), (1, -1), (0, -1), (0, 0), (1, 0), (-1, 0)])
-RAISED = {0: [1, 1, 1, 1, 0, 0, 1], 1: [1, 1, 0, 1, 1, 1, 0]}
-
-
 def test_printed_thesis_cube_carries_the_thesis_array_where_the_database_says(tmp_path):
-    result = made(tmp_path, (SPECS / "thesis-cube.yaml").read_text(), formats=("stl",))
-    cube = registered(tmp_path, result.objects[0].name)
-    truth = thesis_array()
-    pitch, seen = cube.style.pitch_mm, 0
+    specs, database = read_specs([FIXTURES / "specs" / "thesis-cube.yaml"]), f"{tmp_path}/lab.db"
+    made = encode(specs, folder=tmp_path / "out", database=database, formats=("stl",)).objects[0]
+    with read_transaction(open_database(database, writable=False)) as connection:
+        cube = read_object(connection, made.name)
+    truth, seen = thesis_array(), 0
     for part in cube.parts:
         number = int(part.name.rsplit("F", 1)[1]) - 1
-        face = cube.faces[number]
-        assert face.placement is not None
-        cells = cube.layout.faces[number]
-        T = np.linalg.inv(part.T_object_part) @ face.T_object_face
-        turn = -face.placement.rotation_rad
+        cells, turn = cube.layout.faces[number], -cube.faces[number].placement.rotation_rad
         R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-        triangles = triangles_of(tmp_path / part.file)
+        surface = part_surface(
+            tmp_path / part.file, database=database, face=f"F{number + 1}"
+        ).surface
         for r, c, centre in zip(cells.rows, cells.columns, cells.centres_mm, strict=True):
-            at = centre + 0.26 * pitch * NODES @ R.T
-            here = at @ T[:2, :2].T + T[:2, 3]
-            assert is_raised(triangles, here).astype(int).tolist() == RAISED[truth[r, c]]
+            heights = surface.heights_mm(centre + 0.26 * cube.style.pitch_mm * NODES @ R.T)
+            assert (heights > surface.top_mm - 1e-3).astype(int).tolist() == RAISED[truth[r, c]]
             seen += 1
-    assert seen == result.objects[0].symbols > 100
-
-
-def test_placements_map_cells_to_symbol_centres(tmp_path):
-    made(tmp_path, "name: T\nshape: {tetrahedron: 90 mm}\n", formats=())
-    solid = registered(tmp_path, "T")
-    for face in solid.layout.faces:
-        p, place = solid.style.pitch_mm, face.placement
-        c, s = np.cos(place.rotation_rad), np.sin(place.rotation_rad)
-        u = face.centres_mm @ np.array([[c, -s], [s, c]]).T + (place.x_mm, place.y_mm)
-        columns = np.rint(u[:, 0] / p - 0.5).astype(int)
-        rows = np.rint(-u[:, 1] / p - 0.5).astype(int)
-        assert np.abs(u[:, 0] - (columns + 0.5) * p).max() < 1e-9
-        assert ((rows + place.row) % 189 == face.rows).all()
-        assert ((columns + place.column) % 1387 == face.columns).all()
+    assert seen == made.symbols > 100

@@ -3,7 +3,8 @@
 import signal
 
 import pytest
-from bench_loads import held
+from bench_loads import LONG, held
+from hostile_recordings import write_zeros
 
 SOON_S = 4.0  #: alone it takes half of that at most; other tests run beside it
 
@@ -11,14 +12,14 @@ SOON_S = 4.0  #: alone it takes half of that at most; other tests run beside it
 @pytest.mark.parametrize(
     ("load", "number"),
     [
-        ("dripping bodies", signal.SIGINT),
-        ("promises", signal.SIGTERM), ("example", signal.SIGINT),
-        ("making", signal.SIGTERM), ("loads", signal.SIGTERM),
-        ("messages", signal.SIGINT),
-        ("silent port", signal.SIGINT),
+        ("dripping bodies", signal.SIGINT), ("promises", signal.SIGTERM),
+        ("example", signal.SIGINT), ("making", signal.SIGTERM), ("messages", signal.SIGINT),
+        ("silent port", signal.SIGINT), ("replays", signal.SIGINT), ("uploads", signal.SIGTERM),
     ],
 )  # fmt: skip
 def test_it_ends_under_load(lab, load, number):
+    if load in ("replays", "uploads"):  # are read for long
+        write_zeros(lab / "long.h5", LONG)
     seen = held(lab, load, number, seconds=1.0)
     assert seen["code"] == 0
     assert seen["ended_s"] < SOON_S

@@ -9,7 +9,7 @@ from urllib.parse import parse_qsl
 import httpx
 import pytest
 from bench_loads import LARGE, family
-from bench_page import made, making, opened_to_make, running, until
+from bench_page import PATIENCE_MS, made, making, opened_to_make, running, until
 from playwright.sync_api import expect
 
 from generator.command import run as encode_object
@@ -27,9 +27,11 @@ def own(tmp_path_factory):
         yield address, process, folder
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def page(browser, own):
-    page = opened_to_make(browser, own[0])
+    """The page of that server; the tests work its form one after the other."""
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    page.goto(own[0])
     yield page
     page.close()
 
@@ -39,31 +41,34 @@ def ask(address, spec, *, path="make/try", keep=False, timeout=60.0):
     return httpx.post(f"{address}api/{path}", json=body, timeout=timeout)
 
 
-SMALL = {
-    "box": {"shape.box": "[40 mm, 40 mm, 25 mm]"},
-    "cylinder": {"shape.cylinder.diameter": "40 mm", "shape.cylinder.height": "30 mm"},
-}
+def test_an_empty_lab_offers_an_example(page, own):
+    address, _, folder = own
+    button = page.get_by_test_id("example")
+    expect(button).to_be_visible(timeout=PATIENCE_MS)
+    button.click()
+    until(page, "bench.answers > 0")
+    assert page.get_by_test_id("answer").inner_text().startswith("Example F1")
+    expect(button).to_be_hidden()
+    assert (folder / "lab.db").exists()
+    assert httpx.post(f"{address}api/example", json={}).status_code == 409
 
 
-@pytest.mark.parametrize("shape", SMALL)
-def test_a_part_has_the_bytes_that_the_command_writes(page, shape, tmp_path, monkeypatch):
-    making(page, {"shape": shape, **SMALL[shape], "name": f"Own {shape}",
-                  "output.formats": "[stl, 3mf]", "output.lab_key": KEY,
-                  "print.printer": "prusa-mk4"})  # fmt: skip
-    name, files = made(page)
-    assert name == f"Own {shape}.zip"
-    monkeypatch.chdir(tmp_path)
-    spec = f"Own {shape}.yaml"
-    (tmp_path / spec).write_bytes(files.pop(spec))
-    assert encode_object([spec]) == 0
-    files.pop("lab.db")
-    written = {
-        str(one.relative_to(tmp_path)): one.read_bytes() for one in tmp_path.rglob("out/*/*")
-    }
-    assert files == written
+def test_keys_change_the_number_at_the_cursor_and_the_part_follows(page):
+    page.get_by_test_id("make-open").click()
+    until(page, "bench.tried > 0")
+    making(page, {"shape": "box"})
+    field = page.get_by_test_id("make-shape.box")
+    field.focus()
+    field.evaluate("one => one.setSelectionRange(9, 9)")
+    tried = page.evaluate("bench.tried")
+    page.keyboard.press("Shift+ArrowDown")
+    page.keyboard.press("ArrowUp")
+    expect(field).to_have_value("[80 mm, 71 mm, 120 mm]")
+    until(page, f"bench.tried > {tried}")
+    expect(page.get_by_test_id("make-faces")).to_contain_text("71 x 120 mm")
 
 
-def test_what_is_promised_is_seen_and_a_link_opens_it_again(page, own, browser):
+def test_what_is_promised_is_seen_and_a_link_opens_it_again(page, browser):
     making(page, {"shape": "box", "shape.box": "[60 mm, 60 mm, 5 mm]", "name": "Flat",
                   "print.parts": "whole"})  # fmt: skip
     expect(page.get_by_test_id("make-told")).to_contain_text("of touches anywhere on the part")
@@ -79,13 +84,49 @@ def test_what_is_promised_is_seen_and_a_link_opens_it_again(page, own, browser):
     assert dict(parse_qsl(page.url.split("?")[1]))["shape.box"] == "[60 mm, 60 mm, 5 mm]"
     other = opened_to_make(browser, page.url)
     assert other.get_by_test_id("make-spec").text_content() == spec
+    other.goto("about:blank")
+    other.goto(f"{page.url.split('#')[0]}#make?shape.box={'9' * 2000}")
+    expect(other.get_by_test_id("error")).to_contain_text("not offered here: shape.box")
     other.close()
-    long = opened_to_make(browser, f"{page.url.split('#')[0]}#make?shape.box={'9' * 2000}")
-    expect(long.get_by_test_id("error")).to_contain_text("not offered here: shape.box")
-    long.close()
+
+
+def test_a_part_has_the_bytes_that_the_command_writes(page, tmp_path, monkeypatch):
+    page.get_by_test_id("make-lab").select_option("")  # one of its own
+    making(page, {"shape": "cylinder", "shape.cylinder.diameter": "40 mm",
+                  "shape.cylinder.height": "30 mm", "name": "Own can", "print.parts": "",
+                  "output.formats": "[stl, 3mf]", "output.lab_key": KEY,
+                  "print.printer": "prusa-mk4"})  # fmt: skip
+    name, files = made(page)
+    assert name == "Own can.zip"
+    monkeypatch.chdir(tmp_path)
+    spec = tmp_path / "Own can.yaml"
+    spec.write_bytes(files.pop(spec.name))
+    assert encode_object([spec.name]) == 0
+    files.pop("lab.db")
+    written = tmp_path.rglob("out/*/*")
+    assert files == {str(one.relative_to(tmp_path)): one.read_bytes() for one in written}
+
+
+def test_what_is_made_in_the_lab_is_shown_and_touched(page, own):
+    address, _, folder = own
+    page.get_by_test_id("make-lab").select_option("lab")
+    making(page, {"shape": "cube", "name": "Die", "output.formats": "[stl]",
+                  "output.lab_key": ""})  # fmt: skip
+    name, files = made(page)
+    assert name == "Die.zip"
+    assert "lab.db" not in files
+    assert all((folder / one).read_bytes() == files[one] for one in files if one != "Die.yaml")
+    expect(page.get_by_test_id("object")).to_have_value("Die")
+    page.keyboard.press("Escape")
+    page.get_by_test_id("gallery-open").click()
+    expect(page.locator("#gallery-list")).to_contain_text("Die")
+    assert ask(address, CUBE.replace("40", "41"), keep=True).status_code == 400  # its name is taken
+    assert ask(address, CUBE.replace("40", "41")).status_code == 200  # but not in a lab of its own
+    page.keyboard.press("Escape")
 
 
 def test_a_refusal_has_the_command_s_words_at_its_field(page, tmp_path, capsys):
+    page.get_by_test_id("make-open").click()
     page.get_by_test_id("make-name").fill("a/b: c")
     making(page, {"shape": "prism", "shape.prism.side": "40 mmm"}, state="refused")
     spec = tmp_path / "spec.yaml"
@@ -97,23 +138,10 @@ def test_a_refusal_has_the_command_s_words_at_its_field(page, tmp_path, capsys):
     for one in problems:
         expect(said).to_contain_text(one["cause"])
         expect(said).to_contain_text(one["fix"])
-    for field in ("name", "shape.prism.side"):
-        expect(page.get_by_test_id(f"make-{field}")).to_have_attribute("aria-invalid", "true")
-    expect(page.get_by_test_id("make-shape.prism.sides")).to_have_attribute("aria-invalid", "false")
+    for field, wrong in (("name", "true"), ("shape.prism.side", "true"),
+                         ("shape.prism.sides", "false")):  # fmt: skip
+        expect(page.get_by_test_id(f"make-{field}")).to_have_attribute("aria-invalid", wrong)
     expect(page.get_by_test_id("make-go")).to_be_disabled()
-
-
-def test_keys_change_the_number_at_the_cursor_and_the_part_follows(page):
-    making(page, {"shape": "box"})
-    field = page.get_by_test_id("make-shape.box")
-    field.focus()
-    field.evaluate("one => one.setSelectionRange(9, 9)")
-    tried = page.evaluate("bench.tried")
-    page.keyboard.press("Shift+ArrowDown")
-    page.keyboard.press("ArrowUp")
-    expect(field).to_have_value("[80 mm, 71 mm, 120 mm]")
-    until(page, f"bench.tried > {tried}")
-    expect(page.get_by_test_id("make-faces")).to_contain_text("71 x 120 mm")
 
 
 SECRETS = (
@@ -138,29 +166,11 @@ def test_it_ends_with_the_page_that_waits_for_it(own):
     address, process, _ = own
     ask(address, CUBE)
     with pytest.raises(httpx.ReadTimeout):
-        httpx.post(
-            f"{address}api/make", json={"name": "Can", "spec": LARGE, "keep": False}, timeout=2
-        )
+        ask(address, LARGE, path="make", timeout=2)
     end_s = time.monotonic() + 10.0
     while len(family(process.pid)) > 2:  # the server, and a process that waits for the next
         assert time.monotonic() < end_s
         time.sleep(0.05)
-
-
-def test_what_is_made_in_the_lab_is_shown_and_touched(page, own):
-    address, _, folder = own
-    page.get_by_test_id("make-lab").select_option("lab")
-    making(page, {"shape": "cube", "name": "Die", "output.formats": "[stl]"})
-    name, files = made(page)
-    assert name == "Die.zip"
-    assert "lab.db" not in files
-    assert all((folder / one).read_bytes() == files[one] for one in files if one != "Die.yaml")
-    expect(page.get_by_test_id("object")).to_have_value("Die")
-    page.keyboard.press("Escape")
-    page.get_by_test_id("gallery-open").click()
-    expect(page.locator("#gallery-list")).to_contain_text("Die")
-    assert ask(address, CUBE.replace("40", "41"), keep=True).status_code == 400  # its name is taken
-    assert ask(address, CUBE.replace("40", "41")).status_code == 200  # but not in a lab of its own
 
 
 def test_a_part_of_very_many_symbols_is_not_drawn(monkeypatch):

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ from recognizer.validation.touch_plan import TouchPlan, written_surface
 
 TOUCHES, SHARD = 18, 6
 COMMAND = [sys.executable, "-m", "recognizer.validation.command"]
+ADDRESS = re.compile(r'"address": "([^"]+)"')
+OUTWARD = re.compile(r"""(src|href)\s*=\s*["'](?!#|data:)|url\((?!#)|@import""")
 SAME = ("trials.parquet", "results.json")
 
 
@@ -72,24 +75,13 @@ def wait_for(holds, seconds=60.0):
     return found
 
 
-def whole_json(path: Path):
-    """Return what a file holds; None while it is not there, or is being written."""
-    try:
-        return json.loads(path.read_text())
-    except (FileNotFoundError, ValueError):
-        return None
-
-
 def left_of(session: int) -> list[int]:
     found = []
     for process in psutil.process_iter(["pid", "status"]):
-        try:
-            ours = os.getsid(process.pid) == session
-        except ProcessLookupError:
-            continue
-        if ours and process.info["status"] != psutil.STATUS_ZOMBIE:
-            found.append(process.pid)
-    return found
+        with suppress(ProcessLookupError):
+            if os.getsid(process.pid) == session:
+                found.append(process)
+    return [one.pid for one in found if one.info["status"] != psutil.STATUS_ZOMBIE]
 
 
 def test_what_it_prints_and_leaves(reference):
@@ -109,8 +101,7 @@ def test_what_it_prints_and_leaves(reference):
     assert not re.search(r"20\d\d-\d\d-\d\d[T ]", told)
     assert "utc" in json.loads((folder / "provenance.json").read_text())
     page = (folder / "report.html").read_text()
-    assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", page)
-    assert not re.search(r"url\((?!#)|@import", page)
+    assert not OUTWARD.search(page)
 
 
 def test_the_page_fits_asks_for_nothing_and_prints(reference, browser):
@@ -144,33 +135,27 @@ def test_two_processes_interrupted_killed_and_resumed(spec, reference, tmp_path)
 
 
 def test_a_cluster_of_two_workers_one_of_them_killed(spec, reference, tmp_path):
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    address = tmp_path / "scheduler.json"
-    started = []
+    address, folder = tmp_path / "scheduler.json", tmp_path / "run"
+    with ExitStack() as started:
 
-    def start(what, *options):
-        module = f"distributed.cli.dask_{what}"
-        process = subprocess.Popen(
-            [sys.executable, "-m", module, *options, "--no-dashboard"],
-            env=environment, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        started.append(process)
+        def start(what, *options):
+            process = subprocess.Popen(
+                [sys.executable, "-m", f"distributed.cli.dask_{what}", *options, "--no-dashboard"],
+                cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+            started.enter_context(process)
+            started.callback(process.kill)
+            return process
 
-    try:
         start("scheduler", "--port", "0", "--host", "127.0.0.1", "--scheduler-file", str(address))
-        url = wait_for(lambda: whole_json(address))["address"]
-        for _ in range(2):
-            start("worker", url, "--nthreads", "1", "--no-nanny")
-        folder = tmp_path / "run"
+        wait_for(address.exists)
+        url = wait_for(lambda: ADDRESS.search(address.read_text()))[1]
+        worker, _ = (start("worker", url, "--nthreads", "1", "--no-nanny") for _ in range(2))
         process = begun(*asked(spec, folder, "--cluster", url))
         wait_for(lambda: list(folder.glob("shards/touches/*.parquet")))
-        started[1].kill()
+        worker.kill()
         _, err = process.communicate(timeout=120)
         assert process.returncode == 0, err
-    finally:
-        for one in started:
-            one.kill()
-            one.wait()
     assert_same(folder, reference[0])
 
 
@@ -201,18 +186,31 @@ def test_repeat_report_and_compare(reference, tmp_path, capsys):
     assert html.stat().st_size > 10_000
 
 
+def test_worlds_of_two_runs_are_a_page_with_json_beside_it(reference, tmp_path, capsys):
+    one, other, page = reference[0], tmp_path / "other", tmp_path / "worlds.html"
+    shutil.copytree(one, other)
+    assert run(["worlds", str(one), str(other), "-o", str(page), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert json.loads(page.with_suffix(".json").read_text()) == said
+    assert str(tmp_path) not in page.read_text() + page.with_suffix(".json").read_text()
+    assert not OUTWARD.search(page.read_text())
+    assert run(["worlds", str(one), str(one)]) == 2
+    assert "stands twice" in capsys.readouterr().err
+    results = json.loads((other / "results.json").read_text())
+    del results["format"]
+    (other / "results.json").write_text(json.dumps(results))
+    assert run(["compare", str(one), str(other)]) == 2
+    assert "validate-set report" in capsys.readouterr().err
+
+
 def test_a_report_of_what_no_database_knows_shows_no_errors_of_right_answers(reference, tmp_path):
     own = ["--database", str(reference[0] / "lab.db"), "--kinds", "blank", "--study", "0"]
     assert run([*own, "--touches", "3", "-o", str(tmp_path / "blank")]) == 0
-    page = (tmp_path / "blank" / "report.html").read_text()
-    assert "When it answers" in page
-    assert "How far off" not in page
-    assert "How far off" in (reference[0] / "report.html").read_text()
-
-
-def test_a_run_is_not_resumed_otherwise(spec, reference, capsys):
-    assert run([*asked(spec, reference[0]), "--resume", "--seed", "9"]) == 2
-    assert "seed 1, now 9" in capsys.readouterr().err
+    blank, usual = (
+        (folder / "report.html").read_text() for folder in (tmp_path / "blank", reference[0])
+    )
+    assert "When it answers" in blank
+    assert ("How far off" in blank, "How far off" in usual) == (False, True)
 
 
 def test_written_files_are_what_is_registered(reference):
@@ -236,14 +234,13 @@ def test_written_files_are_what_is_registered(reference):
 def test_a_changed_file_is_found_out(reference, tmp_path):
     lab = tmp_path / "lab"
     shutil.copytree(reference[0], lab)
-    database = str(lab / "lab.db")
-    file = next(iter(sorted((lab / "parts").rglob("*-F1.stl"))))
-    written_surface(database, "Cube", "F1")
+    file = min((lab / "parts").rglob("*-F1.stl"))
+    written_surface(str(lab / "lab.db"), "Cube", "F1")
     content = bytearray(file.read_bytes())
     content[200] ^= 1
     file.write_bytes(content)
     with pytest.raises(SetError, match="not the one that the database registers"):
-        written_surface(database, "Cube", "F1")
+        written_surface(str(lab / "lab.db"), "Cube", "F1")
     file.unlink()
     with pytest.raises(SetError, match="cannot read the part"):
-        written_surface(database, "Cube", "F1")
+        written_surface(str(lab / "lab.db"), "Cube", "F1")

@@ -20,12 +20,7 @@ from generator.printed.prints import surface_keys, surface_path
 from generator.printed.surface import PrintedSurface, write_surface
 from probe.errors import SurfaceError
 from probe.simulate import printed
-from probe.simulate.printed import (
-    PrintOptions,
-    listing_of,
-    printed_scene,
-    read_listing,
-)
+from probe.simulate.printed import PrintOptions, listing_of, printed_scene, read_listing
 from probe.simulate.target import part_surface
 from recognizer.scan.session import Scan
 from recognizer.touch.lab import open_lab
@@ -112,27 +107,23 @@ def whole(make_lab):
     return str(make_lab(spec, formats=("stl",)) / "lab.db")
 
 
-def print_as_designed(part, database, folder, faces):
-    """Write what the STL says, .1 mm aside, as the print of some of a part's faces."""
-    keys = surface_keys(part.job, OPTIONS.plan())
-    for face in part.job.faces[:faces]:
-        scene = part_surface(part.job.file, database=database, face=face.name)
-        line = np.arange(-1.0, 37.0, 0.1)
-        points = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
-        heights = scene.surface.heights_mm(points - np.array((0.1, 0.0)))
-        heights[heights < -2.5] = -np.inf
-        side = (len(line), len(line))
-        laid = heights.reshape(side).astype(np.float32)
-        surface = PrintedSurface(laid, (-1.0, -1.0), 0.1, np.eye(4))
-        write_surface(surface, surface_path(folder, keys[face.name]), moved_mm=(0.1, 0.0))
-
-
 @pytest.fixture(scope="module")
 def listing(panels, tmp_path_factory):
-    """One panel of six, printed."""
+    """One panel of six, printed: what the STL says, .1 mm aside."""
     folder = tmp_path_factory.mktemp("run")
     part = find_parts(panels)[2]
-    print_as_designed(part, panels, folder / "kept", 1)
+    (key,) = surface_keys(part.job, OPTIONS.plan()).values()
+    designed = part_surface(part.job.file, database=panels, face="F3").surface
+    line = np.arange(-1.0, 37.0, 0.1)
+    points = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+    heights = designed.heights_mm(points - np.array((0.1, 0.0)))
+    heights[heights < -2.5] = -np.inf
+    laid = heights.reshape(len(line), len(line)).astype(np.float32)
+    surface = PrintedSurface(laid, (-1.0, -1.0), 0.1, np.eye(4))
+    assert part.left(OPTIONS, folder / "kept")
+    write_surface(surface, surface_path(folder / "kept", key), moved_mm=(0.1, 0.0))
+    assert not part.left(OPTIONS, folder / "kept")
+    assert part.left(replace(OPTIONS, seed=6), folder / "kept")
     (folder / "printed.json").write_text(listing_of([part], OPTIONS, folder / "kept", folder))
     return str(folder / "printed.json")
 
@@ -155,64 +146,33 @@ def test_a_body_of_which_nothing_is_seen_is_refused(whole, monkeypatch):
     assert "panels" in caught.value.fix
 
 
-def test_a_print_is_touched_in_the_frame_of_its_face(panels, listing):
-    scene = printed_scene(listing, panels, "Cube", "F3")
-    part = find_parts(panels)[2]
-    designed = part_surface(part.job.file, database=panels, face="F3")
-    assert (scene.object_name, scene.face) == ("Cube", "F3")
-    assert scene.T_object_surface == pytest.approx(designed.T_object_surface)
-    points = np.random.default_rng(1).uniform(4.0, 32.0, (3000, 2))
-    asked, found = designed.surface.heights_mm(points), scene.surface.heights_mm(points)
-    # Walls of 10 degrees: a grid of .1 mm cuts their edges.
-    assert np.mean(np.abs(asked - found) < 0.02) > 0.85
-    assert scene.surface.top_mm == pytest.approx(1.0, abs=0.01)
+def test_a_listing_tells_whether_all_is_there(panels, listing, tmp_path):
+    found, copy = read_listing(listing), tmp_path / "printed.json"
+    assert (found.complete(), found.moved_mm()) == (True, [(0.1, 0.0)])
+    assert printed_scene(listing, panels, "Cube", "F3").surface.top_mm == pytest.approx(1, abs=0.01)
     with pytest.raises(SurfaceError, match="F1 of 'Cube' was not printed"):
         printed_scene(listing, panels, "Cube", "F1")
-
-
-def test_a_listing_tells_whether_all_is_there(panels, listing, tmp_path):
-    found = read_listing(listing)
-    assert found.complete()
-    assert found.moved_mm() == [(0.1, 0.0)]
-    (tmp_path / "printed.json").write_text(Path(listing).read_text())
-    assert not read_listing(str(tmp_path / "printed.json")).complete()
+    copy.write_text(Path(listing).read_text())
+    assert not read_listing(str(copy)).complete()
     with pytest.raises(PrintError, match="not there or cannot be read"):
-        printed_scene(str(tmp_path / "printed.json"), panels, "Cube", "F3")
+        printed_scene(str(copy), panels, "Cube", "F3")
     for text in ("{", "[]", "{}"):
-        (tmp_path / "bad.json").write_text(text)
+        copy.write_text(text)
         read_listing.cache_clear()
         with pytest.raises(SurfaceError, match="listing of the prints"):
-            read_listing(str(tmp_path / "bad.json"))
+            read_listing(str(copy))
 
 
-def test_a_part_is_left_until_all_its_faces_are_there(whole, tmp_path):
-    (part,) = find_parts(whole)
-    assert part.left(OPTIONS, tmp_path)
-    print_as_designed(part, whole, tmp_path, 1)
-    assert part.left(OPTIONS, tmp_path)
-    print_as_designed(part, whole, tmp_path, 5)
-    assert not part.left(OPTIONS, tmp_path)
-    assert part.left(replace(OPTIONS, seed=6), tmp_path)
-
-
-def test_edges_of_prints_are_touched(panels, listing):
-    plan = TouchPlan(panels, 3, "typical", kind="edge", files=True, prints=listing)
-    edge = draw_touch(plan, 1, Reader(open_lab(panels)))
+def test_touches_are_of_what_was_printed_with_its_own_faults(panels, listing, tmp_path):
+    reader = Reader(open_lab(panels))
+    edge = draw_touch(TouchPlan(panels, 3, kind="edge", files=True, prints=listing), 1, reader)
     at = np.array([[edge.touch.x_mm, edge.touch.y_mm]])
     assert edge.contact.scene.region.distance_mm(at)[0] < 9
-
-
-def test_a_print_brings_its_own_faults(panels, listing):
     plan = TouchPlan(panels, level="mismatch")
-    assert plan.noise.scale != 0
     level = replace(plan, prints=listing).noise
-    assert (level.scale, level.wider_mm) == (0.0, 0.0)
+    assert (level.scale, level.wider_mm) == (0.0, 0.0) != (plan.noise.scale, plan.noise.wider_mm)
     assert level.shift_mm == plan.noise.shift_mm > 0
-
-
-def test_other_faces_than_those_of_the_lab_are_refused(panels, listing, tmp_path):
     values = json.loads(Path(listing).read_text())
     (tmp_path / "other.json").write_text(json.dumps(values | {"faces": {"Ball": {"F1": "a"}}}))
-    reader = Reader(open_lab(panels))
     with pytest.raises(ValidationError, match="no face for touches of kind face was printed"):
         draw_touch(TouchPlan(panels, prints=str(tmp_path / "other.json")), 0, reader)

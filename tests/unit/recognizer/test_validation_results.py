@@ -1,29 +1,28 @@
-"""Results of rows that are written by hand, shards on the disk, extremes."""
+"""Results of rows that are written by hand, shards on the disk, extremes, pictures of them."""
 
 from __future__ import annotations
 
 import json
+import re
 import sys
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from recognizer.validation.campaign import Campaign, series_of
 from recognizer.validation.command import run
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.extremes import press_scenes
-from recognizer.validation.files import (
-    ADDED,
-    columns_of,
-    done_shards,
-    read_series,
-    shard_file,
-    write_shard,
-)
+from recognizer.validation.files import ADDED, columns_of, read_series, shard_file, write_shard
+from recognizer.validation.flat_faces import FlatFace, draw_flat
+from recognizer.validation.pictures import label_points
 from recognizer.validation.pipeline import ValidationResult, bound_from, result_from
-from recognizer.validation.results import line_of, results_of
+from recognizer.validation.results import results_of
 
 NAN = float("nan")
 UNTOLD = "too few touches to tell"
@@ -36,9 +35,10 @@ def row(number, verdict="right", **changed):
         "object": "Cube", "face": "F1", "x_mm": 1.0, "y_mm": 2.0, "theta_deg": 30.0,
         "force_n": 50.0, "tilt_deg": 1.0, "edge_mm": 12.0, "symbols": 12, "enough": True,
         "verdict": verdict, "reason": "ambiguous" if verdict == "rejected" else "",
-        "answer": {"right": "Cube/F1", "wrong": "Box/F2", "rejected": ""}[verdict],
+        "answer": {"right": "Cube/F1", "wrong": "Box-2/F2", "rejected": ""}[verdict],
         "error_mm": 0.05 if right else NAN, "error_deg": -0.2 if right else NAN,
         "chi2": 2.0 if right else NAN, "margin": 30.0, "noise": 0.1,
+        "drawn_anew": "",
     }  # fmt: skip
     return plain | changed
 
@@ -48,26 +48,23 @@ def foreign(number, verdict="rejected", kind="blank", **changed):
     return row(number, verdict, **plain | {"symbols": 0, "edge_mm": NAN} | changed)
 
 
-def spent(*numbers):
-    return [{"number": number, "drawing": 0.1, "reading": 0.2} for number in numbers]
+def write(folder, rows):
+    """Write rows as a run does."""
+    series = series_of(Campaign(len(rows)))[0]
+    spent = [{"number": one["number"], "drawing": 0.1, "reading": 0.2} for one in rows]
+    write_shard(folder, series.name, 0, rows, spent)
+    return series
 
 
 @pytest.fixture
 def columns(tmp_path):
-    """Write rows as a run does, and read them."""
+    """Write rows and read them."""
 
     def written(rows):
         folder = tmp_path / str(len(list(tmp_path.iterdir())))
-        series = series_of(Campaign(len(rows)))[0]
-        write_shard(folder, series.name, 0, rows, spent(*(r["number"] for r in rows)))
-        return columns_of(read_series(folder, series))
+        return columns_of(read_series(folder, write(folder, rows)))
 
     return written
-
-
-@pytest.fixture
-def line(columns):
-    return lambda rows: line_of(columns(rows), np.ones(len(rows), bool))
 
 
 def test_touches_until_answered_are_counted_by_kind(columns):
@@ -89,55 +86,59 @@ def test_counts_confusion_and_worst(columns, tmp_path):
     rows = [row(i) for i in range(6)]
     rows += [
         row(6, "wrong"),
-        row(7, "rejected"),
-        row(8, "right", object="Box", face="F2", answer="Box/F2", error_mm=0.4, level="low"),
-        foreign(9, kind="foreign", surface="dots"),
+        row(7, "rejected", drawn_anew="slipped off | no rest"),
+        row(8, object="Box-2", face="F2", answer="Box-2/F2", error_mm=0.4, level="low"),
+        foreign(9, "wrong", kind="foreign", surface="dots"),
+        row(10, "rejected", object="Box-10", face="F10", enough=False),
+        row(11, "rejected", object="Box-10", face="F9", enough=False),
     ]
     found = results_of(columns(rows))
     totals = found["totals"]
-    assert [totals[n] for n in ("touches", "right", "wrong", "rejected")] == [10, 7, 1, 2]
+    assert [totals[n] for n in ("touches", "right", "wrong", "rejected")] == [12, 7, 2, 3]
     assert totals["rms_mm"] == pytest.approx(np.sqrt((6 * 0.05**2 + 0.4**2) / 7), rel=1e-5)
-    assert found["enough"]["touches"] == 9
-    assert found["objects"]["names"] == ["Box", "Cube"]
-    assert found["objects"]["matrix"] == [[1, 0, 0], [1, 6, 1]]
-    assert found["objects"]["confused"] == [
-        {"touched": "Cube/F1", "answered": "Box/F2", "count": 1}
+    assert (found["enough"]["touches"], totals["expected"]["count"]) == (9, 8)
+    assert totals["drawn_anew"] == 2
+    objects = found["objects"]
+    assert objects["names"] == ["Box-2", "Box-10", "Cube"]  # by number, as are their faces
+    assert [line["face"] for line in objects["faces"]] == ["F2", "F9", "F10", "F1"]
+    assert objects["matrix"] == [[1, 0, 0, 0], [0, 0, 0, 2], [1, 0, 6, 1]]
+    assert objects["confused"] == [
+        {"touched": touched, "answered": "Box-2/F2", "count": 1} for touched in ("Cube/F1", "dots")
     ]
-    assert [line["number"] for line in found["worst"][:3]] == [6, 7, 8]
-    assert found["reasons"] == {"ambiguous": 2}
+    assert [line["number"] for line in found["worst"][:3]] == [6, 9, 7]
+    assert found["reasons"] == {"ambiguous": 3}
     states = [line["state"] for line in found["verdict"]]
     assert states == ["fails", UNTOLD, "holds", "holds", UNTOLD]
     bounds = [str(bound_from(line)) for line in found["verdict"]]
-    assert bounds[0] == (
-        "wrong answers, all touches: 1 of 10, 10.000% (0.253% ... 44.502%), bound = 0.0%"
-    )
     assert bounds[2].endswith("mismatch: 0.050 mm (0.050 ... 0.050), bound <= 0.1 mm")
     assert bounds[4].endswith("(59.038% ... 100.000%), bound within 90.0% ... 98.0%")
     result = result_from(found, 1.25, tmp_path)
     assert (result.holds, result.fair, result.fair_right) == (False, 9, 7)
-    assert str(result).startswith("10 touches: 7 right, 1 wrong, 2 refused; pose 0.15")
+    assert str(result).startswith("12 touches: 7 right, 2 wrong, 3 refused; pose 0.15")
     json.dumps(found, allow_nan=False)
 
 
-def test_a_bound_is_told_by_enough_touches_alone(columns):
-    few, many = ([row(i) for i in range(n)] for n in (20, 800))
-    below = [row(i, "right" if i < 790 else "rejected") for i in range(800)]
+@pytest.mark.parametrize(
+    ("of", "missed", "state"),
+    [(20, 0, UNTOLD), (800, 0, "holds"), (800, 10, "fails"), (24, 1, UNTOLD), (24, 3, "fails")],
+)
+def test_a_bound_is_told_by_enough_touches_alone(columns, of, missed, state):
     # the exact interval of n of n begins at .025 ** (1 / n): .995 takes 736 touches
-    states = [results_of(columns(rows))["verdict"][1]["state"] for rows in (few, many, below)]
-    assert states == [UNTOLD, "holds", "fails"]
-
-
-@pytest.mark.parametrize(("missed", "state"), [(0, UNTOLD), (1, UNTOLD), (3, "fails")])
-def test_lines_by_face_kind_and_level_fail_only_where_the_interval_does(columns, missed, state):
-    # exact: 23 of 24 reaches 99.9 %, 21 of 24 only 97.3 %
-    found = results_of(columns([row(i, "rejected" if i < missed else "right") for i in range(24)]))
-    lines = [found[part][0] for part in ("kinds", "worlds", "levels")]
+    found = results_of(columns([row(i, "rejected" if i < missed else "right") for i in range(of)]))
+    lines = [*(found[part][0] for part in ("kinds", "worlds", "levels"))]
+    assert found["verdict"][1]["state"] == state
     assert {line["state"] for line in [*lines, *found["objects"]["faces"]]} == {state}
 
 
-def test_a_line_of_what_nobody_knows_has_no_state_and_a_wrong_answer_fails(line):
-    assert line([foreign(0)])["state"] == ""
-    assert line([row(0), row(1, "wrong")])["state"] == "fails"
+@pytest.mark.parametrize(
+    ("of", "factor", "state"), [(200, 1, UNTOLD), (20, 1, UNTOLD), (200, 2, "fails")]
+)
+def test_a_bound_of_errors_is_judged_by_their_interval(columns, of, factor, state):
+    errors = np.hypot(*np.random.default_rng(1).normal(0, 0.075, (2, 200)))  # .106 mm rms
+    rows = [row(i, error_mm=factor * error) for i, error in enumerate(errors[:of])]
+    place = results_of(columns(rows))["verdict"][2]
+    assert (place["low"] < 0.1 < place["high"]) == (state == UNTOLD)
+    assert place["state"] == state
 
 
 def test_a_face_is_bad_where_a_bound_fails_or_hardly_a_touch_is_answered(columns):
@@ -150,54 +151,8 @@ def test_a_face_is_bad_where_a_bound_fails_or_hardly_a_touch_is_answered(columns
     ] == [True, False, False, True]
 
 
-def test_errors_have_intervals_and_few_of_them_tell_nothing(columns, line):
-    one = line([row(0, error_mm=0.2)])
-    assert (one["rms_mm"], one["rms_mm_95"]) == (0.2, [0.0, None])
-    rng = np.random.default_rng(1)
-    errors = np.hypot(*rng.normal(0, 0.075, (2, 200)))  # .106 mm rms, bound .1
-    for of, factor, state in ((200, 1, UNTOLD), (20, 1, UNTOLD), (200, 2, "fails")):
-        rows = [row(i, error_mm=factor * error) for i, error in enumerate(errors[:of])]
-        place = results_of(columns(rows))["verdict"][2]
-        assert (place["low"] < 0.1 < place["high"]) == (state == UNTOLD)
-        assert place["state"] == state
-
-
-def test_touches_drawn_anew_are_counted_where_somebody_did(columns):
-    held = columns([row(i) for i in range(3)])
-    everything, told = np.ones(3, bool), ["", "slipped off | no rest", "no rest"]
-    for texts, where, count in ((told, everything, 3), (told, np.array([True, False, True]), 1),
-                                ([None] * 3, everything, None)):  # fmt: skip
-        with_texts = held | {"drawn_anew": np.array(texts, object)}
-        assert line_of(with_texts, where)["drawn_anew"] == count
-
-
-def test_a_wrong_answer_on_a_foreign_surface_is_named(columns):
-    strange = foreign(1, "wrong", kind="foreign", surface="dots")
-    found = results_of(columns([row(0), strange]))
-    assert found["objects"]["confused"] == [{"touched": "dots", "answered": "Box/F2", "count": 1}]
-
-
-def test_copies_stand_in_the_order_of_their_numbers(columns):
-    copies = [("Box-10", "F2"), ("Box-2", "F10"), ("Box-2", "F9"), ("Box-1", "F1")]
-    rows = [row(i, object=name, face=face) for i, (name, face) in enumerate(copies)]
-    found = results_of(columns(rows))["objects"]
-    assert found["names"] == ["Box-1", "Box-2", "Box-10"]
-    faces = [(line["object"], line["face"]) for line in found["faces"]]
-    assert faces == [("Box-1", "F1"), ("Box-2", "F9"), ("Box-2", "F10"), ("Box-10", "F2")]
-
-
-def test_a_shard_is_there_when_it_is_whole(tmp_path):
-    series = series_of(Campaign(5, shard=3))[0]
-    write_shard(tmp_path, series.name, 1, [row(4), row(3)], spent(4, 3))
-    assert done_shards(tmp_path, series) == {1}
-    table = pq.read_table(shard_file(tmp_path, series.name, 1))
-    assert table.column("number").to_pylist() == [3, 4]
-    assert len([path for path in tmp_path.rglob("*") if path.is_file()]) == 2
-
-
 def test_touches_of_a_version_that_counted_less_are_read_and_others_refused(tmp_path):
-    series = series_of(Campaign(2))[0]
-    write_shard(tmp_path, series.name, 0, [row(0), row(1)], spent(0, 1))
+    series = write(tmp_path, [row(0), row(1)])
     file = shard_file(tmp_path, series.name, 0)
     whole = pq.read_table(file)
     for name in ADDED:
@@ -234,3 +189,48 @@ def test_stiff_and_extreme_scenes_are_finite_or_refused():
     assert {line["outcome"] for line in lines} == {"finite", "refused"}
     failed = [line["case"] for line in lines if not line["passes"]]
     assert set(failed) <= {"place that is no number"}
+
+
+def test_names_of_crowded_points_do_not_overlap():
+    rng = np.random.default_rng(1)
+    figure = Figure(figsize=(5.5, 4.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    points = [
+        (float(x), float(y), f"more of {k}") for k, (x, y) in enumerate(rng.normal(0, 1, (14, 2)))
+    ]
+    points += [(0.0, 0.0, "one"), (0.0, 0.0, "its double"), (np.nan, 1.0, "no number")]
+    axes.plot(*zip(*[point[:2] for point in points], strict=True), "o")
+    axes.margins(0.3)
+    texts = label_points(axes, points)
+    assert {text.get_text() for text in texts} == {name for *_, name in points} - {"no number"}
+    figure.draw_without_rendering()
+    boxes, frame = [text.get_window_extent() for text in texts], axes.get_window_extent()
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    assert all(frame.padded(1).containsx(x) for box in boxes for x in box.intervalx)
+    assert all(frame.padded(1).containsy(y) for box in boxes for y in box.intervaly)
+
+
+def drawn(**touches):
+    """A face of 40 x 40 mm with touches by their verdicts, at 2 px a mm."""
+    by = {verdict: np.array(at, float).reshape(-1, 2) for verdict, at in touches.items()}
+    corners = np.array([[0, 0], [40, 0], [40, 40], [0, 40]], float)
+    return draw_flat([FlatFace("F<1>", (corners,), np.array([[20.0, 20.0]]), by, False)], 2.0)
+
+
+def test_a_face_drawn_flat_has_a_dot_for_each_touch_where_it_was():
+    svg = drawn(right=[(10, 30)], rejected=[(0, 0), (40, 40)])
+    assert "F&lt;1&gt;" in svg
+    assert "1 right, 2 refused" in svg
+    dots = re.findall(r'd="((?:M[\d.]+ [\d.]+h.01)+)" fill="none" stroke="(#\w+)"', svg)
+    at = {colour: re.findall(r"M([\d.]+) ([\d.]+)", path) for path, colour in dots}
+    assert at["#c9ced6"] == [("40.0", "70.0")]  # 30 px of title, y up
+    assert at["#2a7f62"] == [("20.0", "50.0")]
+    assert at["#d98c00"] == [("0.0", "110.0"), ("80.0", "30.0")]
+
+
+def test_many_right_touches_are_thinned_and_no_refused_one():
+    many = np.random.default_rng(1).uniform(0, 40, (2000, 2))
+    svg = drawn(right=many, rejected=many[:400])
+    assert "2000 right, 400 refused" in svg
+    assert svg.count("h.01") == 1 + 150 + 400

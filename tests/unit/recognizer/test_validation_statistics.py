@@ -25,7 +25,6 @@ from recognizer.validation.statistics import (
     clopper_pearson,
     normalised_errors,
     rms_interval,
-    round_digits,
     share_of,
     state_of,
 )
@@ -75,26 +74,15 @@ def test_an_honest_covariance_is_calibrated_and_a_proud_one_is_not():
     assert (none["of"], none["mean"], none["high"]) == (0, None, None)
 
 
-def test_numbers_are_rounded_to_six_digits_and_nothing_counted_says_nothing():
-    assert round_digits(1234567.0) == 1234570.0
-    assert math.copysign(1, round_digits(-0.0)) == 1
-    assert math.isnan(round_digits(math.nan))
-    none = share_of(0, 0)
-    assert (none["share"], none["low"], none["high"]) == (None, 0.0, 1.0)
-
-
 @pytest.mark.parametrize(
     ("low", "high", "sign", "bounds", "state"),
     [
         (0.91, 0.97, "within", (0.90, 0.98), "holds"),
         (0.89, 0.97, "within", (0.90, 0.98), "too few touches to tell"),
-        (0.91, 0.99, "within", (0.90, 0.98), "too few touches to tell"),
         (0.981, 0.999, "within", (0.90, 0.98), "fails"),
-        (0.60, 0.899, "within", (0.90, 0.98), "fails"),
         (0.0, None, "<=", (0.1,), "too few touches to tell"),
         (0.11, None, "<=", (0.1,), "fails"),
         (0.02, 0.1, "<=", (0.1,), "holds"),
-        (0.2, 0.4, ">=", (0.95,), "fails"),
         (0.95, 1.0, ">=", (0.95,), "holds"),
     ],
 )
@@ -117,13 +105,10 @@ def test_comparison_calls_chance_chance():
     [
         ("face=3, edge", (("face", 0.75), ("edge", 0.25))),
         ("face=1,edge=0", (("face", 1.0),)),
-        ("faces", "'faces' is not known"),
         ("face,face", "stands twice"),
         ("face=-1", "'-1'"),
-        ("face=much", "'much'"),
         ("face=nan", "'nan'"),
         ("face=0", "nothing is left"),
-        ("", "nothing is left"),
     ],
 )
 def test_shares_are_read_from_options(text, shares):
@@ -146,30 +131,28 @@ def test_kinds_come_in_their_shares_and_from_the_number_alone():
     assert "blank" not in strange
     other = Work(Campaign(80, seed=3), "lab.db")
     assert other.plan(series_of(other.campaign)[0], 77) == drawn[77]
+    assert [campaign_of({"touches": n}, None).study for n in (199, 200)] == [0, 200]
 
 
-@pytest.mark.parametrize("engine", ["own", "mujoco"])
-def test_prints_are_parts_of_the_set(engine):
-    printed = {"surfaces": PRINTED, "engine": engine}
-    kept = dict(campaign_of(printed, None).kinds)
+def test_prints_are_parts_of_the_set():
+    kept = dict(campaign_of({"surfaces": PRINTED}, None).kinds)
     assert sum(kept.values()) == pytest.approx(1.0)
     assert kept["face"] / kept["edge"] == pytest.approx(5.5)
     assert not {"blank", "foreign"} & set(kept)
-    with pytest.raises(ValidationError, match="not blank, foreign"):
-        campaign_of(printed | {"kinds": "face,blank,foreign"}, None)
-    assert campaign_of(printed | {"kinds": "edge"}, None).kinds == (("edge", 1.0),)
 
 
-def test_an_engine_touches_by_the_overlays_it_knows():
-    assert campaign_of({"engine": "mujoco", "surfaces": "database"}, None).kinds == KINDS
-    assert campaign_of({"overlay": "pad"}, None).sensor.overlay.kind == "pad"
-    with pytest.raises(ValidationError, match="mujoco does not know the overlay pad"):
-        campaign_of({"engine": "mujoco", "overlay": "pad"}, None)
-
-
-def test_a_study_has_two_hundred_touches_or_none():
-    chosen = [campaign_of({"touches": touches}, None) for touches in (4, 199, 200, 100_000)]
-    assert [one.study for one in chosen] == [0, 0, 200, 200]
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"surfaces": PRINTED, "kinds": "face,blank,foreign"}, "not blank, foreign"),
+        ({"engine": "mujoco", "overlay": "pad"}, "mujoco does not know the overlay pad"),
+    ],
+)
+def test_what_cannot_be_touched_is_refused(asked, said):
+    with pytest.raises(ValidationError, match=said):
+        campaign_of(asked, None)
+    with pytest.raises(ValidationError, match="copy, small need objects of their own"):
+        refuse_without_specs(["face", "copy", "small"])
 
 
 @pytest.mark.parametrize("touches", [1, 24, 25, 999, 1000, 1001, 2530])
@@ -188,9 +171,3 @@ def test_members_of_a_kind_are_touched_by_their_kind_alone():
     names = {"Cube-1": "face"} | {f"{name}-3": kind for kind, name in EXTRA.items()}
     for name, own in names.items():
         assert [kind for kind in ("face", *EXTRA) if is_extra(name, kind)] == [own]
-
-
-def test_nothing_is_registered_in_a_database_that_is_only_named():
-    refuse_without_specs(["face", "side", "same_profile"])
-    with pytest.raises(ValidationError, match="copy, small need objects of their own"):
-        refuse_without_specs(["face", "copy", "small"])
