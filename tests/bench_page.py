@@ -35,6 +35,13 @@ SETTLED = """() => new Promise((done) => {
       else requestAnimationFrame(look);
     };
     requestAnimationFrame(look); })"""
+#: Notes every picture: touch, state, lit face, answer, pose, ms since the one before.
+WATCH = """() => { window.seen = []; let before = performance.now(); const look = () => {
+    const now = performance.now();
+    window.seen.push([bench.touch, bench.state, bench.lit,
+      document.getElementById('answer').innerText, document.getElementById('pose').innerText,
+      now - before]);
+    before = now; requestAnimationFrame(look); }; look(); }"""
 expect.set_options(timeout=PATIENCE_MS)
 
 

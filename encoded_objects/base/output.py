@@ -29,6 +29,11 @@ def write_json(value: Any, *, line: bool = False) -> None:
     write(json.dumps(json_value(value), indent=None if line else 2, allow_nan=False))
 
 
+def three_digits(value: float) -> str:
+    """Return a number to three digits, never by a power of ten: 12.3, 1230."""
+    return f"{float(f'{value:.3g}'):g}"
+
+
 def version(name: str, *, as_json: bool, **parts: str) -> None:
     """Say which version this is, and of parts which one is in use."""
     from encoded_objects import __version__

@@ -108,7 +108,7 @@ def _face_lines(reports: Sequence[FaceReport]) -> list[str]:
         if face.smallest_mm is None:
             continue
         size, least = (
-            " x ".join(f"{v:.3g}" for v in each) for each in (face.size_mm, face.smallest_mm)
+            " x ".join(map(output.three_digits, each)) for each in (face.size_mm, face.smallest_mm)
         )
         answered = ""
         if face.promise is not None:

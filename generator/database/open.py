@@ -134,11 +134,14 @@ def check_place(path: Path) -> None:
         fix = f"name a file in it, such as {path / 'lab.db'}"
         raise DatabaseError("this is a folder, not a database file", fix=fix, place=place)
     try:
-        if os.path.lexists(path):  # also a link that leads nowhere: SQLite would make its target
-            regular_size(path)
+        # also a link that leads nowhere: SQLite would make its target
+        size = regular_size(path) if os.path.lexists(path) else 0
     except OSError as error:
         cause = f"this is no database: {error.strerror}"
         raise DatabaseError(cause, fix="name a file, such as lab.db", place=place) from error
+    if size == 1:  # which SQLite takes for an empty database
+        fix = "name another file, or move this one away"
+        raise DatabaseError("this file is not a database", fix=fix, place=place)
 
 
 def _sqlite_engine(url: URL, path: Path, writable: bool, wait_s: float) -> Engine:

@@ -46,7 +46,7 @@ from generator.layout.sensor_view import (
     symbol_half_mm,
 )
 from generator.polyhedron.development import development
-from generator.polyhedron.frame import face_area, face_frame, face_polygon
+from generator.polyhedron.frame import face_frame, face_polygon, surface_areas
 from generator.polyhedron.winged import Polyhedron
 
 LOW = 0.5  #: share of touches under which a face is named: `validate-set` calls it no use
@@ -218,17 +218,16 @@ def part_rate(
     """Return the rate of a whole part from those of its faces by name; None: none was measured."""
     if not any(rates.values()):
         return None
-    facets = {surface.carrier: surface.facets for surface in polyhedron.surfaces}
-    area = [face_area(polyhedron, face) for face in range(len(polyhedron.faces))]
+    areas = surface_areas(polyhedron)
     once, within, encoded = 0.0, 0.0, 0.0
     for face in faces:
         if len(face.labels):
-            own = sum(area[facet] for facet in facets.get(face.face, (face.face,)))
+            own = areas[face.face]
             encoded += own
             rate = rates[polyhedron.faces[face.face].name] or RecognitionRate(0.0, 0.0)
             once += own * rate.at_once
             within += own * (math.nan if rate.within_three is None else rate.within_three)
-    whole = sum(area)
+    whole = sum(areas.values())
     later = None if math.isnan(within) else _to_three_places(within / whole)
     shares = _to_three_places(once / whole), later, _to_three_places(encoded / whole)
     return PartRate(*shares, one_side=polyhedron.kind == "tag" and encoded > 0.0)

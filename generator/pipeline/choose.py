@@ -5,7 +5,8 @@ the objects fit together with what the database holds, an empty one with room fo
 or `large`, by the sensor type, and the next sizes. Registered objects keep their array, and their
 pitch unless they are made again from a changed spec; those that came from another lab keep that
 lab's array, and a lab goes on with the arrays that it has. Finer symbols are taken where the
-printer makes them and they show places on faces that would stay blank.
+printer makes them and they show places on faces that would stay blank, if these are more than a
+small part of an object's surface: a fillet does not set the pitch of the whole part.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import ObjectPlan, plan_objects
-from generator.polyhedron import Polyhedron
+from generator.polyhedron import Polyhedron, surface_areas
 from generator.spec import ObjectSpec
 from generator.spec.problem import error_location
 from generator.spec.read import with_profile
@@ -43,6 +44,8 @@ from generator.spec.resolved import AUTO
 LARGER = 4  # sizes tried beyond `large`
 FINER_SHARES = (0.9, 0.8)
 """Pitches tried where faces stay blank, over the one the sensor proposes: 4.5 and 4 mm."""
+LEAST_SHOWN = 0.05
+"""Of an object's surface that finer symbols must show besides."""
 FIRST = 0.5  # of an array's room that its first objects may fill
 
 
@@ -179,7 +182,7 @@ def choose_array(
                 f"profile {candidate.name} is taken ({window}): {why}" for why in short[-1:]
             )
             choice = ArrayChoice(plans, notes, alone)
-            return _choose_finer(choice, room, solid) if _blank(plans, alone) else choice
+            return _choose_finer(choice, room, solid) if any(_blank(plans, alone)) else choice
     raise LayoutError(
         f"the objects fit no array that is made here: {short[-1]}",
         fix="make them in several databases",
@@ -188,8 +191,7 @@ def choose_array(
 
 def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> ArrayChoice:
     """Take finer symbols on the same array where they show faces that stay blank otherwise."""
-    shown = sum(len(plan.polyhedron.faces) - len(plan.blank_faces) for plan in coarse.plans)
-    blank = left = _blank(coarse.plans, coarse.alone) if coarse.alone else shown
+    blank = left = _blank(coarse.plans, coarse.alone)
     found, specs = coarse, [plan.spec for plan in coarse.plans]
     for share in FINER_SHARES:
         try:
@@ -205,10 +207,19 @@ def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> A
             continue
         if alone is None or _cells(alone) > room:
             continue
-        if (now := _blank(plans, alone)) < left:
-            faces = f"{blank - now} of the {blank} faces that coarser symbols leave blank"
+        now = _blank(plans, alone)
+        shown = max(
+            (sum(before.values()) - sum(after.values()))
+            / sum(surface_areas(plan.polyhedron).values())
+            for plan, before, after in zip(plans, left, now, strict=True)
+        )
+        if shown >= LEAST_SHOWN:
+            faces, of = (sum(map(len, one)) for one in (now, blank))
             pitch = _share_mm(share, specs[0])
-            note = f"pitch {pitch:g} mm is taken: it shows places on {faces}"
+            note = (
+                f"pitch {pitch:g} mm is taken: it shows places on {of - faces} of the {of} faces "
+                "that coarser symbols leave blank"
+            )
             found, left = ArrayChoice(plans, (*coarse.notes, note), alone), now
     return found
 
@@ -307,10 +318,17 @@ def _cells(layouts: Sequence[Layout]) -> int:
     return sum(len(face.labels) for layout in layouts for face in layout.faces)
 
 
-def _blank(plans: Sequence[ObjectPlan], layouts: Sequence[Layout]) -> int:
-    """Return how many faces could carry symbols and show none."""
-    pairs = zip(plans, layouts, strict=True)
-    return sum(len(set(layout.blank_faces) - plan.blank_faces) for plan, layout in pairs)
+def _blank(plans: Sequence[ObjectPlan], layouts: Sequence[Layout]) -> list[dict[int, float]]:
+    """Return the area (mm^2) of each face that could carry symbols and shows none, by object.
+
+    Without layouts no face shows any.
+    """
+    blank = []
+    for number, plan in enumerate(plans):
+        areas = surface_areas(plan.polyhedron)
+        faces = layouts[number].blank_faces if layouts else areas.keys()
+        blank.append({face: areas[face] for face in set(faces) - plan.blank_faces})
+    return blank
 
 
 def _room(array: SymbolArray, connection: Connection | None) -> int:

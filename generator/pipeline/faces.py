@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from encoded_objects.base.output import three_digits
 from generator.alphabet.outline import SymbolStyle, footprint_half_mm
 from generator.layout.blank import extent_mm, smallest_mm
 from generator.layout.footprint import Points, Region, region_of
@@ -115,8 +116,8 @@ def _place(polyhedron: Polyhedron, face: int, size: Size, kind: str) -> str:
     elif np.ptp(corners[:, axis]) < 1e-6 * np.ptp(polyhedron.vertices):
         where = f"at {'xyz'[axis]} = {middle[axis] + 0.0:.4g}"
     else:
-        where = "about ({})".format(", ".join(f"{value + 0.0:.3g}" for value in middle))
-    return f"the {width:.3g} x {height:.3g} mm face {where}"
+        where = f"about ({', '.join(three_digits(value + 0.0) for value in middle)})"
+    return f"the {three_digits(width)} x {three_digits(height)} mm face {where}"
 
 
 def _rates(plan: ObjectPlan, layout: Layout) -> dict[int, RecognitionRate]:
@@ -152,7 +153,9 @@ def _remedy(plan: ObjectPlan, loops: Loops, face: int, least: float) -> str:
     found = []
     width, factor = _wider(plan, loops, region, least)
     if width:
-        found.append(f"{math.ceil(width * factor - 1e-9):g} mm wide instead of {width:.3g}")
+        found.append(
+            f"{math.ceil(width * factor - 1e-9):g} mm wide instead of {three_digits(width)}"
+        )
     elif more := _thicker(plan, loops, plan.clearances_mm[face], least):
         found.append(f"{more:g} mm wider all along")
     for usual in PITCHES_MM:

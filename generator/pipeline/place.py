@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from sqlalchemy import Connection
 
+from encoded_objects.base.output import three_digits
 from generator.database.cells import cells_of, find_array, occupancy
 from generator.database.open import part_path
 from generator.database.read import find_object, read_layout, read_object
@@ -170,7 +171,7 @@ def lay_out_object(plan: ObjectPlan, others: Occupancy | Cells) -> Layout:
         if plan.spec.shape.file is None or max(size) > SMALL_MODEL_MM:
             raise
         fix = (
-            f"check the model's unit: it is {' x '.join(f'{v:.3g}' for v in size)} mm; in inches "
+            f"check the model's unit: it is {' x '.join(map(three_digits, size))} mm; in inches "
             "it needs scale: 25.4, in metres 1000"
         )
         raise LayoutError(error.cause, fix=fix, place=error.place) from None

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from encoded_objects.base.output import three_digits
 from encoded_objects.base.sensor_type import force_share
 from generator.export.bed import Plate
 from generator.export.drawing import (
@@ -198,8 +199,8 @@ def _card(plan: ObjectPlan, part: Part, face: int) -> Figure:
             ends = polyhedron.vertices[[edge.start, edge.end]]
             edges.append((str(number + 1), (ends @ inverse[:3, :3].T + inverse[:3, 3])[:, :2]))
     mark = _mark(part)
-    x, y, z = np.ptp(np.array(box(part)), axis=0).tolist()
-    size = f"{x:.3g} x {y:.3g} x {z:.3g} mm"
+    sides = np.ptp(np.array(box(part)), axis=0).tolist()
+    size = f"{' x '.join(map(three_digits, sides))} mm"
     drawings = draw_front(part, edges) + draw_back(part)
     return Figure(drawings, size, part.name, mark or "no mark", small=True)
 

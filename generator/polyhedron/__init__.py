@@ -11,6 +11,7 @@ from generator.polyhedron.frame import (
     face_normal,
     face_polygon,
     side_of_face,
+    surface_areas,
     volume,
 )
 from generator.polyhedron.shapes import SHAPES
@@ -30,5 +31,6 @@ __all__ = [
     "face_polygon",
     "polyhedron",
     "side_of_face",
+    "surface_areas",
     "volume",
 ]

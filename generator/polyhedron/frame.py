@@ -45,6 +45,14 @@ def face_area(polyhedron: Polyhedron, face: int) -> float:
     return sum(signed_area(loop) for loop in face_polygon(polyhedron, face))
 
 
+def surface_areas(polyhedron: Polyhedron) -> dict[int, float]:
+    """Return the areas (mm^2) of flat faces by number, of round ones (all facets) by carrier."""
+    areas = {face: face_area(polyhedron, face) for face in range(len(polyhedron.faces))}
+    for surface in polyhedron.surfaces:
+        areas[surface.carrier] = sum(areas.pop(facet) for facet in surface.facets)
+    return areas
+
+
 def face_normal(polyhedron: Polyhedron, face: int) -> Matrix:
     """Return the outward unit normal of a face (3,), object frame: Newell's, over all corners."""
     normal = area_vector(polyhedron.vertices[list(polyhedron.faces[face].loops[0])])

@@ -61,6 +61,7 @@ FLANGES = {
 FIT_MM = 0.2  #: that a hole is wider than the magnet, pin or rod in it: prints come out small
 WALL_MM = 1.2  #: least plastic around a hole: three beads of .4 mm
 SKIN_MM = 0.8  #: least plastic over a pocket: four layers of .2 mm
+LEAST_MM = 1.0  #: diameter of a hole that prints
 LAND_MM = 0.4  #: least depth of a clearance hole under a countersink
 SEAT = 1.5  #: plastic under a screw's head, in diameters of its thread
 INSET_MM = 2.0  #: from the edges of a face to the holes in its corners
@@ -185,7 +186,12 @@ class _Space:
         )
 
     def require_room(self, bore: Bore) -> None:
-        """Refuse a hole that leaves the face."""
+        """Refuse a hole that leaves the face, or is too narrow to be printed."""
+        if 2 * bore.profile[0][1] < LEAST_MM:
+            raise ShapeError(
+                f"a hole of {2 * bore.profile[0][1]:g} mm is too narrow to be printed",
+                fix=f"write {LEAST_MM:g} mm or more",
+            )
         edge = bore.centre + (bore.profile[0][1] + WALL_MM) * _circle(64)
         if not points_inside(edge, self.outline).all():
             raise self.too_small(bore)

@@ -30,15 +30,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))
 import runner
 from bench_loads import cpu_s, memory_mb
-from bench_page import CHROMIUM, FLAGS, opened, rest, running, touched
+from bench_page import CHROMIUM, FLAGS, WATCH, opened, rest, running, touched
 
 STATIC = Path(__file__).parents[2] / "recognizer" / "bench" / "static"
-WATCH = """() => { window.seen = []; let before = performance.now(); const look = () => {
-    const now = performance.now();
-    window.seen.push([bench.touch, bench.state, bench.lit,
-      document.getElementById('answer').innerText, document.getElementById('pose').innerText,
-      now - before]);
-    before = now; requestAnimationFrame(look); }; look(); }"""
 
 
 @contextmanager

@@ -23,16 +23,19 @@ import json
 import math
 import sys
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import runner
 
+from recognizer.validation.statistics import clopper_pearson
+
 SPECS = Path("docs/validation")
 SUMMARY = "million.json"  #: of the worlds that are finished
 COUNTS = ("touches", "on_faces", "right", "wrong")
+GROUPS = ("kind", "level")
 #: What is kept of a wrong answer.
 WRONG = ("number", "kind", "level", "object", "face", "x_mm", "y_mm", "theta_deg", "force_n",
          "tilt_deg", "edge_mm", "answer", "margin")  # fmt: skip
@@ -129,11 +132,21 @@ def touch(name: str, asked: argparse.Namespace) -> None:
                "--study", 0, "--resume", *workers, "-o", folder)  # fmt: skip
 
 
+def counts_of(rows: Iterable[runner.Row]) -> dict[str, int]:
+    """Return how many touches there are, on registered faces, and answered right and wrong."""
+    found = list(rows)
+    verdicts = [row["verdict"] for row in found]
+    return {"touches": len(found), "on_faces": sum(row["object"] != "" for row in found),
+            **{name: verdicts.count(name) for name in ("right", "wrong")}}  # fmt: skip
+
+
 def line_of(rows: list[runner.Row]) -> dict[str, Any]:
     """Return what became of the touches of a world."""
     found = runner.outcome(rows)
-    line = {"touches": len(rows), "on_faces": sum(row["object"] != "" for row in rows),
-            "right": found["right"], "wrong": found["wrong"]}  # fmt: skip
+    line: dict[str, Any] = counts_of(rows)
+    for group in GROUPS:
+        names = sorted({row[group] for row in rows})
+        line[group] = {name: counts_of(row for row in rows if row[group] == name) for name in names}
     for name, digits in (("rms_mm", 4), ("worst_mm", 3), ("inside", 4)):
         if not math.isnan(found[name]):
             line[name] = round(found[name], digits)
@@ -156,12 +169,24 @@ def all_of(lines: Collection[dict[str, Any]]) -> dict[str, Any]:
 
 
 def table(lines: Mapping[str, dict[str, Any]]) -> None:
-    """Print what became of all touches, as Markdown."""
-    runner.table(("world", "touches", "on faces", "right", "wrong", "rms mm", "inside"))
-    for name, line in lines.items():
+    """Print what became of all touches, by world, kind and level, as Markdown."""
+    heads = ("touches", "on faces", "right", "wrong", "95 % of wrong")
+    runner.table(("world", *heads, "rms mm", "inside"))
+    for name, line in {**lines, "all": all_of(lines.values())}.items():
         inside = f"{100 * line['inside']:.0f} %" if "inside" in line else ""
-        counts = (f"{line[key]:,}" for key in COUNTS)
-        runner.row(name, *counts, str(line.get("rms_mm", "")), inside)
+        runner.row(name, *_cells(line), str(line.get("rms_mm", "")), inside)
+    for group in GROUPS:
+        print()
+        runner.table((group, *heads))
+        every = [line.get(group, {}) for line in lines.values()]
+        for name in sorted(set().union(*every)):
+            runner.row(name, *_cells(all_of([one[name] for one in every if name in one])))
+
+
+def _cells(line: Mapping[str, Any]) -> list[str]:
+    """Return the counts, and the exact interval of the share that is wrong."""
+    low, high = clopper_pearson(line["wrong"], line["touches"])
+    return [*(f"{line[key]:,}" for key in COUNTS), f"{100 * low:.2g}-{100 * high:.2g} %"]
 
 
 def run(asked: argparse.Namespace, finished: dict[str, dict[str, Any]]) -> None:
@@ -194,11 +219,11 @@ def main() -> int:
             return 130
     lines = {}
     for name in WORLDS:
-        if name in finished:
-            lines[name] = finished[name]
-        elif rows := runner.rows_of(asked.output / name):
+        if rows := runner.rows_of(asked.output / name):
             lines[name] = line_of(rows)
-    table({**lines, "all": all_of(lines.values())})
+        elif name in finished:
+            lines[name] = finished[name]
+    table(lines)
     return 0
 
 

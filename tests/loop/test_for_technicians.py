@@ -96,6 +96,17 @@ def test_a_random_touch_that_finds_no_rest_is_drawn_again(tmp_path):
     assert probe.drawn_again > 0
 
 
+def test_a_touch_that_meets_a_wall_in_front_of_its_face_says_so(tmp_path, monkeypatch, ask):
+    monkeypatch.chdir(tmp_path)
+    base = manifold3d.Manifold.cube([60, 60, 10])
+    write_stl(tmp_path / "corner.stl", base + manifold3d.Manifold.cube([10, 60, 60]))
+    encode("corner.stl", name="Corner", database="lab.db", formats=("stl",))
+    for y, met in ((20, False), (46, True)):
+        code, _, said = ask(probe_sensor, "simulate", "lab.db#Corner/F3", "--x", 30, "--y", y)
+        assert code == 0
+        assert ("1 touch met another face of the part, 48" in said) == met
+
+
 def test_a_scan_of_a_recording_says_its_news_and_its_answer(here, ask):
     touches = ("simulate", f"{here}#Cube/F1", "--scan", "raster", "--touches", 6, "-o", "s.h5")
     assert ask(probe_sensor, *touches)[0] == 0

@@ -9,7 +9,7 @@ import httpx
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from bench_page import PATIENCE_MS, opened, rest, settle, shown, touched, until
+from bench_page import PATIENCE_MS, WATCH, opened, rest, settle, shown, touched, until
 from playwright.sync_api import expect
 
 from probe.recording.read import Recording
@@ -49,12 +49,6 @@ def test_a_click_touches_there_and_the_face_is_lit(page):
     assert np.allclose(*asked_and_read(page), atol=0.5)
 
 
-WATCH = """() => { window.seen = []; const look = () => {
-    window.seen.push([bench.touch, bench.state, bench.contact, bench.lit,
-      document.getElementById('answer').innerText, document.getElementById('pose').innerText]);
-    if (window.seen.length < 5000) requestAnimationFrame(look); }; look(); }"""
-
-
 def test_no_picture_shows_the_last_answer_for_a_new_touch(page):
     assert touched(page).startswith("Cube")
     rest(page)
@@ -65,7 +59,7 @@ def test_no_picture_shows_the_last_answer_for_a_new_touch(page):
         rest(page)
     new = [one for one in page.evaluate("window.seen") if one[0] > first]
     assert len({one[0] for one in new}) == 2
-    before = [one[3:] for one in new if one[1] in ("felt", "reading")]
+    before = [one[2:5] for one in new if one[1] in ("felt", "reading")]
     assert before, "no picture of a touch that was not read yet"
     for lit, answer, pose in before:
         assert (lit, pose, "Cube" in answer) == ("", "", False)

@@ -22,7 +22,7 @@ from probe.recording.read import Recording
 
 @pytest.fixture(scope="module")
 def bench(served):
-    with served("--port", "touch:?hold=0.4") as address:
+    with served("--port", "touch:?hold=0.4&rate=60") as address:
         yield address
 
 

@@ -15,8 +15,8 @@ from playwright.sync_api import expect
 def process_of(lab, port=0):
     """Run a server at a port, 0: any; yields its address and its process."""
     return running(
-        "--database", lab / "lab.db", "--folder", lab / "recordings", "--port", "touch:?hold=0.6",
-        "--web-port", port,
+        "--database", lab / "lab.db", "--folder", lab / "recordings",
+        "--port", "touch:?hold=0.6&rate=60", "--web-port", port,
     )  # fmt: skip
 
 

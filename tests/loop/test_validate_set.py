@@ -90,18 +90,15 @@ def test_what_it_prints_and_leaves(reference):
     assert rows["number"] == list(range(TOUCHES))
     for verdict in ("right", "wrong", "rejected"):
         assert printed[verdict] == rows["verdict"].count(verdict)
-    assert printed["touches"] == TOUCHES
-    assert printed["right"] > 0
+    assert (printed["touches"], printed["right"] > 0, printed["seconds"] > 0) == (18, True, True)
     assert printed["rms_mm"] < 0.5
     assert printed["rms_deg"] < 2
-    assert printed["seconds"] > 0
     told = (folder / "results.json").read_text() + (folder / "report.html").read_text()
     assert str(folder) not in told
     assert str(Path.home()) not in told
     assert not re.search(r"20\d\d-\d\d-\d\d[T ]", told)
     assert "utc" in json.loads((folder / "provenance.json").read_text())
-    page = (folder / "report.html").read_text()
-    assert not OUTWARD.search(page)
+    assert not OUTWARD.search((folder / "report.html").read_text())
 
 
 def test_the_page_fits_asks_for_nothing_and_prints(reference, browser):

@@ -26,9 +26,9 @@ import signal
 import sys
 import time
 import tomllib
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -48,6 +48,7 @@ LOADED = (  # third parties' modules that tests and code load
 OURS = ("encoded_objects", "generator", "decoder", "probe", "recognizer")
 LONGEST_S = 20.0  #: CPU seconds that no unit test needs; a mutant that takes longer is caught
 MOST_BYTES = 6 << 30  #: of memory
+FORKED = get_context("fork")
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,41 +144,28 @@ def _imports(file: Path, name: str) -> set[str]:
 
 def passes(watched: Watched, source: str, *, loud: bool = False) -> bool:
     """Return whether the tests pass with a module's changed source, in a process of their own."""
-    child = os.fork()
-    if child == 0:
-        os.setpgid(0, 0)
-        resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
-        resource.setrlimit(resource.RLIMIT_CPU, (int(LONGEST_S), int(LONGEST_S) + 2))
-        if not loud:
-            nothing = os.open(os.devnull, os.O_RDWR)
-            for stream in (1, 2):
-                os.dup2(nothing, stream)
-        code = 3
-        try:
-            code = _tested(watched, source)
-        except BaseException:  # noqa: BLE001  (the child ends here, whatever it was)
-            traceback.print_exc()
-        finally:
-            sys.stdout.flush()
-            os._exit(code)
-    end = time.monotonic() + 20 * LONGEST_S
+    child = FORKED.Process(target=_test_alone, args=(watched, source, loud))
+    child.start()
     try:
-        while True:
-            done, status = os.waitpid(child, os.WNOHANG)
-            if done:
-                code = os.waitstatus_to_exitcode(status)
-                if code in (4, 5):  # pytest: wrong usage, no tests
-                    raise SystemExit(f"{watched.module}: {watched.tests} cannot be run")
-                return code == 0
-            if time.monotonic() > end:
-                raise TimeoutError
-            time.sleep(0.02)
-    except (KeyboardInterrupt, TimeoutError) as stopped:
-        os.killpg(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        if isinstance(stopped, KeyboardInterrupt):
-            raise
-        return False
+        child.join(20 * LONGEST_S)
+    finally:  # late, or Ctrl-C
+        if child.is_alive():
+            os.killpg(child.pid, signal.SIGKILL)
+            child.join()
+    if child.exitcode in (4, 5):  # pytest: wrong usage, no tests
+        raise SystemExit(f"{watched.module}: {watched.tests} cannot be run")
+    return child.exitcode == 0
+
+
+def _test_alone(watched: Watched, source: str, loud: bool) -> None:
+    os.setpgid(0, 0)
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
+    resource.setrlimit(resource.RLIMIT_CPU, (int(LONGEST_S), int(LONGEST_S) + 2))
+    if not loud:
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for stream in (1, 2):
+            os.dup2(nothing, stream)
+    raise SystemExit(_tested(watched, source))
 
 
 def _tested(watched: Watched, source: str) -> int:
@@ -260,29 +248,19 @@ def run_sabotages(watched: Watched, plan: list[dict[str, str]]) -> None:
 
 def alone(run: Callable[..., None], *values: object) -> int:
     """Run a function in a process of its own; return its exit code."""
-    sys.stdout.flush()
-    child = os.fork()
-    if child == 0:
-        code: int | str | None = 1
+
+    def quietly() -> None:
         try:
             run(*values)
-            code = 0
-        except SystemExit as end:
-            code = end.code
         except KeyboardInterrupt:
-            code = 130
-        except BaseException:  # noqa: BLE001  (the child ends here, whatever it was)
-            traceback.print_exc()
-        if isinstance(code, str):
-            print(code, file=sys.stderr)
-            code = 1
-        sys.stdout.flush()
-        os._exit(code or 0)
+            raise SystemExit(130) from None
+
+    child = FORKED.Process(target=quietly)
+    child.start()
     while True:
-        try:
-            return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        except KeyboardInterrupt:  # the child has it too, and ends
-            continue
+        with contextlib.suppress(KeyboardInterrupt):  # the child has it too, and ends
+            child.join()
+            return int(child.exitcode or 0)
 
 
 def main() -> int:

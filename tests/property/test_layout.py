@@ -7,7 +7,7 @@ import pytest
 import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from random_shapes import convex_hull, extruded
+from random_shapes import random_convex, random_nonconvex
 
 from generator.array.profiles import profile
 from generator.errors import LayoutError
@@ -78,25 +78,10 @@ def test_footprints_lie_in_the_face_and_keep_every_clearance(face, window):
     assert lattice.places == (count_places(*array_cells(cells, lattice.quarter), window, None),)
 
 
-def hull(seed, points, stretch):
-    """Random convex polyhedron with triangular faces."""
-    random = np.random.default_rng(seed)
-    vertices = random.normal(size=(points, 3))
-    vertices *= 60.0 / np.linalg.norm(vertices, axis=1)[:, None]
-    vertices[:, 2] *= stretch
-    return convex_hull(vertices)
-
-
-def ell_prism(random):
-    """Prism over a random L: non-convex faces and reflex edges."""
-    a, b, c, d, h = random.uniform(25.0, 60.0, 5)
-    base = [(0, 0), (a + b, 0), (a + b, c), (a, c), (a, c + d), (0, c + d)]
-    return extruded([np.array(base)], h)
-
-
-solids = st.one_of(
-    st.builds(hull, st.integers(0, 10**6), st.integers(4, 16), st.floats(0.4, 2.5)),
-    st.builds(lambda seed: ell_prism(np.random.default_rng(seed)), st.integers(0, 10**6)),
+solids = st.builds(
+    lambda make, seed: make(np.random.default_rng(seed)),
+    st.sampled_from([random_convex, random_nonconvex]),
+    st.integers(0, 10**6),
 )
 
 

@@ -149,18 +149,6 @@ def cook(options: CookOptions, salt: Annotated[float, Option("Grams.")] = 1.5) -
     return 0 if options.dish else 1
 
 
-def run(*words: str) -> int:
-    taken.clear()
-    return console.run("do", lambda _: kitchen, list(words), bare=True)
-
-
-def test_fields_and_parameters_are_options():
-    assert run("soup", "--heat", "high", "-p", "3", "--json", "--salt", "2") == 0
-    assert taken == [(CookOptions(Path("soup"), "high", 3, as_json=True), 2.0)]
-    assert run() == 1
-    assert taken == [(CookOptions(), 1.5)]
-
-
 def test_checks_hold_for_python_too():
     with pytest.raises(UsageError, match="give low, medium or high"):
         CookOptions(heat="hot")
@@ -171,7 +159,7 @@ def test_checks_hold_for_python_too():
 @pytest.mark.parametrize(
     "words",
     [["soup"], ["--pots=4", "soup", "--salt", ".5"], ["-p", "7", "--keep-warm", "--json"],
-     ["--heat", "low", "--heat", "high"], []],
+     ["--heat", "low", "--heat", "high"], ["-p", "3", "soup", "--heat", "high"], []],
 )  # fmt: skip
 def test_a_plain_line_is_read_as_typer_reads_it(words):
     taken.clear()

@@ -103,7 +103,7 @@ def test_a_database_exists_once_it_was_made(tmp_path):
     assert "a folder" in refused(tmp_path)
 
 
-FOREIGN = [b"solid cube\nendsolid\n" * 200, b"\x00" * 5000, b"name: Cube\n"]
+FOREIGN = [b"\n", b"solid cube\nendsolid\n" * 200, b"\x00" * 5000, b"name: Cube\n"]
 SCHEMAS = ["objects (x)", "meta (version)", "meta (key TEXT, value TEXT)"]
 
 

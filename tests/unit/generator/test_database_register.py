@@ -80,6 +80,11 @@ def cube_engine(engine):
     return engine
 
 
+def test_the_same_spec_on_other_cells_is_refused(cube_engine):
+    with pytest.raises(DatabaseError, match="on other cells"):
+        register_one(cube_engine, cube_on(0, layout=layout_from(1)))
+
+
 def test_an_error_of_the_caller_undoes_everything(engine):
     def interrupted():
         with write_transaction(engine) as connection:

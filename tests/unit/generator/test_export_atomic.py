@@ -9,8 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -18,7 +16,7 @@ from generator.errors import GeneratorError
 from generator.export.atomic import Staging
 
 
-def hidden(folder: Path) -> list[str]:
+def hidden(folder):
     return [path.name for path in folder.glob(".encode-object-*")]
 
 
@@ -42,7 +40,7 @@ def test_commit_moves_all_files_and_leaves_nothing_hidden(tmp_path):
 def test_an_error_leaves_no_file_and_no_folder(tmp_path):
     folder = tmp_path / "out" / "cube"
 
-    def pieces() -> Iterator[bytes]:
+    def pieces():
         yield b"abc"
         raise KeyError
 
@@ -65,7 +63,6 @@ def test_leftovers_of_a_killed_process_are_removed_and_those_of_a_living_one_kep
     with subprocess.Popen(
         [sys.executable, "-c", _WRITER, str(tmp_path)], stdout=subprocess.PIPE, text=True
     ) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "written\n"
         left = hidden(tmp_path)
         assert len(left) == 1

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet.outline import SymbolStyle
@@ -53,46 +54,29 @@ def lattice(loop, pitch=7.0, rotation=0.3, anchor=(60, 61)):
     )  # fmt: skip
 
 
-def cut(polygon, normal, limit, dimensions=2):
-    """The part of a polygon at normal . x <= limit (Sutherland and Hodgman)."""
-    kept = []
-    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        at, bt = normal @ a - limit, normal @ b - limit
-        if at <= 0:
-            kept.append(a)
-        if at * bt < 0:
-            kept.append(a + (b - a) * at / (at - bt))
-    return np.array(kept).reshape(-1, dimensions)
-
-
-def area(polygon):
-    x, y = polygon.T
-    return (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2
+def rectangle(views, k, less_mm=0.0):
+    """The sensor's rectangle at a pose, face frame."""
+    c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (np.array(VIEW.half_mm) - less_mm)
+    return shapely.Polygon(corners @ [[c, s], [-s, c]] + views.centre_mm[k])
 
 
 @pytest.mark.parametrize("loops", [(SQUARE,), (SQUARE, HOLE), (ELL,), (TRIANGLE,)])
 def test_views_are_those_of_each_pose_by_itself(loops):
-    face = lattice(loops[0])
+    face, outline = lattice(loops[0]), shapely.Polygon(loops[0], loops[1:])
     views = face_views(loops, face, 7.0, VIEW, 150)
     assert len(views.seen) == 150
     for k in range(150):
-        c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
-        axes = np.array([[c, s], [-s, c]])  # sensor x and y in the face frame
-        there = (face.centres_mm - views.centre_mm[k]) @ axes.T
-        whole = (abs(there[:, 0]) <= 12.7 - 2.52) & (abs(there[:, 1]) <= 9.0 - 2.52)
+        whole = shapely.intersects_xy(rectangle(views, k, VIEW.symbol_half_mm), *face.centres_mm.T)
         assert views.seen[k] == whole.sum()
         c, s = np.cos(0.3), np.sin(0.3)
         lattice_mm = face.centres_mm[whole] @ np.array([[c, s], [-s, c]])
         lines = [len(np.unique(np.rint(one / 7.0 * 2))) for one in lattice_mm.T]
         assert views.lines[k] == min(lines)
-        on_face = 0.0
-        for loop in loops:
-            part = loop - views.centre_mm[k]
-            for normal, limit in ((axes[0], 12.7), (-axes[0], 12.7), (axes[1], 9), (-axes[1], 9)):
-                part = cut(part, normal, limit)
-            on_face += area(part) if len(part) else 0.0
-        assert views.loaded[k] == pytest.approx(on_face / (4 * 12.7 * 9.0), abs=1e-9)
-        assert views.around[k] == (np.hypot(*there.T) <= 20.0).sum()
+        share = outline.intersection(rectangle(views, k)).area / rectangle(views, k).area
+        assert views.loaded[k] == pytest.approx(share, abs=1e-9)
+        away = np.hypot(*(face.centres_mm - views.centre_mm[k]).T)
+        assert views.around[k] == (away <= 20.0).sum()
 
 
 @pytest.mark.parametrize(
@@ -141,26 +125,31 @@ RAMP = [(0, 0), (110, 0), (110, 50), (60, 20), (0, 20)]
 LOW = [(0, 0), (90, 0), (90, 20), (45, 20), (45, 20.9), (0, 20.9)]  # a step lower than a symbol
 
 
+def above(corners, height):
+    """The part of a polygon in space above a height, seen from above."""
+    kept = []
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        if a[2] >= height:
+            kept.append(a)
+        if (a[2] - height) * (b[2] - height) < 0:
+            kept.append(a + (b - a) * (height - a[2]) / (b[2] - a[2]))
+    return shapely.Polygon([corner[:2] for corner in kept])
+
+
 @pytest.mark.parametrize("outline", [STAIRS, RAMP, LOW])
 def test_a_sensor_meets_what_rises_inside_its_rectangle(outline):
-    """Each face cut at the height of symbols, then by the rectangle, one pose after the other."""
     solid, height = profile_solid(outline), 1.0
     for number in range(len(solid.faces)):
         loops, frame = face_polygon(solid, number), face_frame(solid, number)
         views = face_views(loops, lattice(loops[0]), 7.0, VIEW, 60)
         views = beside_obstacles(views, solid_edges(solid), frame, height, VIEW)
+        rising = [
+            above((solid.vertices[list(face.loops[0])] - frame[:3, 3]) @ frame[:3, :3], height)
+            for other, face in enumerate(solid.faces)
+            if face_normal(solid, other) @ frame[:3, 2] > 1e-9
+        ]
         for k in range(60):
-            c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
-            axes = np.array([[c, s, 0], [-s, c, 0]])
-            met = 0.0
-            for other, face in enumerate(solid.faces):
-                if face_normal(solid, other) @ frame[:3, 2] < 1e-9:
-                    continue
-                part = (solid.vertices[list(face.loops[0])] - frame[:3, 3]) @ frame[:3, :3]
-                part = cut(part - [*views.centre_mm[k], 0], np.array([0, 0, -1.0]), -height, 3)
-                for normal, limit in zip((*axes, *-axes), (12.7, 9, 12.7, 9), strict=True):
-                    part = cut(part, normal, limit, 3)
-                met += area(part[:, :2]) if len(part) else 0.0
+            met = sum(part.intersection(rectangle(views, k)).area for part in rising)
             assert views.blocked[k] == (met > MEETS_MM2)
         meets = {4: ("F6",), 5: ("F5",), 6: ("F8",), 8: ()} if outline is STAIRS else {}
         assert views.meets == meets.get(number, views.meets)  # walls, not their tops
@@ -180,13 +169,9 @@ def test_a_round_face_shows_what_lies_near_the_line_that_it_is_touched_along():
     views = round_views(solid_edges(solid), surface, flat, face, style, VIEW, 200)
     half = radius * math.acos(1 - SAG_MM / radius)
     for k in range(200):
-        c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
-        axes, there = np.array([[c, s], [-s, c]]), at - views.centre_mm[k]
-        x, y = axes @ there.T
-        inside = (abs(x) <= 12.7 - 2.52) & (abs(y) <= 9.0 - 2.52) & (abs(there[:, 0]) <= half)
-        assert views.seen[k] == inside.sum()
-        part = flat.outline - views.centre_mm[k]
-        for normal, limit in zip((*axes, *-axes), (12.7, 9, 12.7, 9), strict=True):
-            part = cut(part, normal, limit)
-        assert views.loaded[k] == pytest.approx(area(part) / (4 * 12.7 * 9.0), abs=1e-9)
+        near = abs(at[:, 0] - views.centre_mm[k, 0]) <= half
+        whole = shapely.intersects_xy(rectangle(views, k, VIEW.symbol_half_mm), *at.T)
+        assert views.seen[k] == (near & whole).sum()
+        there = shapely.Polygon(flat.outline).intersection(rectangle(views, k))
+        assert views.loaded[k] == pytest.approx(there.area / rectangle(views, k).area, abs=1e-9)
     assert not views.blocked.any()

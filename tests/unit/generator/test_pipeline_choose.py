@@ -106,15 +106,16 @@ def test_auto_takes_finer_symbols_where_the_usual_ones_show_no_place(tmp_path):
     assert "5 mm pitch" in problem.cause
     assert "set pitch" not in problem.fix  # 2.7 mm, which no nozzle of .4 mm prints
     assert "1.7 times larger" in problem.fix
-    for side, settings, pitch in (
-        (15, DENSE, 4.5),
-        (14, DENSE, 4.0),
+    for box, settings, pitch in (
+        ("[60, 15, 15]", DENSE, 4.5),
+        ("[60, 14, 14]", DENSE, 4.0),
+        ("[160, 14, 14]", DENSE, 5.0),  # ends of 4 % of its surface stay blank
         # makes 4.5 mm, which show no more
-        (14, DENSE + "print: {printer: fdm-0.6}\n", 5.0),
-        (15, "symbols: {alphabet: dense-4, pitch: 5 mm}\n", 5.0),
-        (17, DENSE, 5.0),
+        ("[60, 14, 14]", DENSE + "print: {printer: fdm-0.6}\n", 5.0),
+        ("[60, 15, 15]", "symbols: {alphabet: dense-4, pitch: 5 mm}\n", 5.0),
+        ("[60, 17, 17]", DENSE, 5.0),
     ):
-        found = choice(tmp_path, f"name: A\nshape: {{box: [60, {side}, {side}]}}\n{settings}")
+        found = choice(tmp_path, f"name: A\nshape: {{box: {box}}}\n{settings}")
         assert pitches(found) == {pitch}
         assert bool(found.notes) == (pitch < 5)
 

@@ -44,31 +44,26 @@ def test_messages(text):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "place", "cause", "fix"),
     [
-        ("name: Cu\x07be\n", """\
-c.yaml:1:9: error: control character U+0007 in the text
-    1 | name: Cu\N{REPLACEMENT CHARACTER}be
-      |         ^
-  fix: delete it"""),
-        ("%YAML 9.9\n---\nname: x\n", """\
-c.yaml:1:1: error: not YAML: found incompatible YAML document (version 1.* is required)
-    1 | %YAML 9.9
-      | ^
-  fix: compare with: encode-object init cube"""),
-        ("name: Würfel\n".encode("latin-1"), """\
-c.yaml:1:8: error: byte 0xfc is not UTF-8 text
-    1 | name: W\N{REPLACEMENT CHARACTER}rfel
-      |        ^
-  fix: save the file as UTF-8"""),
-        (b"#" * 262_145, """\
-c.yaml: error: the file is larger than 256 KiB
-  fix: give a large polyhedron as a file, for example shape: {file: part.stl}"""),
+        ("name: Cu\x07be\n", ":1:9", "control character U+0007 in the text", "delete it"),
+        ("%YAML 9.9\n---\nname: x\n", ":1:1",
+         "not YAML: found incompatible YAML document (version 1.* is required)",
+         "compare with: encode-object init cube"),
+        ("name: Würfel\n".encode("latin-1"), ":1:8", "byte 0xfc is not UTF-8 text",
+         "save the file as UTF-8"),
+        (b"#" * 262_145, "", "the file is larger than 256 KiB",
+         "give a large polyhedron as a file, for example shape: {file: part.stl}"),
     ],
     ids=["control character", "yaml version", "latin-1", "size"],
 )  # fmt: skip
-def test_a_file_that_is_no_text_of_ours(text, message):
-    assert str(refusal(text=text)) == message
+def test_a_file_that_is_no_text_of_ours(text, place, cause, fix):
+    said = str(refusal(text=text))
+    assert said.startswith(f"c.yaml{place}: error: {cause}\n")
+    assert said.endswith(f"\n  fix: {fix}")
+    assert said.replace("\n", "").isprintable()
+    if place in (":1:9", ":1:8"):
+        assert "\N{REPLACEMENT CHARACTER}" in said
 
 
 @pytest.mark.parametrize(
@@ -118,14 +113,11 @@ def test_long_lines_are_shown_around_the_caret(text, start):
     assert shown[caret.index("^") :].startswith(start)
 
 
-def test_caret_stands_under_wide_characters():
+def test_caret_stands_under_wide_characters_and_no_escapes_reach_the_terminal():
+    assert "\x1b" not in str(refusal(text='name: "\\e[31mCube"\nshape: {cube: 60}\n'))
     text = "{name: 立方, layout: x, shape: {cube: 60}}\n"
     shown, caret = str(refusal(text=text)).splitlines()[1:3]
     assert len(caret) - 1 == shown.index("x,") + 2  # each of the two takes two terminal cells
-
-
-def test_terminal_escapes_do_not_reach_the_terminal():
-    assert "\x1b" not in str(refusal(text='name: "\\e[31mCube"\nshape: {cube: 60}\n'))
 
 
 def test_several_databases_are_fine_when_one_is_given():

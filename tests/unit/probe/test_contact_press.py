@@ -13,7 +13,7 @@ from encoded_objects.base.sensor_type import Overlay, SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.contact.contract import Touch
 from probe.contact.gel import bridge, depths_mm, gel
-from probe.contact.press import AUTO_ERROR, LEVELS, accuracy_of, footprint, level_for, press, table
+from probe.contact.press import accuracy_of, footprint, level_for, press
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
@@ -21,20 +21,6 @@ from probe.surface.indenters import FlatPlate, RaisedStrip, RoughSurface, Tilted
 
 TAB, PAD = (SensorType(overlay=Overlay(kind=kind)) for kind in ("tab", "pad"))
 LEVEL = Touch(0.0, 0.0, 0.0, 64.0)
-
-
-@pytest.mark.parametrize("sensor", [TAB, PAD])
-def test_pick_is_the_cheapest_that_holds_the_error(sensor):
-    known = table()[sensor.overlay.kind]
-    for error in [*(line.error for line in known), AUTO_ERROR, 0.1, 0.9]:
-        level = level_for(sensor, error)
-        picked = next(line for line in known if line.level == level)
-        assert picked.error <= error
-        assert all(line.ms >= picked.ms for line in known if line.error <= error)
-    assert level_for(sensor) == level_for(sensor, AUTO_ERROR)
-    assert [line.level for line in known] == [*LEVELS[sensor.overlay.kind]]
-    assert np.all(np.diff([line.error for line in known]) < 0)
-    assert np.all(np.diff([line.ms for line in known]) > 0)
 
 
 def test_pick_holds_its_error_on_a_surface_that_was_not_measured():

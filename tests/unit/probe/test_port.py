@@ -232,6 +232,17 @@ def test_jumps_are_announced():
     ]  # fmt: skip
 
 
+def test_a_late_reader_makes_the_device_wait():
+    port = SoftwareProbe("sim:", frames(1000), IDENT, speed=1.0)
+    port.write(b"s")
+    packets(port)
+    time.sleep(0.7)
+    assert len(packets(port)) == 1  # not the seventy that were due
+    port.write(b"t")
+    (statistics,) = packets(port)
+    assert statistics.transmit_waits == 1
+
+
 def test_a_recording_repeats_with_rising_numbers_and_times():
     seen = list(islice(endless_frames(lambda: iter([frame(7, 5), frame(9, 25)])), 5))
     assert [f.seq for f in seen] == [0, 2, 3, 5, 6]

@@ -85,6 +85,17 @@ def test_which_type_images_are_of():
         choose_sensor_type("fsr-8x8", "", (16, 16), "touch.h5")
 
 
+def test_the_pitch_that_is_proposed():
+    assert SensorType().symbol_pitch_mm == 5.0
+    assert SensorType().with_overlay("pad").symbol_pitch_mm == 7.0
+    assert sensor_type_named("flexitac-12x32").symbol_pitch_mm == 6.0
+    assert sensor_type_named("gel-24x32").symbol_pitch_mm == 3.0
+    few = tuple((row, column) for row in range(16) for column in range(16) if column % 8)
+    small, sparse = SensorType(8, 8, 1.5875), SensorType(missing=few)
+    assert small.symbol_pitch_mm < SensorType().symbol_pitch_mm
+    assert sparse.symbol_pitch_mm < SensorType().symbol_pitch_mm
+
+
 def test_frames_of_another_shape_are_not_recorded(tmp_path):
     with Recorder(tmp_path / "a.h5") as recorder:
         recorder.append(frame_from(np.zeros((8, 8)), t_ns=0, seq=0))
