@@ -63,18 +63,15 @@ def test_the_order_of_touches_does_not_matter_to_the_canvas(seed, places):
         for pose in places
     ]
     there, back = empty_canvas(SENSOR.pitch_mm), empty_canvas(SENSOR.pitch_mm)
-    for patch, how in some:
-        there = add_to_canvas(there, patch, how)
-    for patch, how in reversed(some):
-        back = add_to_canvas(back, patch, how)
+    for one, other in zip(some, some[::-1], strict=True):
+        there, back = add_to_canvas(there, *one), add_to_canvas(back, *other)
     assert there.tiles.keys() == back.tiles.keys()
-    one = image_of(there) if np.ptp(np.array(places)[:, :2], axis=0).max() < 100 else None
-    if one is not None:
-        two = image_of(back)
+    if np.ptp(np.array(places)[:, :2], axis=0).max() < 100:
+        one, two = image_of(there), image_of(back)
         assert (one.count == two.count).all()
         assert one.values == pytest.approx(two.values, abs=1e-9)
-    for patch, how in some:
-        there = add_to_canvas(there, patch, how, -1)
+    for each in some:
+        there = add_to_canvas(there, *each, -1)
     assert not there.tiles
 
 

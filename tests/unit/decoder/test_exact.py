@@ -68,30 +68,28 @@ def test_contradicting_cells_are_refused():
     assert decode_exact(product, window)[0].reason == "not an encoded surface"
 
 
-def test_too_few_cells_list_the_places_that_they_allow():
-    array = PROFILES["thesis"].array()
-    window = windows_at(array, [7], [9], (6, 2))[0]
-    window[0, 0] = window[3, 1] = -1
-    found = decode_exact(array, window)[0]
-    assert found.reason == "too few symbols"
-    assert found.row is None
-    assert (7, 9) in {(c.row, c.column) for c in found.candidates}
-    assert len(found.candidates) == 4
-    seen = window >= 0
+@pytest.mark.parametrize(
+    ("array", "shape", "unseen", "most"),
+    [
+        (PROFILES["thesis"].array(), (6, 2), [(0, 0), (3, 1)], 4),
+        (array_from({"family": "prmva", "order": 3, "degree": 8}), None, [(0, 0)], 3),
+        (PROFILES["product"].array(), None, [(0, slice(None))], 4),
+    ],
+)
+def test_too_few_cells_list_the_places_that_they_allow(array, shape, unseen, most):
+    shape = shape or array.window
+    window = windows_at(array, [5], [7], shape)[0]
+    for cells in unseen:
+        window[cells] = -1
+    found, seen = decode_exact(array, window)[0], window >= 0
+    assert (found.reason, found.row) == ("too few symbols", None)
+    assert (5, 7) in {(c.row, c.column) for c in found.candidates}
+    assert len(found.candidates) <= most
     for place in found.candidates:
-        there = windows_at(array, [place.row], [place.column], (6, 2))[0]
+        there = windows_at(array, [place.row], [place.column], shape)[0]
         assert (there == window)[seen].all()
-    odd = array_from({"family": "prmva", "order": 3, "degree": 8})
-    product = PROFILES["product"].array()
-    for array, number in ((odd, 3), (product, 4)):
-        window = windows_at(array, [5], [7], array.window)[0]
-        window[0] = -1 if array is product else [-1, *window[0, 1:]]
-        found = decode_exact(array, window)[0]
-        assert found.reason == "too few symbols"
-        assert (5, 7) in {(c.row, c.column) for c in found.candidates}
-        assert len(found.candidates) <= number
-    nothing = np.full((6, 2), -1)
-    assert decode_exact(array, nothing)[0].reason == "too few symbols"
+    nothing = decode_exact(array, np.full(shape, -1))[0]
+    assert nothing.reason == "too few symbols"
 
 
 def test_methods_refuse_sizes_that_would_not_end():

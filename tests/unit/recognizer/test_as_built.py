@@ -24,13 +24,11 @@ from recognizer.as_built.touches import measure_prints
 from recognizer.as_built.verdict import AS_DESIGNED, CORRECTED, PRINT_AGAIN, judge_print
 from recognizer.errors import AsBuiltError
 from recognizer.touch.as_built import (
-    UNUSUAL,
     PrintedFace,
     TouchScale,
     print_matrix,
     print_of,
     scales_and_skew,
-    usual_print,
 )
 from recognizer.touch.lab import open_lab
 from recognizer.touch.options import ReaderOptions
@@ -170,19 +168,6 @@ def at_rest(x=0.0, y=0.0, turn=0.0):
 
 def felt(excess, sigma=1e-3, expected=1e9, with_pose=(0.0, 0.0, 0.0)):
     return TouchScale(excess, np.array([*with_pose, sigma**2]), expected)
-
-
-def test_a_touch_that_shows_an_unusual_scale_widens_its_ellipse_and_stays():
-    usual = PrintedFace(usual_print(), np.eye(4))
-    own, at = np.diag([1e-4, 1e-4, 1e-6]), at_rest(30.0, 0.0)
-    print_ = PrintedFace(print_with(covariance=usual_print().covariance), np.eye(4))
-    for excess, wider in ((0.003, 1.0), (0.012, 3.0), (0.06, UNUSUAL)):
-        found, covariance = usual.pose(at, own, felt(excess, 4e-3))
-        measured, known = print_.pose(at, own, felt(excess, 4e-3))
-        np.testing.assert_allclose(found, measured, atol=1e-12)
-        grown = covariance[0, 0] / known[0, 0]
-        assert 1.0 <= grown <= wider
-        assert (grown > 1.0) == (wider > 1.0)
 
 
 def test_a_reader_that_knows_parts_as_designed_is_surer_of_the_same_place(tmp_path):

@@ -43,14 +43,11 @@ def test_what_the_image_shows_by_itself(reader, monkeypatch):
     image = bars(rng)
     assert code_of(reader, image) == cause.UNCLEAR  # nothing is the matter with it
     assert code_of(reader, np.full((16, 16), 8.0)) == cause.NO_LOAD
-    assert code_of(reader, np.where(X < -1, image, 8.0)) == cause.EDGE
     assert code_of(reader, 8 + (image - 8) * np.clip((X + 14) / 26, 0, 1)) == cause.TILTED
     assert code_of(reader, bars(rng, high=18.0)) == cause.SOFT
     even = 100 * np.exp(rng.normal(0, 0.15, (16, 16)))
     even[0, :13] = 8.0
     assert code_of(reader, even) == cause.PLAIN
-    row = np.where(np.abs(Y) < 3, image, 8.0)
-    assert code_of(reader, row) == cause.ONE_ROW
     smeared = 8 + np.mean([np.roll(image - 8, k, axis=1) for k in range(5)], axis=0)
     signal = signal_of(smeared)
     monkeypatch.setattr("recognizer.touch.diagnose.SMEARED", 1.5)

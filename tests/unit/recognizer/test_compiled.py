@@ -1,6 +1,5 @@
 """The compiled loops of reading give the values of their numpy forms, `reference.touch_loops`."""
 
-import itertools
 from collections import Counter
 from dataclasses import replace
 from types import SimpleNamespace
@@ -22,7 +21,7 @@ from recognizer.touch.options import TIE_NATS
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols import fit, kernels, posterior, search
 from recognizer.touch.symbols.image import image_of_signal, normalize_image
-from recognizer.touch.symbols.search import bank_of, best_around, score_lattices
+from recognizer.touch.symbols.search import bank_of, score_lattices
 from recognizer.touch.symbols.template import template_of
 
 STYLE = SymbolStyle(pitch_mm=5.0)
@@ -185,16 +184,6 @@ def test_lattices_score_what_their_symbols_do_tactel_by_tactel(monkeypatch):
         expected[turn] = best[bank.lookups[turn]].sum(axis=-1)
     found = score_lattices(bank, values, weights, template.order).scores
     assert found == pytest.approx(expected, rel=1e-4)
-
-
-@pytest.mark.parametrize("shape", [(5, 16), (3, 9), (2, 4), (1, 1)])
-def test_the_best_beside_a_score_goes_round_all_three_ways(shape):
-    scores = np.random.default_rng(6).random(shape).astype(np.float32)
-    turns, n = shape[0], round(shape[1] ** 0.5)
-    cube = scores.reshape(turns, n, n)
-    steps = list(itertools.product((-1, 0, 1), repeat=3))
-    expected = np.max([np.roll(cube, step, axis=(0, 1, 2)) for step in steps], axis=0)
-    assert best_around(scores).tolist() == expected.reshape(shape).tolist()
 
 
 @pytest.mark.parametrize("labels_at", [given, nothing])

@@ -119,17 +119,6 @@ def test_the_answer_of_several_touches(confirmed, outliers, sd_mm, reason):
 
 
 @pytest.mark.parametrize(
-    ("changed", "margin", "counts"),
-    [
-        ({}, FOURTEEN, True), ({}, 13.9, False), ({"worn": 1}, 40.0, True),
-        ({"worn": 2}, 40.0, False), ({"contradictions": 1}, 40.0, False),
-    ],
-)  # fmt: skip
-def test_the_border_counts_for_a_place_that_lacks_only_symbols(changed, margin, counts):
-    assert may_count_border(replace(GOOD, **changed), margin, LIMITS) is counts
-
-
-@pytest.mark.parametrize(
     ("scores", "seen", "held", "truth"),
     [
         ([-9, -9, 0, -9, -9], 20, 2, (False, True, True, 0.0)),

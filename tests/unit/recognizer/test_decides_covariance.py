@@ -48,16 +48,6 @@ def test_under_tabs_a_form_far_from_what_was_known_widens_it(away):
         np.testing.assert_allclose(found, times * inverses(normals(2)), rtol=1e-6)
 
 
-@pytest.mark.parametrize("hardens", [True, False])
-def test_it_grows_with_the_square_of_the_noise(hardens):
-    normal = normals(1)
-    usual, twice, half = (
-        asked(normal, hardens=hardens, noise=noise) for noise in (USUAL, 2 * USUAL, USUAL / 2)
-    )
-    np.testing.assert_allclose(twice, 4 * usual)
-    np.testing.assert_allclose(half, usual / 4)
-
-
 def alike(left):
     """One plus the sum over the eight neighbours of the autocorrelation, by loops."""
     left = np.clip(left, -0.6, 0.6)

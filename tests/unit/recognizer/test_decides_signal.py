@@ -10,7 +10,6 @@ from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.signal import (
     contact_counts,
-    mean_of_strongest,
     noise_of,
     signal_of,
 )
@@ -30,20 +29,6 @@ def trusted(*sums, turned=False):
     assert (trust == trust[:, :1]).all()
     assert set(trust.ravel()) <= {0.0, 1.0}
     return trust[:, 0].astype(bool).tolist()
-
-
-def test_the_background_is_what_the_densest_of_the_lowest_read():
-    low, high = np.arange(100.0, 230.0, 10.0), np.arange(300.0, 620.0, 40.0)
-    readings = np.concatenate([low, high]).reshape(3, 7)  # 13 of 21 are low, 6 of them alike
-    found = signal_of(readings)
-    assert found.forces[0].tolist() == [0.0, 0.0, 0.0, 5.0, 15.0, 25.0, 35.0]
-    assert found.forces[2, 6] == 455.0
-    assert not found.newtons
-
-
-def test_what_presses_evenly_is_no_background():
-    readings = np.arange(100.0, 310.0, 10.0).reshape(3, 7)
-    assert signal_of(readings).forces[0].tolist() == [0.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0]
 
 
 def six(value, others=0.0, count=6):
@@ -135,19 +120,6 @@ def test_what_a_bad_tactel_reads_keeps_no_row_alive():
     assert found.trust[[0, 1, 2, 3, 5, 6, 7, 8]].all()
 
 
-@pytest.mark.parametrize("scale", [1 / 1023, 2.5 / 1023, 1e-6, 0.99])
-def test_a_contact_on_any_scale_is_what_rises_out_of_its_own_noise(scale):
-    rng = np.random.default_rng(8)
-    idle = np.rint(rng.normal(20.0, 1.0, (16, 16)))
-    touched = idle.copy()
-    touched[4:10, 4:10] += 200.0
-    few = idle.copy()
-    few[4, 4:9] += 200.0
-    assert signal_of(scale * touched).contact
-    assert not signal_of(scale * idle).contact
-    assert not signal_of(scale * few).contact  # five tactels are spikes
-
-
 def test_noise_is_worked_by_hand():
     free = np.random.default_rng(10).normal(5.0, 0.5, 180)
     assert noise_of(np.r_[free, np.linspace(20, 200, 76)]) == pytest.approx(0.5, rel=0.2)
@@ -171,30 +143,6 @@ def test_a_contact_rises_by_six_deviations_of_a_noisy_type():
     assert contact_counts(SensorType(exponent=0.5)) == pytest.approx(64.0)  # forces are squares
 
 
-def rising(strong):
-    """A hundred readings: a third rise evenly, a third lie close together, ten are strong."""
-    sums = [np.arange(30.0), 50.0 + np.arange(60.0) / 100, np.full(10, strong)]
-    return np.concatenate(sums).reshape(10, 10)
-
-
-def test_the_background_is_no_higher_over_the_lowest_than_a_fifth_of_the_tactels_nearly_is():
-    image = rising(500.0)
-    lowest, fifth = np.quantile(image, [0.05, 0.2])
-    level = lowest + 1.4 * (fifth - lowest)  # the densest, 50, are higher
-    assert signal_of(image).forces[9] == pytest.approx(np.full(10, 500.0 - level))
-
-
-@pytest.mark.parametrize(("over", "even"), [(1.55, True), (1.65, False)])
-def test_where_few_tactels_stand_out_all_of_them_are_pressed(over, even):
-    lowest, middle = np.quantile(rising(500.0), [0.05, 0.5])
-    strong = middle + over * (middle - lowest)
-    for spike in (strong, 9000.0):  # which is no stroke
-        image = rising(strong)
-        image[9, 0] = spike
-        found = signal_of(image).forces[9, 9]
-        assert bool(found == pytest.approx(strong - lowest)) is even
-
-
 def test_the_law_of_a_type_is_taken_off_counts_alone():
     image = six(4.0 * contact_counts(SensorType()))
     rooted = replace(SensorType(), exponent=0.5)
@@ -205,7 +153,3 @@ def test_the_law_of_a_type_is_taken_off_counts_alone():
     for law in (rooted, replace(SensorType(), exponent=2.0)):
         seen = [signal_of(six(counts), floor=0.0, sensor=law).contact for counts in (7.0, 9.0)]
         assert seen == [False, True]  # eight counts of any law
-
-
-def test_how_hard_is_pressed_is_the_mean_of_the_twelve_strongest():
-    assert mean_of_strongest(np.arange(256.0).reshape(16, 16)) == 249.5

@@ -17,9 +17,7 @@ from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.curvature import guess_curvatures
 from recognizer.touch.symbols.image import (
     Image,
-    bend_image,
     image_of_signal,
-    normalize_image,
     pressing_of,
 )
 
@@ -57,15 +55,6 @@ def test_how_an_overlay_presses_by_its_kind():
         depths = np.array([0.1, 0.4])
         np.testing.assert_allclose(law.depth(law.force(depths)), depths)
     np.testing.assert_allclose(law.force(np.array([-0.5, 0.1, 0.4])), [0.0, 0.3, 1.2])
-
-
-def test_a_very_wide_bend_is_no_bend():
-    flat = image(np.random.default_rng(1).uniform(0, 2, (16, 16)))
-    gain = np.array([[0.1, 0.4, 0.1, -0.05], [0.0, 0.6, 0.0, 0.0]])
-    round_one = normalize_image(bend_image(flat, SENSOR, Bend(1e9, 0.4)), gain)
-    for name in ("psi", "press", "bare", "contact", "measure"):
-        plain = getattr(normalize_image(flat, gain), name)
-        assert getattr(round_one, name) == pytest.approx(plain, rel=1e-4, abs=1e-5)
 
 
 @pytest.mark.parametrize("radius", [20.0, 40.0, 80.0])

@@ -42,11 +42,7 @@ def reader(lab):
 
 #: a face of the cube: its middle is where a print's scale moves nothing
 REGION = polygon([np.array([(0, 0), (80, 0), (80, 80), (0, 80)])])
-
-
 PLACES = [(x, y) for n, y in enumerate((26.0, 40.0, 54.0)) for x in (22, 32, 42, 52)[:: (-1) ** n]]
-
-
 T_ARM_FACE = np.array([200.0, -70.0, 0.6])
 
 

@@ -10,7 +10,6 @@ from encoded_objects.base.sensor_type import Overlay, SensorType
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW, refusal
 from recognizer.touch.search_gate import (
-    GAPS,
     gap_share,
     is_nearly_chance,
     may_find_more,
@@ -58,11 +57,6 @@ def test_a_plate_shows_no_strokes_and_symbols_do(small):
 )
 def test_where_gaps_were_not_measured_nothing_is_refused(small, given):
     assert shows_strokes(reader(small, **given), plate(0.05))
-
-
-def test_an_edge_of_a_plate_is_no_stroke(small):
-    half = signal_of(np.where(np.indices((16, 16))[1] < 8, 200.0, 8.0))
-    assert gap_share(half) < GAPS
 
 
 def test_gaps_tactel_by_tactel():

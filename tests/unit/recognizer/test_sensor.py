@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.circuit.network import effective_resistances
 from probe.contact.contract import Touch
 from probe.contact.press import ENGINE, press
 from probe.contact.tips import Tips
@@ -21,7 +20,7 @@ from recognizer.sensor.wiring import find_mounting, wiring_hint, wiring_named
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import Recognition
-from recognizer.touch.sensor_state import invert_floating, unknown_state
+from recognizer.touch.sensor_state import unknown_state
 
 SENSOR = SensorType()
 DEAD = [(0, 0), (3, 4), (7, 15), (9, 9), (12, 2)]
@@ -56,17 +55,6 @@ def test_dead_tactels_never_rise_hot_ones_never_fall_and_raised_ones_keep_an_off
     assert enough.dead[3, 4]
     images[:, :, 8:] = 0.0  # every touch hung over an edge
     assert not answering_of(images).dead[:, 12:].any()
-
-
-def test_a_floating_network_is_inverted_up_to_a_scale():
-    rng = np.random.default_rng(1)
-    g = np.where(rng.random((16, 16)) < 0.4, rng.uniform(0.3, 1.0, (16, 16)), 1e-3)
-    readings = 1000.0 / effective_resistances(g)
-    found = invert_floating(readings)
-    assert readings[g < 0.1].max() > 0.5 * readings.max()  # ghosts before
-    assert found == pytest.approx(1000.0 * g, rel=1e-3, abs=1e-2)
-    beyond = np.eye(16)
-    assert (invert_floating(beyond) >= 0).all()  # of no network
 
 
 def state_of(**changed):

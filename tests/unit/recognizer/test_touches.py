@@ -7,7 +7,7 @@ import pytest
 
 from probe.frame import frame_from
 from recognizer.touch.lab import radii_of
-from recognizer.touch.source import ENOUGH, FRAGMENTS, cut_touches, every_frame
+from recognizer.touch.source import ENOUGH, cut_touches, every_frame
 
 RNG = np.random.default_rng(8)
 A, B, C = (np.where(RNG.random((16, 16)) < 0.35, RNG.uniform(60, 300, (16, 16)), 0.0)
@@ -86,15 +86,6 @@ def test_images_that_do_not_follow_each_other_are_touches():
     found = cut(A, B, C, A)
     assert [(touch.seq, touch.frames) for touch in found] == [(0, 1), (1, 1), (2, 1), (3, 1)]
     assert [touch.seq for touch in cut(REST, A, REST, B)] == [1, 3]
-
-
-def test_many_unlike_images_do_not_wait_for_the_end():
-    images = [A, B, C] * 100
-    frames = film(*images)
-    reading = cut_touches(frames)
-    next(reading)
-    assert next(frames).seq <= FRAGMENTS + 2
-    assert len(list(reading)) == len(images) - 1 - 1  # one frame was taken out here
 
 
 def test_nothing_is_touched():
