@@ -13,30 +13,24 @@ MIRRORED = [
 OWN = {"alphabet": {"name": "mirrored", "reach": 0.28, "glyphs": MIRRORED}}
 
 
-@pytest.mark.parametrize(("profile", "symbols", "order", "shape"), [
-    ("tactel-8", {}, 8, (189, 1387)),
-    ("tactel-16", {}, 16, (51, 1285)),
-    ("tactel-8", OWN, 8, (189, 1387)),
+@pytest.mark.parametrize(("profile", "symbols", "name"), [
+    ("tactel-16", {}, "tactel-16"), ("tactel-8", OWN, "mirrored"),
 ])  # fmt: skip
-def test_touches_of_a_cube_are_read(tmp_path, profile, symbols, order, shape):
+def test_touches_of_a_cube_are_read(tmp_path, profile, symbols, name):
     url = str(tmp_path / "lab.db")
     cube = {"name": "Cube", "shape": {"cube": "60 mm"}, "profile": profile, "symbols": symbols}
     encode(cube, database=url, folder=tmp_path / "out", formats=())
     reader = Reader(open_lab(url))
-    (embossed,) = reader.lab.arrays
-    array = embossed.array
-    assert (array.order, array.rows, array.columns) == (order, *shape)
-    assert embossed.alphabet.name == (symbols["alphabet"]["name"] if symbols else profile)
+    assert [one.alphabet.name for one in reader.lab.arrays] == [name]
     rng = np.random.default_rng(12)
-    for face in ("F1", "F3", "F6"):
-        for _ in range(3):
-            x, y, theta = *rng.uniform(17, 43, 2), rng.uniform(-180, 180)
-            touch = simulate(f"{url}#Cube/{face}", x=x, y=y, theta=theta, force=60)
-            answer = reader.read(touch.counts)
-            assert (answer.object, answer.face) == ("Cube", face), answer
-            assert np.hypot(*(answer.T_face_probe[:2, 3] - (x, y))) < 0.15
-            turn = np.degrees(np.arctan2(*answer.T_face_probe[[1, 0], 0])) - theta
-            assert abs((turn + 180) % 360 - 180) < 1.0
+    for face in ("F1", "F1", "F3", "F3", "F6", "F6"):
+        x, y, theta = *rng.uniform(17, 43, 2), rng.uniform(-180, 180)
+        touch = simulate(f"{url}#Cube/{face}", x=x, y=y, theta=theta, force=60)
+        answer = reader.read(touch.counts)
+        assert (answer.object, answer.face) == ("Cube", face), answer
+        assert np.hypot(*(answer.T_face_probe[:2, 3] - (x, y))) < 0.15
+        turn = np.degrees(np.arctan2(*answer.T_face_probe[[1, 0], 0])) - theta
+        assert abs((turn + 180) % 360 - 180) < 1.0
     scan = Scan(reader)
     for x in (9, 15):  # over an edge
         touch = simulate(f"{url}#Cube/F2", x=x, y=31, theta=20, force=60)

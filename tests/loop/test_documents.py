@@ -89,6 +89,8 @@ SAID = {
     "encode_set": r"Cube:.*\nBox-1:.*\nBox-2:(?s:.*)\n\d+ of 262143 cells in use\n(?s:.*)",
     "mujoco_press": r"Cube/F6 at \(.*\n",
     "follow_port": r"(?s:.*)Cube/F1(?s:.*)",
+    "own_sensor_data": r"mine\.h5: 2 frames.*\n.*Cube/F4.*\n.*Cube/F4.*\n",
+    "read_recording": r"touches\.h5: 40 frames, by simulated/tab\n(?s:(.*Cube/F2){3}.*)",
     "report": r"40 touches: \d+ right, 0 wrong, (?s:.*)True\n",
     "scan": r"(?s:.*)touches: Plate\n",
 }
@@ -126,24 +128,11 @@ def test_simulate_and_read(tmp_path, said_by):
     assert float(re.findall(r"off by ([\d.]+) mm", said)[0]) < 0.1
 
 
-def test_read_recording(tmp_path, said_by):
-    said = said_by("read_recording", tmp_path).splitlines()
-    assert said[0] == "touches.h5: 40 frames, by simulated/tab"
-    assert len(said) == 6
-    assert sum("Cube/F2" in line for line in said) >= 3
-
-
 def test_ros2_node(tmp_path, said_by):
     said = said_by("ros2_node", tmp_path)
     x, y, z = (float(n) for n in re.findall(r"'[xyz]': ([-\d.e]+)", said))
     assert said.startswith("Cube ")
     assert (x**2 + y**2 + z**2) ** 0.5 < 0.02  # the origin is the middle of the face, in metres
-
-
-def test_own_sensor_data(tmp_path, said_by):
-    said = said_by("own_sensor_data", tmp_path).splitlines()
-    assert said[0].startswith("mine.h5: 2 frames")
-    assert ["Cube/F4" in line for line in said[1:]] == [True, True], said
 
 
 def test_trimesh_part(tmp_path, said_by):

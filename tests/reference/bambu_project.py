@@ -20,6 +20,8 @@ import numpy as np
 CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 PRODUCTION = "{http://schemas.microsoft.com/3dmanufacturing/production/2015/06}"
 
+Meshes = dict[int, tuple[str, np.ndarray]]  #: by number: the file, and its points
+
 
 @dataclass(frozen=True)
 class Placed:
@@ -40,7 +42,6 @@ class Project:
     application: str
     plates: tuple[tuple[Placed, ...], ...]
     settings: dict[str, Any]
-    uuids: tuple[str, ...]
 
 
 def read_project(content: bytes) -> Project:
@@ -48,7 +49,7 @@ def read_project(content: bytes) -> Project:
     package = zipfile.ZipFile(io.BytesIO(content))
     root = ET.fromstring(package.read("3D/3dmodel.model"))
     rels = ET.fromstring(package.read("3D/_rels/3dmodel.model.rels"))
-    meshes: dict[int, tuple[str, np.ndarray]] = {}
+    meshes: Meshes = {}
     uuids = [one.get(f"{PRODUCTION}UUID") for one in root.iter()]
     for target in (one.get("Target") for one in rels):
         model = ET.fromstring(package.read(target.lstrip("/")))
@@ -79,9 +80,8 @@ def read_project(content: bytes) -> Project:
             number = int(values(instance)["object_id"])
             assert number not in listed
             listed.add(number)
-            placed = placed_object(
-                objects[number], items[number], described[number], meshes, origin
-            )
+            known = objects[number], items[number], described[number]
+            placed = placed_object(*known, meshes, origin)
             assert min(placed.low) >= -1e-6, "in front of its plate, or below"
             assert placed.high[0] <= width + 1e-6, "beyond its plate"
             assert placed.high[1] <= depth + 1e-6, "beyond its plate"
@@ -90,17 +90,13 @@ def read_project(content: bytes) -> Project:
         held.append(tuple(own))
     assert listed == objects.keys()
     named = {one.get("name"): one.text for one in root.iter(f"{CORE}metadata")}
-    known = tuple(one for one in uuids if one)
+    known = [one for one in uuids if one]
     assert len(set(known)) == len(known)
-    return Project(named["Application"], tuple(held), settings, known)
+    return Project(named["Application"], tuple(held), settings)
 
 
 def placed_object(
-    described: ET.Element,
-    item: ET.Element,
-    config: ET.Element,
-    meshes: dict[int, tuple[str, np.ndarray]],
-    origin: np.ndarray,
+    described: ET.Element, item: ET.Element, config: ET.Element, meshes: Meshes, origin: np.ndarray
 ) -> Placed:
     """Return an object as it lies on the plate that begins at `origin`."""
     points, parts = [], {int(one.get("id")): one for one in config.iter("part")}

@@ -12,7 +12,7 @@ Ctrl-C. In a test:
 
 Firmware and emulator are built by make on first use, and kept under a name made of sources and
 settings. The emulator (`emulator/`, C on libsimavr) obeys lines on its standard input, the faults
-among them (`emulator/control.h`), and ends with it. Images pass through a mapped file
+among them (`emulator/main.c`), and ends with it. Images pass through a mapped file
 (`emulator/images.h`): it takes an image whole at the beginning of a scan, and notes its number.
 """
 
@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import argparse
 import hashlib
-import json
 import os
 import platform
 import select
@@ -32,7 +31,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -116,24 +114,10 @@ class EmulatedProbe:
         """Return the number of the image in frame `seq`, one of the last 4096 since the reset."""
         return int(self._file["seen"][0, seq % REMEMBERED])
 
-    @property
-    def scans(self) -> int:
-        """Scans begun since the last reset."""
-        return int(self._file["scans"][0])
-
-    @property
-    def boots(self) -> int:
-        """Resets, the first start counted."""
-        return int(self._file["boots"][0])
-
     def fault(self, command: str) -> None:
-        """Make a fault, or end it: flip N, drop N, garbage N, unplug S, reset, tau US, noise MV."""
-        if (answer := self._ask(command)) != "ok":
-            raise ValueError(answer)
-
-    def statistics(self) -> SimpleNamespace:
-        """Return what the emulator counted since it started (`emulator/main.c`)."""
-        return SimpleNamespace(**json.loads(self._ask("statistics")))
+        """Make a fault, or end it: flip N, drop N, garbage N, unplug S, reset (`main.c`)."""
+        self.process.stdin.write(command.encode() + b"\n")
+        assert self._answer() == "ok", command
 
     def end(self) -> None:
         """End the emulation; the port is gone."""
@@ -144,10 +128,6 @@ class EmulatedProbe:
             self.process.kill()
             self.process.wait()
             self.process.stdout.close()
-
-    def _ask(self, command: str) -> str:
-        self.process.stdin.write(command.encode() + b"\n")
-        return self._answer()
 
     def _answer(self) -> str:
         said, until_s = b"", time.monotonic() + ANSWER_S

@@ -22,15 +22,7 @@ from numpy.typing import NDArray
 
 from generator.array.field import Field, Labels
 from generator.array.fold import FoldedArray
-from reference.visible import PoseGrid, VisibleSet, visible_sets
-
-#: Share of poses whose cells may be dependent although they are no more than n, or have not rank n
-#: although they are n or more. At a pitch of 7 mm (8.5 cells a touch): .10 for 63x65 with half of
-#: its polynomials, .56 to .93 for 255x257, .02 to .35 for 51x1285 (half of its polynomials have .10
-#: or less). At 5 mm and less all these have 0.
-MOST_SHORT = 0.11
-#: That are tested: a tenth of a second, where the shares are good to .01.
-RANK_POSES = PoseGrid(places=12, turns=30)
+from reference.visible import VisibleSet
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,22 +36,7 @@ class RivalShares:
 
 
 def rival_shares(array: FoldedArray, sets: Sequence[VisibleSet]) -> RivalShares:
-    """Return how often what is seen whole has a rival elsewhere on a full array.
-
-    Parameters
-    ----------
-    array
-        All of its cells carry symbols.
-    sets
-        Of `visible_sets`.
-
-    Examples
-    --------
-    >>> from generator.array.profiles import profile
-    >>> sets = visible_sets(7.0, (12.7, 12.7), 2.52)
-    >>> round(rival_shares(profile("one-touch").array(), sets).poses[0], 2)
-    0.1
-    """
+    """Return how often what is seen whole has a rival elsewhere on a full array."""
     extent = 1 + np.max([one.cells.max(axis=0, initial=0) for one in sets], axis=0)
     offsets = array.offsets(np.arange(extent[0])[:, None], np.arange(extent[1]))
     cells = array.sequence.coefficients(offsets).reshape(*extent, -1)  # what each shows of a state
@@ -80,20 +57,6 @@ def rival_shares(array: FoldedArray, sets: Sequence[VisibleSet]) -> RivalShares:
         (float(poses[0]), float(poses[1]), float(poses[2])),
         (float(mean[0]), float(mean[1]), float(mean[2])),
     )
-
-
-def serves(
-    array: FoldedArray,
-    pitch_mm: float,
-    sensor_half_mm: tuple[float, float],
-    symbol_half_mm: float,
-) -> bool:
-    """Whether the cells that a sensor sees whole have the rank that so many cells can have.
-
-    The test of a fold, and of a polynomial on a fold; measures as for `visible_sets`.
-    """
-    sets = visible_sets(pitch_mm, sensor_half_mm, symbol_half_mm, RANK_POSES)
-    return rival_shares(array, sets).short <= MOST_SHORT
 
 
 def _reduced_rows(gf: Field, matrices: Labels) -> tuple[Labels, NDArray[np.bool_]]:

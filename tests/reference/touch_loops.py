@@ -215,27 +215,6 @@ def explained_share(image, pose, gain, labels_at):
     return 1.0 - (left - noise_alone) / max(whole - noise_alone, 1e-12)
 
 
-def lattice_scores(bank, values, weights, order):
-    """Return the score of every rotation and shift, (rotations, shifts^2)."""
-    pad = bank.reach + bank.rim
-    rows, columns = bank.shape
-    height, width = rows + 2 * bank.rim, columns + 2 * bank.rim
-    padded = np.zeros((2, rows + 2 * pad, columns + 2 * pad), np.float32)
-    padded[:, pad : pad + rows, pad : pad + columns] = 2 * weights * values, -weights
-    one, other = padded.ravel().take(bank.tactels)
-    turns = len(bank.rotations_rad)
-    even, odd = (one + other) @ bank.even, (one - other) @ bank.odd
-    even, odd = (part.reshape(height, width, order, turns // 2, -1) for part in (even, odd))
-    best = np.concatenate([even + odd, (even - odd)[..., ::-1]], axis=3).max(axis=2)
-    np.maximum(best, 0, out=best)
-    phases = round(math.sqrt(best.shape[-1]))
-    grid = best.reshape(height, width, turns, phases, phases).transpose(2, 0, 3, 1, 4)
-    places = np.zeros((turns, height * width * phases * phases + 1), np.float32)
-    places[:, :-1] = grid.reshape(turns, -1)
-    base = (np.arange(turns) * places.shape[1])[:, None, None]
-    return np.take(places.ravel(), bank.lookups + base).sum(axis=2)
-
-
 def add_scores(embossed, places, cells, scores, before):
     """Return sums (n,) of the scores of cells at each place."""
     rows, columns, owners = places

@@ -49,28 +49,9 @@ def visible_sets(
 ) -> tuple[VisibleSet, ...]:
     """Return the distinct sets of cells that a sensor sees whole inside a wide face.
 
-    Parameters
-    ----------
-    pitch_mm
-        Distance of neighbouring cells.
-    sensor_half_mm
-        Half width and half height of the sensor's rectangle.
-    symbol_half_mm
-        From a symbol's centre to the end of its strokes.
-    poses
-        Places and turns that are counted.
-
-    Returns
-    -------
-    tuple of VisibleSet
-        The most frequent first; shares add up to 1. An empty set stands for poses that show
-        no symbol whole.
-
-    Examples
-    --------
-    >>> sets = visible_sets(7.0, (12.7, 12.7), 2.52)
-    >>> round(sum(len(s.cells) * s.share for s in sets), 1)
-    8.5
+    `sensor_half_mm` is half the width and the height of the sensor's rectangle, `symbol_half_mm`
+    the way from a symbol's centre to the end of its strokes. The most frequent set comes first;
+    shares add up to 1. An empty set stands for poses that show no symbol whole.
     """
     free = np.array(sensor_half_mm) - symbol_half_mm
     reach = math.ceil(float(np.hypot(*np.maximum(free, 0.0))) / pitch_mm) + 1

@@ -1,12 +1,12 @@
 #include "electric.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <simavr/avr_adc.h>
 #include <simavr/avr_ioport.h>
 
-#include "chance.h"
 #include "network.h"
 
 #define REFERENCE_MV 5000 /* and the supply of the rows */
@@ -33,8 +33,7 @@ static readout_t readout;
 static network_t network; /* of the image and sensor at hand */
 static images_t *shared, image; /* the file, and what is felt in this scan */
 static FILE *trace;
-static chance_t chance;
-static double tau_cycles, noise_mv;
+static double tau_cycles;
 
 static uint8_t ports['Z' + 1]; /* output levels by letter */
 static uint16_t rows; /* at the supply, by bits */
@@ -151,6 +150,14 @@ static void port_changed(avr_irq_t *irq, uint32_t value, void *parameter)
         inject(); /* switched before the voltage was held */
 }
 
+/* Of mean 0 and deviation 1 (Box and Muller). */
+static double normal(void)
+{
+    double radius = sqrt(-2 * log(1 - drand48()));
+
+    return radius * cos(2 * M_PI * drand48());
+}
+
 /* A conversion starts: it holds its voltage 1.5 ADC clocks after the next edge of that clock. */
 static void conversion_starts(avr_irq_t *irq, uint32_t value, void *parameter)
 {
@@ -174,7 +181,7 @@ static void conversion_starts(avr_irq_t *irq, uint32_t value, void *parameter)
     }
     if (trace)
         fprintf(trace, "%llu convert %u\n", (unsigned long long)avr->cycle, channel);
-    noise = noise_mv > 0 ? noise_mv * chance_normal(&chance) : 0;
+    noise = readout.noise_mv * normal();
     inject();
 }
 
@@ -187,7 +194,7 @@ const wiring_t *electric_wiring(const char *board)
 }
 
 void electric_connect(avr_t *processor, const wiring_t *wires, readout_t how, images_t *images,
-                      uint64_t seed, FILE *file)
+                      FILE *file)
 {
     static const char letters[] = "ABCD";
 
@@ -196,7 +203,7 @@ void electric_connect(avr_t *processor, const wiring_t *wires, readout_t how, im
     readout = how;
     shared = images;
     trace = file;
-    chance = chance_from(seed);
+    tau_cycles = how.tau_us * 16;
     inputs = avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_ADC0);
     image.lock = 1; /* no lock of a whole image */
     images_take(shared, &image);
@@ -221,16 +228,4 @@ void electric_reset(void)
     since = held = 0;
     shared->scans = 0;
     shared->boots++;
-}
-
-void electric_set_tau(double microseconds)
-{
-    from_mv = voltage_mv(avr->cycle);
-    since = avr->cycle;
-    tau_cycles = microseconds * 16;
-}
-
-void electric_set_noise(double millivolts)
-{
-    noise_mv = millivolts;
 }

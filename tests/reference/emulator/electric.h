@@ -35,6 +35,8 @@ typedef struct {
 typedef struct {
     enum { GROUNDED, FLOATING, VIRTUAL } wiring; /* rows that are not read; columns held at 0 V */
     double load_ohm; /* of the column; virtual: of the amplifier's feedback */
+    double tau_us;   /* after a switch */
+    double noise_mv; /* deviation at the ADC */
 } readout_t;
 
 /* The wiring of a board, or 0. */
@@ -42,12 +44,9 @@ const wiring_t *electric_wiring(const char *board);
 
 /* `trace`, if not 0, gets a line for every switch and every conversion. */
 void electric_connect(avr_t *avr, const wiring_t *wiring, readout_t readout, images_t *images,
-                      uint64_t seed, FILE *trace);
+                      FILE *trace);
 
 /* To be called before the processor is reset. */
 void electric_reset(void);
-
-void electric_set_tau(double microseconds);
-void electric_set_noise(double millivolts);
 
 #endif

@@ -7,13 +7,12 @@
 #include <poll.h>
 #include <pty.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <termios.h>
 #include <unistd.h>
 
 #include <simavr/avr_uart.h>
-
-#include "chance.h"
 
 #define MEMORY 65536 /* bytes kept for a slow listener, as by a Linux serial driver */
 #define RECEIVED 256
@@ -24,13 +23,10 @@
 #define U2X0 1 /* bits */
 #define RXEN0 4
 
-line_counts_t line_counts;
-
 static avr_t *avr;
 static avr_uart_t *uart;
 static avr_irq_t *input;
 static const char *link_path;
-static chance_t chance;
 static double flips, drops; /* probability for a byte */
 
 static int master = -1;
@@ -45,11 +41,8 @@ static bool stopped; /* the processor's receiver is full */
 
 static void keep(uint8_t byte)
 {
-    if (kept == MEMORY) {
-        line_counts.overrun++;
-        return;
-    }
-    memory[kept++] = byte;
+    if (kept < MEMORY)
+        memory[kept++] = byte;
 }
 
 static void processor_sends(avr_irq_t *irq, uint32_t value, void *parameter)
@@ -58,23 +51,12 @@ static void processor_sends(avr_irq_t *irq, uint32_t value, void *parameter)
 
     (void)irq;
     (void)parameter;
-    line_counts.sent++;
-    if (!heard) {
-        line_counts.unheard++;
+    if (!heard || (drops > 0 && drand48() < drops))
         return;
-    }
-    if (drops > 0 && chance_uniform(&chance) < drops) {
-        line_counts.dropped++;
-        return;
-    }
-    if (flips > 0 && chance_uniform(&chance) < flips) {
-        byte ^= (uint8_t)(1u << (chance_bits(&chance) >> 61));
-        line_counts.flipped++;
-    }
-    if (wrong_speed) {
-        byte ^= (uint8_t)(chance_bits(&chance) >> 56);
-        line_counts.garbled++;
-    }
+    if (flips > 0 && drand48() < flips)
+        byte ^= (uint8_t)(1u << (mrand48() & 7));
+    if (wrong_speed)
+        byte ^= (uint8_t)mrand48();
     keep(byte);
 }
 
@@ -93,13 +75,12 @@ static void receiver_full(avr_irq_t *irq, uint32_t value, void *parameter)
     stopped = value != 0;
 }
 
-void line_connect(avr_t *processor, const char *link, uint64_t seed)
+void line_connect(avr_t *processor, const char *link)
 {
     uint32_t flags = 0;
 
     avr = processor;
     link_path = link;
-    chance = chance_from(seed);
     for (avr_io_t *io = avr->io_port; io; io = io->next)
         if (!strcmp(io->kind, "uart") && ((avr_uart_t *)io)->name == '0')
             uart = (avr_uart_t *)io;
@@ -189,8 +170,6 @@ void line_reset(void)
 static void forget(void)
 {
     int slave = open(terminal, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-
-    line_counts.unheard += kept;
     kept = 0;
     if (slave >= 0) {
         tcflush(slave, TCIFLUSH);
@@ -219,7 +198,6 @@ static void deliver(void)
 
     if (written <= 0)
         return;
-    line_counts.delivered += (uint64_t)written;
     kept -= (unsigned)written;
     memmove(memory, memory + written, kept);
 }
@@ -231,14 +209,12 @@ static void fetch(void)
     if (given == taken) {
         given = taken = 0;
         got = read(master, received, sizeof received);
-        if (got > 0) {
+        if (got > 0)
             taken = (unsigned)got;
-            line_counts.received += taken;
-        }
     }
     while (given < taken && !stopped) {
         uint8_t byte = received[given++];
-        avr_raise_irq(input, wrong_speed ? (uint8_t)(chance_bits(&chance) >> 56) : byte);
+        avr_raise_irq(input, wrong_speed ? (uint8_t)mrand48() : byte);
     }
 }
 
@@ -268,6 +244,6 @@ void line_set_drops(double per_million)
 
 void line_put_garbage(uint32_t bytes)
 {
-    for (; bytes && heard; bytes--, line_counts.garbage++)
-        keep((uint8_t)(chance_bits(&chance) >> 56));
+    for (; bytes && heard; bytes--)
+        keep((uint8_t)mrand48());
 }

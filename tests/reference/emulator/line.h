@@ -12,21 +12,7 @@
 
 #include <simavr/sim_avr.h>
 
-typedef struct {
-    uint64_t sent;      /* bytes that the processor sent */
-    uint64_t delivered; /* of them, to a listener (damaged ones too) */
-    uint64_t unheard;   /* lost: nobody had the port open */
-    uint64_t overrun;   /* lost: the listener was too slow */
-    uint64_t dropped;   /* lost: by fault */
-    uint64_t flipped;   /* damaged: by fault */
-    uint64_t garbage;   /* bytes put in between */
-    uint64_t garbled;   /* damaged: the listener has set another speed */
-    uint64_t received;  /* bytes from the listener */
-} line_counts_t;
-
-extern line_counts_t line_counts;
-
-void line_connect(avr_t *avr, const char *link, uint64_t seed);
+void line_connect(avr_t *avr, const char *link);
 
 /* Make the pseudo-terminal and its link; 0, or the number of an error. */
 int line_plug(void);

@@ -1,12 +1,20 @@
 /* Runs the probe's firmware on an emulated AVR, with its circuit, serial line and faults.
  *
  *   emulator --board uno --firmware probe.elf --images FILE --link PATH
- *            [--wiring grounded|floating|virtual] [--load OHM] [--tau US] [--noise MV] [--seed N] [--trace FILE] [--free]
+ *            [--wiring grounded|floating|virtual] [--load OHM] [--tau US] [--noise MV] [--trace FILE] [--free]
  *
- * Says "ready" on standard output, then obeys the lines of control.h. Paced at 16 MHz of real
- * time, with --free as fast as it goes. Ends with its standard input.
+ * Says "ready" on standard output, then obeys lines of its input, and ends with it:
+ *
+ *   flip N         damage one bit in N of a million bytes
+ *   drop N         lose N of a million bytes
+ *   garbage N      put N random bytes into the line, at once (at most 4096)
+ *   unplug S       take the port and the power away, give both back after S seconds
+ *   reset          reset the processor
+ *
+ * Paced at 16 MHz of real time, with --free as fast as it goes.
  */
 #include <getopt.h>
+#include <poll.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -14,12 +22,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <simavr/avr_extint.h>
 #include <simavr/sim_avr.h>
 #include <simavr/sim_elf.h>
 
-#include "control.h"
 #include "electric.h"
 #include "images.h"
 #include "line.h"
@@ -32,19 +40,17 @@
 static struct {
     const char *board, *firmware, *images, *link, *trace;
     readout_t readout;
-    double tau_us, noise_mv;
-    uint64_t seed;
     bool free;
-} options = {.board = "uno", .readout = {.load_ohm = 2200}, .tau_us = 1};
+} options = {.board = "uno", .readout = {.load_ohm = 2200, .tau_us = 1}};
 
 static volatile sig_atomic_t terminated;
+static bool quit, reset_wanted; /* what the input asked for */
+static double unplug_s;
 
 static avr_t *avr;
 static double origin_s;           /* wall time at which `emulated_s` was 0 */
 static double emulated_s;         /* time of the processor, without the time off power */
 static avr_cycle_count_t counted; /* cycles that are in it */
-static double worst_lag_s, slipped_s;
-static unsigned resets;
 
 static void fail(const char *format, ...)
 {
@@ -91,8 +97,8 @@ static void read_options(int count, char **values)
     static const struct option names[] = {
         {"board", 1, 0, 'b'}, {"firmware", 1, 0, 'f'}, {"images", 1, 0, 'i'},
         {"link", 1, 0, 'l'},  {"trace", 1, 0, 'c'},    {"tau", 1, 0, 't'},
-        {"noise", 1, 0, 'n'}, {"seed", 1, 0, 's'},     {"free", 0, 0, 'r'},
-        {"wiring", 1, 0, 'w'}, {"load", 1, 0, 'o'},
+        {"noise", 1, 0, 'n'}, {"free", 0, 0, 'r'},     {"wiring", 1, 0, 'w'},
+        {"load", 1, 0, 'o'},
         {0, 0, 0, 0}};
     int letter;
 
@@ -103,9 +109,8 @@ static void read_options(int count, char **values)
         case 'i': options.images = optarg; break;
         case 'l': options.link = optarg; break;
         case 'c': options.trace = optarg; break;
-        case 't': options.tau_us = atof(optarg); break;
-        case 'n': options.noise_mv = atof(optarg); break;
-        case 's': options.seed = strtoull(optarg, 0, 0); break;
+        case 't': options.readout.tau_us = atof(optarg); break;
+        case 'n': options.readout.noise_mv = atof(optarg); break;
         case 'r': options.free = true; break;
         case 'o': options.readout.load_ohm = atof(optarg); break;
         case 'w':
@@ -139,7 +144,6 @@ static void reset(void)
         avr_extint_set_strict_lvl_trig(avr, pin, 0);
     counted = avr->cycle;
     line_reset();
-    resets++;
 }
 
 static void make_processor(const wiring_t *wiring)
@@ -173,39 +177,60 @@ static void run_slice(void)
     counted = avr->cycle;
 }
 
-/* Wait for real time, or note how far behind it we are. */
+/* Wait for real time, or give up what is too far behind it. */
 static void keep_pace(void)
 {
     double ahead_s = origin_s + emulated_s - wall_s();
 
     if (options.free)
         return;
-    if (ahead_s > 0) {
+    if (ahead_s > 0)
         pause_s(ahead_s);
-        return;
-    }
-    if (-ahead_s > worst_lag_s)
-        worst_lag_s = -ahead_s;
-    if (-ahead_s > SLIP_S) {
-        slipped_s -= ahead_s;
+    else if (-ahead_s > SLIP_S)
         origin_s -= ahead_s;
-    }
 }
 
-static void answer_statistics(double started_s)
+/* Lines of the input, each obeyed and answered with a line. */
+static void answer(const char *said)
 {
-    const line_counts_t *line = &line_counts;
+    puts(said);
+    fflush(stdout);
+}
 
-    control_answer("{\"emulated_s\": %.6f, \"wall_s\": %.6f, \"worst_lag_s\": %.6f, "
-                   "\"slipped_s\": %.6f, \"resets\": %u, \"sent\": %llu, \"delivered\": %llu, "
-                   "\"unheard\": %llu, \"overrun\": %llu, \"dropped\": %llu, \"flipped\": %llu, "
-                   "\"garbage\": %llu, \"garbled\": %llu, \"received\": %llu}",
-                   emulated_s, wall_s() - started_s, worst_lag_s, slipped_s, resets,
-                   (unsigned long long)line->sent, (unsigned long long)line->delivered,
-                   (unsigned long long)line->unheard, (unsigned long long)line->overrun,
-                   (unsigned long long)line->dropped, (unsigned long long)line->flipped,
-                   (unsigned long long)line->garbage, (unsigned long long)line->garbled,
-                   (unsigned long long)line->received);
+static void obey(const char *line)
+{
+    char word[16] = "";
+    double value = -1;
+
+    sscanf(line, "%15s %lf", word, &value);
+    if (!strcmp(word, "reset")) {
+        reset_wanted = true;
+    } else if (!strcmp(word, "unplug") && value > 0 && value <= 3600) {
+        unplug_s = value;
+    } else if (!strcmp(word, "flip") && value >= 0 && value <= 1e6) {
+        line_set_flips(value);
+    } else if (!strcmp(word, "drop") && value >= 0 && value <= 1e6) {
+        line_set_drops(value);
+    } else if (!strcmp(word, "garbage") && value >= 0 && value <= 4096) {
+        line_put_garbage((unsigned)value);
+    } else {
+        answer("error: no command with a number in its range");
+        return;
+    }
+    answer("ok");
+}
+
+static void read_commands(void)
+{
+    struct pollfd state = {.fd = STDIN_FILENO, .events = POLLIN};
+    char line[256];
+
+    while (!quit && poll(&state, 1, 0) > 0) { /* who asks waits for the answer */
+        if (fgets(line, sizeof line, stdin))
+            obey(line);
+        else
+            quit = true;
+    }
 }
 
 static void plug(void)
@@ -222,8 +247,7 @@ int main(int count, char **values)
     const char *why = "";
     images_t *images;
     FILE *trace = 0;
-    wishes_t wishes = {0};
-    double back_s = 0, started_s = wall_s(); /* back_s: when power comes back; 0: it is there */
+    double back_s = 0; /* when power comes back; 0: it is there */
 
     read_options(count, values);
     if (!(wiring = electric_wiring(options.board)))
@@ -237,17 +261,15 @@ int main(int count, char **values)
     signal(SIGPIPE, SIG_IGN);
 
     make_processor(wiring);
-    electric_connect(avr, wiring, options.readout, images, options.seed, trace);
-    electric_set_tau(options.tau_us);
-    electric_set_noise(options.noise_mv);
-    line_connect(avr, options.link, ~options.seed);
+    electric_connect(avr, wiring, options.readout, images, trace);
+    line_connect(avr, options.link);
     reset();
     run_slice(); /* lets the firmware set its line rate, which the port takes on */
     plug();
-    control_answer("ready");
+    answer("ready");
 
     origin_s = wall_s() - emulated_s;
-    while (!wishes.quit && !terminated) {
+    while (!quit && !terminated) {
         if (back_s > 0 && wall_s() >= back_s) {
             back_s = 0;
             reset();
@@ -261,16 +283,15 @@ int main(int count, char **values)
             line_carry();
             keep_pace();
         }
-        control_read(&wishes);
-        if (wishes.statistics)
-            answer_statistics(started_s);
-        if (wishes.unplug_s > 0) {
+        read_commands();
+        if (unplug_s > 0) {
             line_unplug();
-            back_s = wall_s() + wishes.unplug_s;
+            back_s = wall_s() + unplug_s;
         }
-        if (wishes.reset && back_s == 0)
+        if (reset_wanted && back_s == 0)
             reset();
-        wishes = (wishes_t){.quit = wishes.quit};
+        reset_wanted = false;
+        unplug_s = 0;
     }
     line_unplug();
     if (trace)

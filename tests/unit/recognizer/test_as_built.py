@@ -65,7 +65,7 @@ def felt_on(as_built, R_part_face, error=(0, 0, 0, 0), covariance=None):
     )  # fmt: skip
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(NEAR, NEAR, st.floats(-0.03, 0.03), st.floats(-math.pi, math.pi))
 def test_exact_touches_of_turned_faces_give_the_print_back(scale_x, scale_y, skew, angle):
     truth = print_with(scale_x, scale_y, skew, 1.55)
@@ -143,7 +143,7 @@ def read_pose(S, T_part_face, T_part_probe):
     return pose
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(NEAR, NEAR, st.floats(-0.03, 0.03), st.floats(-3, 3), st.sampled_from((TOP, WALL_X, SLOPE)))
 def test_a_pose_that_is_read_becomes_the_pose_on_the_print(scale_x, scale_y, skew, turn, R):
     T_part_face = np.eye(4)
