@@ -6,10 +6,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from probe.arm import SensorPose
-from recognizer.touch.recognition import Recognition
-from recognizer.touch.robot import ObjectPose, Seating, fuse_poses, object_pose
+from probe.arm import Arm, SensorPose
+from probe.errors import PoseError
+from probe.wrist import Wrist, counts_of, distances_at
+from recognizer.touch.recognition import Recognition, refusal
+from recognizer.touch.robot import (
+    MOVED_CHANCE,
+    ObjectPose,
+    Seating,
+    carried_pose,
+    fuse_poses,
+    object_pose,
+)
 
+JOINTS = np.radians([20.0, -40.0, 70.0, -25.0, 15.0])
 PLANAR = np.array([[0.02, 0.004, 1e-4], [0.004, 0.01, -5e-5], [1e-4, -5e-5, 4e-5]])
 
 
@@ -22,8 +32,14 @@ def pose_of(rotvec, at):
 
 T_OBJECT_FACE = pose_of([0.3, 1.1, -0.4], [30.0, -20.0, 10.0])
 T_FACE_PROBE = pose_of([0.0, 0.0, 0.7], [22.0, 31.0, 1.0])
-ANSWER = Recognition(0, "Cube", "F1", (3, 4), T_FACE_PROBE, T_OBJECT_FACE @ T_FACE_PROBE,
-                     PLANAR, 30.0, None, "", inside_mm=20.0)  # fmt: skip
+
+
+EXACT = Seating(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def answer(T_face_probe=T_FACE_PROBE, inside_mm=20.0):
+    return Recognition(0, "Cube", "F1", (3, 4), T_face_probe, T_OBJECT_FACE @ T_face_probe,
+                       PLANAR, 30.0, None, "", inside_mm=inside_mm)  # fmt: skip
 
 
 def moved(T, error):
@@ -42,11 +58,20 @@ def test_the_object_is_found_where_it_stands():
     T_base_object = pose_of([0.1, 0.2, 1.3], [350.0, 80.0, 20.0])
     T_base_sensor = T_base_object @ T_OBJECT_FACE @ T_FACE_PROBE
     sensor = SensorPose(T_base_sensor, np.zeros((6, 6)))
-    placed = object_pose(ANSWER, sensor, Seating(0.0, 0.0, 0.0, 0.0, 0.0))
+    placed = object_pose(answer(), sensor, EXACT)
     assert placed.T_robot_object == pytest.approx(T_base_object, abs=1e-9)
-    sunk = object_pose(ANSWER, sensor, Seating(pressed_mm=0.4))
+    sunk = object_pose(answer(), sensor, Seating(pressed_mm=0.4))
     out = (T_base_object @ T_OBJECT_FACE)[:3, 2]
     assert sunk.T_robot_object[:3, 3] == pytest.approx(T_base_object[:3, 3] + 0.4 * out, abs=1e-9)
+
+
+def test_a_sensor_that_hangs_over_the_border_sinks_and_tips():
+    seating = Seating(0.5, 0.4, 0.3, 0.01, 0.05, half_mm=10.0)
+    assert [seating.depth_mm(at) for at in (25.0, 10.0, 5.0, 0.0, -1.0)] == pytest.approx(
+        [0.5, 0.5, 0.7, 0.9, 0.9]
+    )
+    assert [seating.spread_rad(at) for at in (10.0, 2.5, 0.0)] == pytest.approx([0.01, 0.04, 0.05])
+    assert seating.spread_rad(None) == seating.spread_rad(0.0)  # of a round face nothing is known
 
 
 def test_the_covariance_is_that_of_drawn_errors():
@@ -55,7 +80,7 @@ def test_the_covariance_is_that_of_drawn_errors():
     sensor = SensorPose(pose_of([0.4, -2.2, 0.6], [300.0, 50.0, 90.0]), root @ root.T)
     seating = Seating(pressed_mm=0.3, z_mm=0.4, tilt_rad=0.01)
     sunk = pose_of([0.0, 0.0, 0.0], [0.0, 0.0, -seating.pressed_mm])
-    placed = object_pose(ANSWER, sensor, seating)
+    placed = object_pose(answer(), sensor, seating)
     number = 800
     errors = rng.multivariate_normal(np.zeros(6), sensor.covariance, number)
     planar = rng.multivariate_normal(np.zeros(3), PLANAR, number)
@@ -71,6 +96,28 @@ def test_the_covariance_is_that_of_drawn_errors():
         drawn[k] = error_between(placed.T_robot_object, true)
     whitened = np.linalg.solve(np.linalg.cholesky(placed.covariance), drawn.T)
     assert np.cov(whitened) == pytest.approx(np.eye(6), abs=6 / math.sqrt(number))
+
+
+def test_a_joint_error_moves_the_object_as_its_covariance_says():
+    arm, wrist = Arm(), Wrist()
+    counts = counts_of(wrist, distances_at(wrist, 4.0, 0.01, -0.02))
+    errors = np.array([0.01, 0.0, 0.0, 0.0, 0.0])
+    at = carried_pose(arm, wrist, JOINTS, errors, counts)
+    turned = carried_pose(arm, wrist, JOINTS + errors, np.zeros(5), counts)
+    known = answer()
+    placed, other = object_pose(known, at, EXACT), object_pose(known, turned, EXACT)
+    alone = object_pose(known, carried_pose(arm, wrist, JOINTS, np.zeros(5), counts), EXACT)
+    step = other.T_robot_object[:3, 3] - placed.T_robot_object[:3, 3]
+    grown = placed.covariance[:3, :3] - alone.covariance[:3, :3]
+    assert np.linalg.norm(step) > 1.0
+    assert grown == pytest.approx(np.outer(step, step), abs=0.02 * step @ step)
+
+
+def test_what_is_not_known():
+    sensor = SensorPose(np.eye(4), np.zeros((6, 6)))
+    assert object_pose(refusal(0, "ambiguous"), sensor) is None
+    with pytest.raises(PoseError, match="end stops"):
+        carried_pose(Arm(), Wrist(), JOINTS, np.zeros(5), [0, 0, 0, 0])
 
 
 BASE = pose_of([0.2, -0.1, 0.9], [320.0, 40.0, 30.0])
@@ -124,7 +171,16 @@ def test_an_object_that_lies_still_is_not_taken_for_moved():
     rng = np.random.default_rng(8)
     number = 400
     alarms = sum(fuse_poses(drawn(rng, 2 + k % 4)).moved for k in range(number))
-    assert alarms <= 4  # one of a thousand, .4
+    assert alarms <= 4  # MOVED_CHANCE of them, .4
+    assert MOVED_CHANCE == 1e-3
+
+
+def test_one_pose_fused_is_itself():
+    placed = ObjectPose(BASE, SPREAD)
+    fused = fuse_poses([placed])
+    assert fused.pose.T_robot_object == pytest.approx(placed.T_robot_object, abs=1e-12)
+    assert fused.pose.covariance == pytest.approx(placed.covariance, rel=1e-6)
+    assert (fused.moved, fused.since) == (False, 0)
 
 
 @pytest.mark.parametrize(("by", "noticed"), [(0.99, False), (1.01, True)])
