@@ -38,7 +38,7 @@ from generator.polyhedron.frame import face_frame, face_polygon
 from generator.polyhedron.winged import Developable, Face, Polyhedron, WingedEdge, developable_from
 
 MOST_SYMBOLS = 127  #: of an array; readers keep labels in 8 bits
-_PITCHES_MM = (0.1, 10_000.0)  #: no symbol is finer than a resin's beam, or larger than a model
+_PITCHES_MM = (0.03, 10_000.0)  #: no symbol is finer than a beam of resin, or larger than a model
 
 
 @of_rows
