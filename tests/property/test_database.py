@@ -28,6 +28,7 @@ engines = st.sampled_from(["sqlite", "sqlite", "sqlite", "postgresql"])  # a ser
 floats = st.floats(-1e4, 1e4)  # lengths in mm; a database refuses what no model has
 angles = st.floats(-1.5, 1.5)
 positive = st.floats(min_value=1e-300, max_value=1e4)
+pitches = st.floats(min_value=0.03, max_value=1e4)
 solids = st.sampled_from([SOLID, *FRAMES])
 names = st.text(st.characters(blacklist_categories=["Cs"], blacklist_characters="\0"), min_size=1)
 formats = st.sampled_from(["step", "stl"])
@@ -54,7 +55,7 @@ def layouts(draw):
         faces.append(FaceLayout(number, placement, rows, columns, labels, centres, places))
     blank = tuple(face.face for face in faces if len(face.rows) == 0)
     return Layout(
-        draw(st.sampled_from(["net", "faces"])), draw(positive), tuple(faces),
+        draw(st.sampled_from(["net", "faces"])), draw(pitches), tuple(faces),
         tuple(sorted(blank)), tuple(draw(st.lists(names, max_size=2))),
     )  # fmt: skip
 
