@@ -19,7 +19,7 @@ def init(
     shape: Annotated[
         str,
         Argument("cube, box, triangular_prism, tetrahedron, octahedron, dodecahedron, prism, "
-                 "pyramid, cylinder, cone, polyhedron or file."),
+                 "pyramid, cylinder, cone, tag, polyhedron or file."),
     ] = "cube",
     file: Annotated[
         Path | None,

@@ -22,6 +22,7 @@ from generator.database.lab import lab_key as stored_lab_key
 from generator.database.open import open_database, open_if_there
 from generator.database.register import register
 from generator.database.transaction import read_transaction, write_transaction
+from generator.errors import DatabaseError, PrintError
 from generator.export.atomic import remove_leftovers
 from generator.pipeline.choose import ArrayChoice, choose_array, lab_of
 from generator.pipeline.faces import face_reports
@@ -33,6 +34,7 @@ from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.polyhedron import Polyhedron
 from generator.spec import ObjectSpec
+from generator.spec.problem import error_location
 
 
 def encode(
@@ -84,10 +86,21 @@ def encode(
     """
     began = time.perf_counter()
     url = database or specs[0].database
+    if trial is not None and trial.exists():
+        fix = "name a new file, or remove this one"
+        raise DatabaseError("a trial makes a database, and there is one", fix=fix, place=str(trial))
     progress("planning", 0.0)
     engine, plans, dry_build = plan_in_lab(
         specs, url, lab_key=lab_key, make=not dry_run, replace_changed=replace
     )
+    for plan in plans:
+        wanted = plan.spec.formats if formats is None else formats
+        if "bambu" in wanted and not plan.printer.nozzle_mm:
+            with error_location(plan.spec.source, "print.printer"):
+                fix = "leave bambu out of formats, or choose a printer of filament"
+                name = plan.printer.name
+                cause = f"Bambu Studio and OrcaSlicer print filament, and {name} prints resin"
+                raise PrintError(cause, fix=fix)
     rest = part_of_progress(progress, 0.1, 1.0)
     files: tuple[Path, ...] = ()
     to_print: tuple[Path, ...] = ()

@@ -116,7 +116,7 @@ def _place(polyhedron: Polyhedron, face: int, size: Size, kind: str) -> str:
     elif np.ptp(corners[:, axis]) < 1e-6 * np.ptp(polyhedron.vertices):
         where = f"at {'xyz'[axis]} = {middle[axis] + 0.0:.4g}"
     else:
-        where = f"about ({', '.join(three_digits(value + 0.0) for value in middle)})"
+        where = f"about ({', '.join(three_digits(round(value, 6) + 0.0) for value in middle)})"
     return f"the {three_digits(width)} x {three_digits(height)} mm face {where}"
 
 

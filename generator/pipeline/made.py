@@ -182,6 +182,6 @@ def overhangs(plan: ObjectPlan, layout: Layout) -> Overhangs:
         needed = f"supports needed under {', '.join(over)} ({counted})"
     if upright:  # their lower sides hang over by their height
         needed += f", {upright} symbols stand out sideways"
-    has_round = bool(polyhedron.surfaces or polyhedron.blank)
-    better = "" if has_round else "; with  parts: panels  nothing hangs over"
+    flat = not (polyhedron.surfaces or polyhedron.blank) and (over or upright)
+    better = "; with  parts: panels  nothing hangs over" if flat else ""
     return Overhangs(f"{lies}, {needed}{better}", over)

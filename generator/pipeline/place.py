@@ -14,7 +14,7 @@ from encoded_objects.base.output import three_digits
 from generator.database.cells import cells_of, find_array, occupancy
 from generator.database.open import part_path
 from generator.database.read import find_object, read_layout, read_object
-from generator.database.register import require_same_spec
+from generator.database.register import require_in_use, require_same_spec
 from generator.database.registered import RegisteredObject
 from generator.errors import LayoutError
 from generator.layout.layout import lay_out
@@ -69,6 +69,7 @@ def place_object(
     if connection is None or known is None:
         layout = _lay_out_at_shape(plan, everything)
         return PlacedObject(layout, everything.used, reused=False, replaces=False)
+    require_in_use(connection, known)
     others = everything
     if (array_id := find_array(connection, plan.array)) is not None:
         others = others.without_cells(*cells_of(connection, known.object_id, array_id))

@@ -34,12 +34,19 @@ from generator.polyhedron.winged import Developable
 from generator.printers import Printer
 from generator.solid.analytic import bend_problem
 from generator.solid.part import edge_numbers
-from generator.solid.plate import cut_corners, plain_panels, symbol_clearance_mm, top_insets_mm
+from generator.solid.plate import (
+    cut_corners,
+    plain_panels,
+    symbol_clearance_mm,
+    top_inset_mm,
+    top_insets_mm,
+)
 from generator.spec import ObjectSpec, ShapeSpec
 from generator.spec.problem import error_location
 
 FACES_LISTED = 8  #: faces that a message lists by name
 TAG_BACK = 1  #: face that a tag lies on
+SHARP_MM = 5.0  #: by which panels end before an edge that stays open, said beyond
 LAYER_MM = 0.02  # by which a printed height may differ from the designed one, unsaid
 
 
@@ -168,6 +175,7 @@ def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan
         (
             *faces.notes,
             *_covered_note(polyhedron, covered, reach),
+            *_sharp_note(polyhedron, spec),
             *_pitch_note(spec),
             *_layer_note(spec),
             *_sensor_note(spec),
@@ -329,6 +337,24 @@ def _chosen_stance(polyhedron: Polyhedron, spec: ObjectSpec) -> Stance | None:
     if held is not None and (stance := stance_on(polyhedron, held, steepest)) is not None:
         return stance
     return best_stance(polyhedron, _flat(polyhedron), steepest)
+
+
+def _sharp_note(polyhedron: Polyhedron, spec: ObjectSpec) -> tuple[str, ...]:
+    """Say where panels end far before an edge, since their mitres would be too thin to print."""
+    if spec.parts != "panels":
+        return ()
+    open_mm = {}
+    for number, edge in enumerate(polyhedron.edges):
+        angle = dihedral(polyhedron, number)
+        inset = top_inset_mm(angle, spec.wall_mm, spec.printer, spec.gap_mm)
+        if angle < math.pi and inset > SHARP_MM:
+            names = (polyhedron.faces[k].name for k in sorted((edge.left, edge.right)))
+            open_mm[" and ".join(names)] = inset
+    if not open_mm:
+        return ()
+    where = ", ".join(f"{names} ({mm:.0f} mm)" for names, mm in open_mm.items())
+    note = "panels end that far before the edge where faces meet sharply, which stays open: "
+    return (f"{note}{where}; print it in one piece (print: {{parts: whole}})",)
 
 
 def _pitch_note(spec: ObjectSpec) -> tuple[str, ...]:

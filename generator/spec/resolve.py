@@ -30,7 +30,7 @@ from generator.array.definition import array_from
 from generator.array.profiles import PROFILES, SMALLEST, smallest_profile
 from generator.errors import AlphabetError, ArrayError
 from generator.polyhedron.mount import Mount, least_thickness_mm
-from generator.polyhedron.shapes import TAG_MM
+from generator.polyhedron.shapes import FRAME_STEP_MM, TAG_MM
 from generator.printers import Printer, printer_named, printer_of_nozzle
 from generator.spec.explain import explain_errors
 from generator.spec.problem import SPEC, SpecError, mark_of
@@ -158,9 +158,10 @@ def resolve(
             f"set gap to {GAP_MM:g} mm, or more for much glue",
         )
     if shape is not None and shape.kind == "tag" and "thickness" not in shape.parameters:
-        thickness = printer.printed_mm(
-            max(TAG_MM, least_thickness_mm(mount) + printer.layer_mm / 2)
-        )
+        least = least_thickness_mm(mount)
+        if least and shape.parameters.get("frame"):  # which is lower than what carries symbols
+            least += FRAME_STEP_MM
+        thickness = printer.printed_mm(max(TAG_MM, least + printer.layer_mm / 2))
         shape = replace(shape, parameters={**shape.parameters, "thickness": thickness})
     if problems or shape is None:
         raise SpecError(problems)

@@ -100,6 +100,8 @@ def test_a_trial_takes_down_what_would_be_made_and_nothing_else(bench, capsys):
     counted = [face["symbols"] for face in shown["faces"]]
     assert [one for one in counted if one] == [face["symbols"] for face in said["face_reports"]]
     assert encode_object([path, "--trial", "other.db"]) == 2
+    assert encode_object([path, "--dry-run", "--trial", "trial.db"]) == 4  # never a lab
+    assert "name a new file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("answer", "code"), [("n", 1), ("y", 0)])

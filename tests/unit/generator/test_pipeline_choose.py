@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from generator.database.open import open_if_there
-from generator.database.transaction import read_transaction
+from generator.database.open import existing_database, open_if_there
+from generator.database.register import retire
+from generator.database.transaction import read_transaction, write_transaction
+from generator.errors import DatabaseError
 from generator.pipeline import encode
 from generator.pipeline.choose import choose_array, lab_of
 from generator.spec import SpecError, read_specs
@@ -196,6 +198,8 @@ def test_the_least_size_of_a_face_shows_a_place(tmp_path):
          r"(?s)array 63x65 is full.*fix: .*set profile: auto"),
         ("cylinder: {diameter: 40 mm, height: 30 mm}}\nprint: {parts: panels}\n",
          r":3:16: error: a round face cannot be printed as a flat"),
+        ("cube: 60 mm}\nprint: {printer: resin}\noutput: {formats: [bambu]}\n",
+         r":3:18: error: Bambu Studio and OrcaSlicer print filament, and resin prints resin"),
         ("file: inch.obj}\n",
          r"(?s)no place can be identified.*it is 3 x 2 x 1.5 mm; in inches it needs scale: 25.4"),
     ],
@@ -207,6 +211,24 @@ def test_what_cannot_be_made_is_refused_where_it_is_asked_for(tmp_path, settings
     (tmp_path / "inch.obj").write_text("\n".join(lines))
     with pytest.raises(SpecError, match=said):
         dry(tmp_path, f"name: A\nshape: {{{settings}")
+
+
+def test_panels_that_leave_a_sharp_edge_open_say_so(tmp_path):
+    points = "[[0,0,0],[100,0,0],[100,0,20],[0,40,0],[100,40,0],[100,40,20]]"
+    faces = "[[0,1,2],[3,5,4],[0,3,4,1],[1,4,5,2],[0,2,5,3]]"
+    text = f"name: A\nshape:\n  polyhedron: {{vertices: {points}, faces: {faces}}}\n"
+    for settings, said in (("", True), ("print: {parts: whole}\n", False)):
+        (one,) = dry(tmp_path, text + settings).objects
+        assert any("stays open: F3 and F5 (28 mm)" in note for note in one.warnings) == said
+
+
+def test_a_retired_name_is_refused_by_a_dry_run_too(tmp_path):
+    text = "name: A\nshape: {{cube: {} mm}}\n"
+    made(tmp_path, text.format(30))
+    with write_transaction(existing_database(str(tmp_path / "lab.db"))) as connection:
+        retire(connection, "A")
+    with pytest.raises(DatabaseError, match="was retired"):
+        dry(tmp_path, text.format(35), replace=True)
 
 
 def test_a_part_larger_than_the_bed_is_told_before_it_is_made(tmp_path):

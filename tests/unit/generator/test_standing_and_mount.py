@@ -144,6 +144,7 @@ def test_saying_what_holds_already_means_the_same_object(tmp_path):
          "too thin to sink the head of M6"),
         (TAG, {"mount": {"rod": 6}}, "needs 11.5 mm behind face F2"),
         (CUBE, {"mount": {"screws": "M3"}, "print": {"parts": "panels"}}, "with a mount"),
+        (TAG, {"mount": {"hole": 0.1}}, "a hole of 0.1 mm is too narrow"),
         (ROD, {"mount": {"rod": 6, "face": "F2"}}, "flat"),
         ({"pyramid": {"side": 60, "height": 50}}, {"mount": {"hole": "M8"}}, "one parallel face"),
     ],
@@ -222,7 +223,8 @@ def test_a_tag_of_one_line_is_made_and_read(tmp_path):
 
 def test_a_mount_may_be_a_text_and_a_tag_is_as_thick_as_it_needs():
     def spec(side, mount):
-        settings = {"name": "Tag", "shape": {"tag": [side, side]}, "mount": mount}
+        shape = {"size": [abs(side)] * 2, "frame": 12} if side < 0 else [side, side]
+        settings = {"name": "Tag", "shape": {"tag": shape}, "mount": mount}
         return read_specs([tree_from(settings)])[0]
 
     screws = [spec(40, text) for text in ("screws M3", "{screws: M3}", {"screws": "M3"})]
@@ -230,7 +232,7 @@ def test_a_mount_may_be_a_text_and_a_tag_is_as_thick_as_it_needs():
     for side, mount, thick in (
         (40, {"magnets": [8, 1.5]}, 3.0), (40, {"magnets": [8, 3.0]}, 4.0),
         (40, {"screws": "M3"}, 3.0), (40, {"screws": "M6"}, 3.4),
-        (70, {"flange": "ISO 9409-1-50-4-M6"}, 3.8),
+        (70, {"flange": "ISO 9409-1-50-4-M6"}, 3.8), (-80, {"magnets": [8, 2.0]}, 4.0),
     ):  # fmt: skip
         assert spec(side, mount).shape.parameters["thickness"] == pytest.approx(thick)
 
