@@ -62,7 +62,9 @@ UNREST = (
     ("too thin", "strokes too thin"),
     ("finds no rest", "no rest in the engine"),
     ("does not settle", "no rest in the engine"),
+    ("another face", "met another face"),
 )
+BLOCKED_MM = 3.0  #: rest of the plate over a flat face, symbols of 1 mm; higher is another face
 DRAWS = 64  #: of a touch that shows enough symbols to exchange some
 TURN_RAD = 0.01  #: a panel turned by less stands as registered
 FOREIGN_SYMBOLS = 64  #: rows and columns of foreign symbols, repeated without end
@@ -199,7 +201,7 @@ def draw_again(
     Raises
     ------
     ContactError
-        The plate does not come to rest there.
+        The plate does not come to rest there, or on another face.
     """
     counts = _read(plan, before.contact.scene, touch, before.sensor, reader, rng)
     return DrawnTouch(before.contact, touch, counts, before.sensor)
@@ -217,7 +219,14 @@ def _read(
     rng: np.random.Generator,
 ) -> NDArray[np.uint16]:  # fmt: skip
     worse = LevelSensor(reader.sensor, plan.noise, plan.engine, sensor)
-    return worse.read(scene, touch, rng).counts
+    reading = worse.read(scene, touch, rng)
+    flat = scene.object_name and scene.scene_at is None
+    if flat and BLOCKED_MM < reading.contact.z_mm < math.inf:
+        raise ContactError(
+            f"the plate meets another face, {reading.contact.z_mm:.1f} mm over {scene.face}",
+            fix="move the sensor away from what stands over the face",
+        )
+    return reading.counts
 
 
 def _sample_scene(

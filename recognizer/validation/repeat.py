@@ -22,7 +22,14 @@ from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.pictures import WORDS, figure_on
 from recognizer.validation.run import read_record
-from recognizer.validation.trial import find_face, judge
+from recognizer.validation.trial import (
+    MOST,
+    NEXT,
+    find_face,
+    judge,
+    judge_all,
+    touch_until_answered,
+)
 from recognizer.validation.workers import reader_now
 
 if TYPE_CHECKING:
@@ -38,7 +45,8 @@ TRUTH, ANSWER = "#b0413e", "#2f6db3"
 def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]:
     """Do a touch of a run again, and write a picture of it if `plot` is given.
 
-    Returns the touch as a row of `trials.parquet` holds it; None for what is no number.
+    Returns the touch as a row of `trials.parquet` holds it; None for what is no number. Of touches
+    that followed each other the picture shows the last.
 
     Raises
     ------
@@ -61,9 +69,14 @@ def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]
         )
     plan = work.plan(series, number)
     reader = plan.knowing(reader_now(work))
-    found = draw_touch(plan, number, reader)
-    answer = recognise(reader, reader.signal(found.counts), number)
-    row = judge(plan, number, found, answer, reader).row()
+    if plan.policy == NEXT:
+        made = list(touch_until_answered(plan, number, reader, MOST))
+        found, answer = made[-1].found, made[-1].answer
+        row = judge_all(plan, number, made, reader).row()
+    else:
+        found = draw_touch(plan, number, reader)
+        answer = recognise(reader, reader.signal(found.counts), number)
+        row = judge(plan, number, found, answer, reader).row()
     row = {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in row.items()

@@ -20,7 +20,10 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from generator.database.round_face import RoundFace
+from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.scan import surface_to_sensor
 from recognizer.scan.session import Scan
@@ -51,6 +54,7 @@ RIGHT, WRONG, REJECTED = "right", "wrong", "rejected"
 ONE, NEXT = POLICY_NAMES = ("one", "next")
 
 Row = dict[str, Any]
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +106,9 @@ def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
     """Return the outcome of one touch, or of those that followed it: first place, last answer."""
     reader = plan.knowing(reader)
     if plan.policy == NEXT:
-        made = list(touch_until_answered(plan, number, reader, MOST))
-        spent = sum(one.seconds for one in made)
-        first = judge(plan, number, made[0].found, made[0].answer, reader, spent)
-        last = judge(plan, number, made[-1].found, made[-1].answer, reader)
-        answered = {name: getattr(last, name) for name in OF_ANSWER}
-        return replace(first, touches=len(made), **answered)
+        return judge_all(
+            plan, number, list(touch_until_answered(plan, number, reader, MOST)), reader
+        )
     found = draw_touch(plan, number, reader)
     start = time.process_time()
     answer = recognise(reader, reader.signal(found.counts), number)
@@ -140,6 +141,15 @@ def touch_until_answered(
             return
         pose = pose @ surface_to_sensor(step.dx_mm, step.dy_mm, math.radians(step.turn_deg))
         found = _touch_at(plan, found, step, reader, rng)
+
+
+def judge_all(plan: TouchPlan, number: int, made: list[PolicyTouch], reader: Reader) -> Trial:
+    """Return the outcome of touches that followed each other: first place, last answer."""
+    spent = sum(one.seconds for one in made)
+    first = judge(plan, number, made[0].found, made[0].answer, reader, spent)
+    last = judge(plan, number, made[-1].found, made[-1].answer, reader)
+    answered = {name: getattr(last, name) for name in OF_ANSWER}
+    return replace(first, touches=len(made), **answered)
 
 
 def _touch_at(
@@ -178,9 +188,11 @@ def judge(
         if (answer.object, answer.face) == touched and T is not None and (
             answer.covariance is not None
         ):  # fmt: skip
-            turn = math.remainder(math.atan2(T[1, 0], T[0, 0]) - touch.theta_rad, 2 * math.pi)
-            away = np.array([T[0, 3] - touch.x_mm, T[1, 3] - touch.y_mm, turn])
-            error, degrees = math.hypot(away[0], away[1]), math.degrees(turn)
+            away = _away(T, touch)
+            held = find_face(reader.lab, *touched)
+            if held is not None and held[0].round and math.hypot(away[0], away[1]) >= NEAR_MM:
+                away = _away(T, _across_seam(held[0].round, T, touch))
+            error, degrees = math.hypot(away[0], away[1]), math.degrees(away[2])
             chi2 = float(away @ np.linalg.solve(answer.covariance, away))
             verdict = RIGHT if error < NEAR_MM and abs(degrees) < NEAR_DEG else WRONG
     edge, symbols, enough = math.nan, 0, False
@@ -218,6 +230,25 @@ def judge(
         drawn_anew=" | ".join(found.resampled),
         seconds=seconds,
     )
+
+
+def _away(T_face_probe: Array, touch: Touch) -> Array:
+    """Return how far an answer is from a touch: x, y, turn."""
+    turn = math.atan2(T_face_probe[1, 0], T_face_probe[0, 0]) - touch.theta_rad
+    x, y = T_face_probe[:2, 3]
+    return np.array([x - touch.x_mm, y - touch.y_mm, math.remainder(turn, math.tau)])
+
+
+def _across_seam(face: RoundFace, T_face_probe: Array, touch: Touch) -> Touch:
+    """Return a touch of a round face as it stands in the plane that touches where the answer is.
+
+    The unrolled plane has a place beside the seam of a closed face twice; the object has it once.
+    """
+    T_object_plane = face.tangent(float(T_face_probe[0, 3]), float(T_face_probe[1, 3]))
+    T = np.linalg.solve(T_object_plane, face.tangent(touch.x_mm, touch.y_mm))
+    x, y = (T @ (touch.x_mm, touch.y_mm, 0.0, 1.0))[:2].tolist()
+    c, s = (T[:2, :2] @ (math.cos(touch.theta_rad), math.sin(touch.theta_rad))).tolist()
+    return replace(touch, x_mm=x, y_mm=y, theta_rad=math.atan2(s, c))
 
 
 def find_face(lab: Lab, object_name: str, face: str) -> tuple[EncodedFace, int] | None:

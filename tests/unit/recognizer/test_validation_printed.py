@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from generator.errors import PrintError
@@ -28,9 +29,11 @@ from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import AMBIGUOUS, NextTouch, refusal
 from recognizer.validation.draw import draw_again, draw_touch
 from recognizer.validation.errors import ValidationError
+from recognizer.validation.pipeline import validate
 from recognizer.validation.printing import find_parts
+from recognizer.validation.repeat import repeat_touch
 from recognizer.validation.touch_plan import TouchPlan
-from recognizer.validation.trial import NEXT, touch_until_answered, trial
+from recognizer.validation.trial import NEXT, judge, touch_until_answered, trial
 
 PLAN = TouchPlan("", 5, "typical", "corner", policy=NEXT)
 
@@ -70,6 +73,68 @@ def test_steps_are_made_from_the_sensor_s_frame_by_the_same_sensor(url, reader, 
     dead = [one.found.counts < 40 for one in made]
     assert np.logical_and(*dead).sum() >= 90  # a third of them would be by chance
     assert len(made) == 2
+
+
+def test_a_run_of_touches_that_follow_each_other_repeats(url, tmp_path):
+    options = {"policy": NEXT, "kinds": "corner", "surfaces": "database", "study": 0, "seed": 6}
+    validate((), database=url, folder=tmp_path / "run", touches=6, **options)
+    rows = pq.read_table(tmp_path / "run" / "trials.parquet").to_pylist()
+    row = next(row for row in rows if row["touches"] > 1)
+    again = repeat_touch(tmp_path / "run", row["number"], None)
+    for name, value in again.items():
+        assert value == (None if value is None else row[name]), name
+
+
+L = """
+name: Bracket
+shape:
+  polyhedron:
+    vertices: [[0, 0, 0], [70, 0, 0], [70, 20, 0], [20, 20, 0], [20, 70, 0], [0, 70, 0],
+      [0, 0, 50], [70, 0, 50], [70, 20, 50], [20, 20, 50], [20, 70, 50], [0, 70, 50]]
+    faces: [[0, 5, 4, 3, 2, 1], [6, 7, 8, 9, 10, 11], [0, 1, 7, 6], [1, 2, 8, 7], [2, 3, 9, 8],
+      [3, 4, 10, 9], [4, 5, 11, 10], [5, 0, 6, 11]]
+print: {parts: whole}
+"""
+
+
+def test_a_touch_that_meets_another_face_is_drawn_again(make_lab):
+    url = f"sqlite:///{make_lab(L) / 'lab.db'}"
+    reader = Reader(open_lab(url))
+    plan = replace(PLAN, database=url, kind="anywhere", level="low", only="Bracket/F5")
+    made = [draw_touch(plan, number, reader) for number in range(8)]
+    assert any("met another face" in one.resampled for one in made)
+    reach = reader.sensor.half_mm[0]
+    for one in made:  # the wall is where x of the object is 20
+        at = one.contact.scene.T_object_surface @ (one.touch.x_mm, one.touch.y_mm, 0, 1)
+        assert at[0] - 20 > 0.7 * reach
+
+
+@pytest.mark.parametrize("shape", ["cylinder: {diameter: 44 mm, height: 50 mm}",
+                                   "cone: {diameter: 70 mm, height: 60 mm}"])  # fmt: skip
+def test_answers_across_the_seam_of_a_round_face_are_right(make_lab, shape):
+    made = make_lab(f"{{name: Round, shape: {{{shape}}}}}", formats=("stl",))
+    url = f"sqlite:///{made / 'lab.db'}"
+    reader = Reader(open_lab(url))
+    plan = replace(PLAN, database=url, level="low", kind="anywhere")
+    numbers = range(len(reader.lab.arrays[0].faces))
+    face = next(f for f in map(reader.lab.arrays[0].face, numbers) if f.round)
+    d = face.round.development
+    start, end = (d.low[0] + d.high[0]) / 2, (d.low[-1] + d.high[-1]) / 2  # one place
+    up, over = d.high[0] - d.low[0], d.high[-1] - d.low[-1]
+    turn = math.atan2(over[1], over[0]) - math.atan2(up[1], up[0])
+    drawn = draw_touch(replace(plan, only=f"Round/{face.face}"), 0, reader)
+    found = replace(drawn, touch=replace(drawn.touch, x_mm=start[0], y_mm=start[1], theta_rad=0.3))
+    T = np.eye(4)
+    for off, verdict in ((0.3, "right"), (3.0, "wrong")):
+        c, s = math.cos(0.3 + turn), math.sin(0.3 + turn)
+        T[:2, :2], T[:2, 3] = [[c, -s], [s, c]], end + off * over / np.hypot(*over)
+        answer = replace(
+            refusal(0, ""), object="Round", face=face.face, T_face_probe=T, covariance=np.eye(3)
+        )
+        judged = judge(plan, 0, found, answer, reader)
+        assert judged.verdict == verdict
+        assert judged.error_mm == pytest.approx(off, abs=0.01)
+        assert judged.error_deg == pytest.approx(0, abs=0.01)
 
 
 def test_a_worn_face_has_lost_the_same_symbols_elsewhere(url, reader):
