@@ -102,7 +102,8 @@ def learn_sensor(
                 evidence.append(evidence_of(verified))
             if done is not None:
                 done((turn + (number + 1) / len(inverted)) / ROUNDS)
-        state = refine_tactels(state, evidence, before)
+        if known.touches + len(images) >= LEAST_TOUCHES:
+            state = refine_tactels(state, evidence, before)
     return replace(
         state, floating=floating, touches=known.touches + len(images), drift=_drift(readings)
     )

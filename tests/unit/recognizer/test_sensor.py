@@ -183,6 +183,13 @@ def test_touches_tell_gains_and_where_tips_stand(reader, felt, monkeypatch):
         Reader(reader.lab, SensorType(rows=8), state=state)
 
 
+def test_a_few_touches_tell_nothing_of_a_sensor(reader, felt):
+    state = learn_sensor(reader, felt[0][: LEAST_TOUCHES - 1])
+    assert state.touches == LEAST_TOUCHES - 1
+    assert (state.gain == 1).all()
+    assert not state.aside_mm.any()
+
+
 def test_flips_are_read_from_an_option():
     image = np.array([[0, 1], [2, 3]])
     assert wiring_named("").apply(image, 3).tolist() == image.tolist()
