@@ -24,7 +24,7 @@ class RecognizerError(EncodedObjectsError):
 
 
 class LabError(RecognizerError):
-    """A database without an object that can be read by touch."""
+    """A database without an object, or without the one that is named, to be read by touch."""
 
 
 class TouchError(RecognizerError):

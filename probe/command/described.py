@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base import output
-from encoded_objects.base.errors import without_password
+from encoded_objects.base.errors import printable, without_password
 from encoded_objects.base.output import count_of, pairs, write_json
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from encoded_objects.base.sensor_type_file import (
@@ -158,7 +158,7 @@ def _describe_recording(name: str, sensor_type: str) -> Described:
         "written by": held.tool_version or "another programme",
     }
     more = {str(key): _shorten(value) for key, value in origin.more.items()}
-    return values, lines | more
+    return values, {printable(key): printable(text) for key, text in (lines | more).items()}
 
 
 def _type_of(held: Recording, asked: str) -> str:

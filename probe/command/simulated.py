@@ -21,8 +21,6 @@ from probe.simulate.simulation import SimulatedProbe, SimulatedTouch, TouchOptio
 if TYPE_CHECKING:
     from probe.simulate.scan import ScanKind
 
-BLOCKED_MM = 3.0  #: over the face; symbols are 1 mm high
-
 
 def simulate_touches(options: SimulateOptions) -> int:
     """Simulate and write; returns the exit code. The files of an interrupted run are complete.
@@ -66,8 +64,7 @@ def simulate_touches(options: SimulateOptions) -> int:
             draft.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", "utf-8")
     written = [str(out) for out in (output, png, truth) if out is not None]
     _say(result, first, written, as_json=options.as_json)
-    blocked = [one["T_face_probe"][2][3] for one in kept if one["T_face_probe"] is not None]
-    blocked = [z_mm for z_mm in blocked if z_mm > BLOCKED_MM]
+    blocked = [one["T_face_probe"][2][3] for one in kept if "met_another_face" in one]
     if blocked:
         met = count_of(len(blocked), "touch")
         message(f"{met} met another face of the part, {max(blocked):.1f} mm over this one")

@@ -26,6 +26,7 @@ from encoded_objects.base.foreign import DAMAGE, open_regular
 from probe.errors import RecordingError
 
 _PART = ".part"
+SAVE: Final = "copy it again, or save what can be read with `repair`"  #: of a damaged file
 _FLOCK: Final = "hhqqi0q"  #: struct flock: type, whence, start, length (0: all), process
 _OTHER_FOLDER = "choose a folder that you may read and write"
 _FIXES = {
@@ -67,7 +68,7 @@ def damaged_error(path: Path, action: str = "read") -> RecordingError:
     """Return the error of a damaged file."""
     return RecordingError(
         f"it is damaged: cannot {action} it",
-        fix="copy it again, or save what can be read with `repair`",
+        fix=SAVE,
         place=path,
     )
 

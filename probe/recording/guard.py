@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 
 from encoded_objects.base.foreign import open_regular, regular_size
 from probe.errors import RecordingError
-from probe.recording.files import blank_error, explain_errors, is_part, not_closed_error
+from probe.recording.files import SAVE, blank_error, explain_errors, is_part, not_closed_error
 
 if TYPE_CHECKING:
     import h5py
@@ -76,7 +76,7 @@ def open_hdf5(
     if head.truncated and not damaged and not (live and head.writing):
         raise RecordingError(
             f"it is truncated: {head.size} of {head.end} bytes",
-            fix="copy it again, or save what can be read with `repair`",
+            fix=SAVE,
             place=path,
         )
     if head.writing and not live and not damaged:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
@@ -17,6 +18,7 @@ from types import MappingProxyType
 
 from probe.errors import RecordingError
 from probe.recording.files import (
+    SAVE,
     draft_of,
     explain_errors,
     final_of,
@@ -56,7 +58,7 @@ def repair(path: Path | str) -> RepairResult:
         raise RecordingError(
             "it is still being written", fix="stop the recording first", place=path
         )
-    with open_frames(path, damaged=True) as file:
+    with _open_damaged(path) as file:
         target = _free_name(path, file.piece) if is_part(path) else path
         frames = sum(map(len, _readable_blocks(file)))
         lost, origin = file.frames - frames, file.origin
@@ -79,6 +81,21 @@ def repair(path: Path | str) -> RepairResult:
         if path != target:
             os.rename(path, target)
     return RepairResult(target, frames, lost, changed=True)
+
+
+@contextmanager
+def _open_damaged(path: Path) -> Iterator[FrameFile]:
+    """Open a file in whatever state; one that cannot be opened is not sent to `repair` again."""
+    with ExitStack() as stack:
+        try:
+            file = stack.enter_context(open_frames(path, damaged=True))
+        except RecordingError as error:
+            if error.fix != SAVE:
+                raise
+            raise RecordingError(
+                "it is damaged: nothing in it can be read", fix="copy it again", place=path
+            ) from error
+        yield file
 
 
 def _readable_blocks(file: FrameFile) -> Iterator[FrameBlock]:

@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 from typing import Any, Literal
 
@@ -38,12 +39,16 @@ from probe.simulate.sensor import simulated_sensor
 from probe.simulate.target import surface_of
 
 DRAWS = 50  # of a touch at random until it has an equilibrium
+BLOCKED_MM = 3.0  #: over a flat face; symbols are 1 mm high
 _WAY = 1 << 32  # of the generator that draws a scan's path: no touch has that number
 
 
 @dataclass(frozen=True, slots=True)
 class TouchOptions:
-    """Touches as a person names them: mm, degrees, N; None where they say nothing."""
+    """Touches as a person names them: mm, degrees, N; None where they say nothing.
+
+    Raises SurfaceError: no touch, no frame, or a seed below 0.
+    """
 
     x_mm: float | None = None
     y_mm: float | None = None
@@ -55,6 +60,13 @@ class TouchOptions:
     frames: int = 1  #: of each touch
     seed: int = 0
     scan: ScanKind | None = None  #: None: touches by themselves
+
+    def __post_init__(self) -> None:
+        for name, least in (("touches", 1), ("frames", 1), ("seed", 0)):
+            value = getattr(self, name)
+            whole = isinstance(value, Integral) and not isinstance(value, bool)
+            if not (whole and value >= least) and (name, value) != ("touches", None):
+                raise SurfaceError(f"{name} {value!r}", fix=f"give a whole number from {least} on")
 
     def draw(self, scene: Scene, sensor: SensorType, rng: np.random.Generator) -> Touch:
         """Return a touch; values that are not named are drawn, or have a default of the type.
@@ -119,7 +131,14 @@ class SimulatedTouch:
             "T_face_probe": None if T_face_probe is None else T_face_probe.tolist(),
             "T_object_probe": None if T_object_probe is None else T_object_probe.tolist(),
             **({} if T_base is None else {"T_base_probe": T_base.tolist()}),
+            **({"met_another_face": True} if self._blocked() else {}),
         }
+
+    def _blocked(self) -> bool:
+        """Whether the plate rests on another face of the part, in front of a flat one."""
+        scene, z_mm = self.scene, self.contact.z_mm
+        flat = scene.T_object_surface is not None and scene.scene_at is None  # and its frame known
+        return flat and BLOCKED_MM < z_mm < math.inf
 
 
 class SimulatedProbe:

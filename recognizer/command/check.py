@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -12,6 +13,7 @@ from encoded_objects.base.options import Application, Argument, Json, Option, co
 from recognizer.command.options import Database
 
 if TYPE_CHECKING:
+    from recognizer.touch.lab import Lab
     from recognizer.touch.reader import Reader
     from recognizer.touch.source import TouchImage, TouchSource
 
@@ -22,6 +24,8 @@ near its middle, the sensor's x axis (from column 0 to the last one) along the f
 RECORDING holds such touches; with --port the next touch is taken.
 """
 EPILOG = "Exit codes: 0 as drawn, 1 otherwise or not recognised, 2 bad input, 3 device, 4 database."
+
+SHOWN = 12  #: names of objects or faces in a message
 
 app = Application(named=True)
 
@@ -59,12 +63,42 @@ def check(
     from recognizer.touch.reader import Reader
 
     lab = open_lab(database)
+    _require_face(lab, object_name, face)
     source, touches = _placed_touches(recording, port, sensor_type, at, every)
     reader = Reader(lab, source.sensor)
     agreed = _report(reader, source, touches, (object_name, face), as_json)
     if state is not None and agreed is not None:
         _keep(state, reader, source, agreed)
     return 0 if agreed == () else 1
+
+
+def _require_face(lab: Lab, object_name: str, face: str) -> None:
+    """Refuse an object or a face that no touch can show."""
+    from recognizer.errors import LabError
+
+    known = {each.names[one] for each in lab.arrays for one in each.faces[:, 0].tolist()}
+    if object_name not in known:
+        raise LabError(
+            f"no object with symbols is called '{object_name}'",
+            fix=f"objects: {_first_names(sorted(known))}",
+            place=lab.url,
+        )
+    faces = [
+        each.face(number).face
+        for each in lab.arrays
+        for number, (object_id, _) in enumerate(each.faces.tolist())
+        if each.names[object_id] == object_name
+    ]
+    if face not in faces:
+        raise LabError(
+            f"no face with symbols of {object_name} is called '{face}'",
+            fix=f"faces: {_first_names(faces)}",
+            place=lab.url,
+        )
+
+
+def _first_names(names: Sequence[str]) -> str:
+    return ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
 
 
 def _keep(path: Path, reader: Reader, source: TouchSource, changes: tuple[str, ...]) -> None:

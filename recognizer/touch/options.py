@@ -8,12 +8,29 @@ mismatch).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields
+from numbers import Integral, Real
+from typing import Any
+
+from encoded_objects.base.errors import UsageError
 
 #: Nats between a symbol and none where rounding decides: of a cell that is seen by its rim alone.
 #: Scores of a cell are bounded, so that differences of 6, 8 and 14 nats are common: limits stand
 #: this much below whole numbers.
 TIE_NATS = 1e-4
+ABOVE_ZERO = ("doubt", "scale_sd")  #: by these is divided
+
+
+def _require(
+    name: str, value: Any, *, whole: bool = False, least: int = 0, above: bool = False
+) -> None:
+    """Refuse what is no finite number, or no whole one, or less than the least."""
+    number = isinstance(value, Integral if whole else Real) and not isinstance(value, bool)
+    if not number or not math.isfinite(value) or value < least or (above and value == least):
+        kind = "a whole number" if whole else "a finite number"
+        given = f"above {least}" if above else f"of {least} or more"
+        raise UsageError(f"{name} {value!r}", fix=f"give {kind} {given}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +43,19 @@ class Effort:
     final_steps: int = 2
     again: int = 0  #: of the best lattices, under whose gains the image is searched again
 
+    def __post_init__(self) -> None:
+        for name in ("candidates", "finalists"):
+            _require(name, getattr(self, name), whole=True, least=1)
+        for name in ("steps", "final_steps", "again"):
+            _require(name, getattr(self, name), whole=True)
+
 
 @dataclass(frozen=True, slots=True)
 class ReaderOptions:
-    """How a touch is read, and when an answer is given."""
+    """How a touch is read, and when an answer is given.
+
+    Raises UsageError: a value that is no number, not finite, or out of its range.
+    """
 
     margin: float = 10.0 - TIE_NATS  #: nats over the best other place
     margin_by_few: float = 14.0 - TIE_NATS  #: where agreeing symbols say less than 22 bits
@@ -46,6 +72,20 @@ class ReaderOptions:
     #: of the second, of touches that the first does not answer or of which few cells agree: five
     #: times the work (`docs/recognizer.md`)
     thorough: Effort = Effort(12, 4, 6, 6, again=2)
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            kind = type(each.default)
+            if kind is float:
+                _require(each.name, value, above=each.name in ABOVE_ZERO)
+            elif not isinstance(value, kind):
+                raise UsageError(
+                    f"{each.name} {value!r}",
+                    fix=f"give {'True or False' if kind is bool else 'an Effort'}",
+                )
+        if self.scale_most >= 1:
+            raise UsageError(f"scale_most {self.scale_most}", fix="give a share below 1")
 
 
 DEFAULTS = ReaderOptions()

@@ -20,6 +20,7 @@ from generator.array import profile
 from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.simulate.scene import Scene, TouchRanges, bare_scene, random_touches
+from probe.simulate.simulation import BLOCKED_MM
 from probe.simulate.world.sensor import LevelSensor, SensorInstance, sample_sensor
 from probe.simulate.world.surfaces import (
     AdjacentParts,
@@ -64,7 +65,6 @@ UNREST = (
     ("does not settle", "no rest in the engine"),
     ("another face", "met another face"),
 )
-BLOCKED_MM = 3.0  #: rest of the plate over a flat face, symbols of 1 mm; higher is another face
 DRAWS = 64  #: of a touch that shows enough symbols to exchange some
 TURN_RAD = 0.01  #: a panel turned by less stands as registered
 FOREIGN_SYMBOLS = 64  #: rows and columns of foreign symbols, repeated without end

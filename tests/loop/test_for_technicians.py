@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import signal
 import sqlite3
@@ -102,8 +103,11 @@ def test_a_touch_that_meets_a_wall_in_front_of_its_face_says_so(tmp_path, monkey
     write_stl(tmp_path / "corner.stl", base + manifold3d.Manifold.cube([10, 60, 60]))
     encode("corner.stl", name="Corner", database="lab.db", formats=("stl",))
     for y, met in ((20, False), (46, True)):
-        code, _, said = ask(probe_sensor, "simulate", "lab.db#Corner/F3", "--x", 30, "--y", y)
+        place = ("--x", 30, "--y", y, "--truth", f"{y}.json")
+        code, _, said = ask(probe_sensor, "simulate", "lab.db#Corner/F3", *place)
         assert code == 0
+        (truth,) = json.loads((tmp_path / f"{y}.json").read_text("utf-8"))["touches"]
+        assert truth.get("met_another_face", False) == met
         assert ("1 touch met another face of the part, 48" in said) == met
 
 

@@ -136,6 +136,16 @@ def test_bias_warns_of_drift_with_code_1(asked, bench):
     assert json.loads(asked(*words, "--json")[1])["shift_counts"] > 20
 
 
+def test_attributes_cannot_command_a_terminal(asked, tmp_path):
+    more = {"note": "a\x1b[31mred\x07", "bell\x07": "b"}
+    recorded(tmp_path / "a.h5", np.zeros((2, 16, 16), np.uint16), attributes=more)
+    code, out, err = asked("info", str(tmp_path / "a.h5"))
+    assert (code, err) == (0, "")
+    assert "a\ufffd[31mred\ufffd" in out
+    assert "bell\ufffd" in out
+    assert not {"\x1b", "\x07"} & set(out)
+
+
 def test_boards_from_text():
     assert board_from("none") is None
     assert board_from("simulated") == Electronics()

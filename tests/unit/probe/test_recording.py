@@ -193,9 +193,10 @@ def test_heads_that_mean_harm_are_damage(tmp_path, head):
     text = (head if isinstance(head, str) else json.dumps(head)).encode()
     path = tmp_path / "touch.h5"
     path.write_bytes(b"TOUCHLOG" + struct.pack("<II", len(text), zlib.crc32(text)) + text)
-    for attempt in (Recording, repair):
-        with pytest.raises(RecordingError, match="damaged: cannot read it"):
-            attempt(path)
+    with pytest.raises(RecordingError, match=r"damaged: cannot read it; copy .*`repair`"):
+        Recording(path)
+    with pytest.raises(RecordingError, match=r"nothing in it can be read; copy it again$"):
+        repair(path)
     content = b"TOUCHLOG" + struct.pack("<II", 1 << 31, 0)
     path.write_bytes(content)
     with pytest.raises(RecordingError, match="damaged: cannot read it"):

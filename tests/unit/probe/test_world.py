@@ -13,6 +13,7 @@ from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import CircuitError, SurfaceError
 from probe.simulate.scene import bare_scene
+from probe.simulate.simulation import TouchOptions
 from probe.simulate.world.levels import SOUND
 from probe.simulate.world.sensor import MOUNTINGS, LevelSensor, mount
 from probe.simulate.world.surfaces import (
@@ -65,6 +66,9 @@ ONES, APART = np.ones((5, 4)), np.ones((3, 3)) * [[1], [0], [1]]
         (lambda: mount(np.zeros((12, 32)), "quarter turn"), "cannot be mounted 'quarter turn'"),
         (lambda: place_adjacent(polygon([STAR]), OBLONG, np.random.default_rng(1)),
          "no edge beside which"),
+        (lambda: TouchOptions(frames=0), "frames 0; give a whole number from 1 on"),
+        (lambda: TouchOptions(touches=0), "touches 0; give a whole number from 1 on"),
+        (lambda: TouchOptions(seed=-1), "seed -1; give a whole number from 0 on"),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(call, match):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from encoded_objects.base.errors import UsageError
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
@@ -14,6 +15,7 @@ from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
 from recognizer.errors import TouchError
 from recognizer.touch.lab import open_lab
+from recognizer.touch.options import Effort, ReaderOptions
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import (
     AMBIGUOUS,
@@ -114,6 +116,30 @@ def test_trust_must_fit_and_bad_tactels_are_not_believed(reader, counts):
     spoiled, trust = counts.copy(), np.ones((16, 16))
     spoiled[3:5, 4:9], trust[3:5, 4:9] = 5000.0, 0.0
     assert reader.read(spoiled, trust=trust).face == "F1"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"margin": math.nan}, "margin nan; give a finite number of 0 or more"),
+        ({"rim_mm": math.inf}, "rim_mm inf"),
+        ({"contact_n": -0.1}, "contact_n -0.1"),
+        ({"margin_by_few": "14"}, "margin_by_few '14'"),
+        ({"doubt": 0.0}, "doubt 0.0; give a finite number above 0"),
+        ({"scale_sd": 0}, "scale_sd 0; "),
+        ({"scale_most": 1.0}, "scale_most 1.0; give a share below 1"),
+        ({"as_designed": 1}, "as_designed 1; give True or False"),
+        ({"first": (4, 2)}, "an Effort"),
+    ],
+)
+def test_knobs_that_mean_nothing_are_refused(wrong, said):
+    with pytest.raises(UsageError, match=said):
+        ReaderOptions(**wrong)
+
+
+def test_an_effort_is_of_whole_numbers():
+    with pytest.raises(UsageError, match="candidates 0; give a whole number of 1 or more"):
+        Effort(candidates=0)
 
 
 def test_every_reason_has_a_way_out():
