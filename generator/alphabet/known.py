@@ -140,7 +140,7 @@ _DENSE_8 = (
     Glyph("A^6", line((-1, -1), (0, 0), (1, -1)) + line((0, 0), (-1, 1))),
 )
 
-# Letters made for tactels: docs/alphabets.md says how they were found.
+# Letters made for tactels (docs/alphabets.md): `tests/campaigns/alphabets.py --printer fdm-0.4`.
 _TACTEL_4 = (
     Glyph("0", line((-1, 0), (-1, -1), (0, -1), (1, 0), (1, 1))),
     Glyph("1", line((-1, 1), (-1, -1), (1, -1))),

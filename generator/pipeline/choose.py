@@ -192,6 +192,7 @@ def choose_array(
 def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> ArrayChoice:
     """Take finer symbols on the same array where they show faces that stay blank otherwise."""
     blank = left = _blank(coarse.plans, coarse.alone)
+    areas = [surface_areas(plan.polyhedron) for plan in coarse.plans]
     found, specs = coarse, [plan.spec for plan in coarse.plans]
     for share in FINER_SHARES:
         try:
@@ -209,16 +210,14 @@ def _choose_finer(coarse: ArrayChoice, room: int, solid: Polyhedron | None) -> A
             continue
         now = _blank(plans, alone)
         shown = max(
-            (sum(before.values()) - sum(after.values()))
-            / sum(surface_areas(plan.polyhedron).values())
-            for plan, before, after in zip(plans, left, now, strict=True)
+            (sum(of[k] for k in before) - sum(of[k] for k in after)) / sum(of.values())
+            for of, before, after in zip(areas, left, now, strict=True)
         )
         if shown >= LEAST_SHOWN:
-            faces, of = (sum(map(len, one)) for one in (now, blank))
-            pitch = _share_mm(share, specs[0])
+            faces, coarser = (sum(map(len, one)) for one in (now, blank))
             note = (
-                f"pitch {pitch:g} mm is taken: it shows places on {of - faces} of the {of} faces "
-                "that coarser symbols leave blank"
+                f"pitch {_share_mm(share, specs[0]):g} mm is taken: it shows places on "
+                f"{coarser - faces} of the {coarser} faces that coarser symbols leave blank"
             )
             found, left = ArrayChoice(plans, (*coarse.notes, note), alone), now
     return found
@@ -318,17 +317,12 @@ def _cells(layouts: Sequence[Layout]) -> int:
     return sum(len(face.labels) for layout in layouts for face in layout.faces)
 
 
-def _blank(plans: Sequence[ObjectPlan], layouts: Sequence[Layout]) -> list[dict[int, float]]:
-    """Return the area (mm^2) of each face that could carry symbols and shows none, by object.
-
-    Without layouts no face shows any.
-    """
-    blank = []
-    for number, plan in enumerate(plans):
-        areas = surface_areas(plan.polyhedron)
-        faces = layouts[number].blank_faces if layouts else areas.keys()
-        blank.append({face: areas[face] for face in set(faces) - plan.blank_faces})
-    return blank
+def _blank(plans: Sequence[ObjectPlan], layouts: Sequence[Layout]) -> list[set[int]]:
+    """Return the faces that could carry symbols and show none, by object; all without layouts."""
+    if not layouts:
+        return [set(range(len(plan.polyhedron.faces))) - plan.blank_faces for plan in plans]
+    pairs = zip(plans, layouts, strict=True)
+    return [set(layout.blank_faces) - plan.blank_faces for plan, layout in pairs]
 
 
 def _room(array: SymbolArray, connection: Connection | None) -> int:

@@ -21,6 +21,7 @@ from probe.errors import SurfaceError
 from probe.surface.contract import HeightMap
 from probe.surface.polygon import FaceRegion, polygon
 
+BLOCKED_MM = 3.0  #: over a flat face; symbols are 1 mm high
 GRID = 64  #: points each way among which the inmost of a region is chosen
 BARE_MM = 100.0  #: half the side of the region of a surface of no object
 TRIES = 16_000  #: draws for one touch: a region that fills 0.1 % of its box is still found
@@ -42,6 +43,11 @@ class Scene:
     def under(self, touch: Touch) -> Scene:
         """Return the scene of a touch; on a flat face that is always this one."""
         return self if self.scene_at is None else self.scene_at(touch)
+
+    def meets_another_face(self, z_mm: float) -> bool:
+        """Whether a plate at rest so high over a flat face stands on another one of its part."""
+        flat = self.T_object_surface is not None and self.scene_at is None  # and its frame known
+        return flat and BLOCKED_MM < z_mm < math.inf
 
     def centre_mm(self) -> NDArray[np.float64]:
         """Return the region's middle (2,): the mean of its area, or its inmost point."""

@@ -39,7 +39,6 @@ from probe.simulate.sensor import simulated_sensor
 from probe.simulate.target import surface_of
 
 DRAWS = 50  # of a touch at random until it has an equilibrium
-BLOCKED_MM = 3.0  #: over a flat face; symbols are 1 mm high
 _WAY = 1 << 32  # of the generator that draws a scan's path: no touch has that number
 
 
@@ -131,14 +130,8 @@ class SimulatedTouch:
             "T_face_probe": None if T_face_probe is None else T_face_probe.tolist(),
             "T_object_probe": None if T_object_probe is None else T_object_probe.tolist(),
             **({} if T_base is None else {"T_base_probe": T_base.tolist()}),
-            **({"met_another_face": True} if self._blocked() else {}),
+            **({"met_another_face": True} if self.scene.meets_another_face(contact.z_mm) else {}),
         }
-
-    def _blocked(self) -> bool:
-        """Whether the plate rests on another face of the part, in front of a flat one."""
-        scene, z_mm = self.scene, self.contact.z_mm
-        flat = scene.T_object_surface is not None and scene.scene_at is None  # and its frame known
-        return flat and BLOCKED_MM < z_mm < math.inf
 
 
 class SimulatedProbe:

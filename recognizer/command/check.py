@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -74,13 +73,14 @@ def check(
 
 def _require_face(lab: Lab, object_name: str, face: str) -> None:
     """Refuse an object or a face that no touch can show."""
+    from encoded_objects.base.output import some_of
     from recognizer.errors import LabError
 
     known = {each.names[one] for each in lab.arrays for one in each.faces[:, 0].tolist()}
     if object_name not in known:
         raise LabError(
             f"no object with symbols is called '{object_name}'",
-            fix=f"objects: {_first_names(sorted(known))}",
+            fix=f"objects: {some_of(sorted(known), SHOWN)}",
             place=lab.url,
         )
     faces = [
@@ -92,13 +92,9 @@ def _require_face(lab: Lab, object_name: str, face: str) -> None:
     if face not in faces:
         raise LabError(
             f"no face with symbols of {object_name} is called '{face}'",
-            fix=f"faces: {_first_names(faces)}",
+            fix=f"faces: {some_of(faces, SHOWN)}",
             place=lab.url,
         )
-
-
-def _first_names(names: Sequence[str]) -> str:
-    return ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
 
 
 def _keep(path: Path, reader: Reader, source: TouchSource, changes: tuple[str, ...]) -> None:

@@ -20,7 +20,6 @@ from generator.array import profile
 from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.simulate.scene import Scene, TouchRanges, bare_scene, random_touches
-from probe.simulate.simulation import BLOCKED_MM
 from probe.simulate.world.sensor import LevelSensor, SensorInstance, sample_sensor
 from probe.simulate.world.surfaces import (
     AdjacentParts,
@@ -220,8 +219,7 @@ def _read(
 ) -> NDArray[np.uint16]:  # fmt: skip
     worse = LevelSensor(reader.sensor, plan.noise, plan.engine, sensor)
     reading = worse.read(scene, touch, rng)
-    flat = scene.object_name and scene.scene_at is None
-    if flat and BLOCKED_MM < reading.contact.z_mm < math.inf:
+    if scene.meets_another_face(reading.contact.z_mm):
         raise ContactError(
             f"the plate meets another face, {reading.contact.z_mm:.1f} mm over {scene.face}",
             fix="move the sensor away from what stands over the face",

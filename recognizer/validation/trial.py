@@ -189,9 +189,10 @@ def judge(
             answer.covariance is not None
         ):  # fmt: skip
             away = _away(T, touch)
-            held = find_face(reader.lab, *touched)
-            if held is not None and held[0].round and math.hypot(away[0], away[1]) >= NEAR_MM:
-                away = _away(T, _across_seam(held[0].round, T, touch))
+            if math.hypot(away[0], away[1]) >= NEAR_MM:
+                held = find_face(reader.lab, *touched)
+                if held is not None and held[0].round:
+                    away = _away(T, _across_seam(held[0].round, T, touch))
             error, degrees = math.hypot(away[0], away[1]), math.degrees(away[2])
             chi2 = float(away @ np.linalg.solve(answer.covariance, away))
             verdict = RIGHT if error < NEAR_MM and abs(degrees) < NEAR_DEG else WRONG
