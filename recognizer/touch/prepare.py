@@ -64,7 +64,7 @@ class PreparedLab:
         if not isinstance(self.sensor, SensorType):
             raise LabError(
                 f"{self.sensor!r} is no sensor type",
-                fix="give a SensorType; sensor_type_named(NAME) of encoded_objects.base.sensor_type_file",
+                fix="give a SensorType: SensorType() is fsr-16",
             )
         made = tuple(
             Prepared(each, *template_and_bank(each.alphabet, each.style, self.sensor))
