@@ -1,7 +1,7 @@
 """`--learn FILE` and `--sensor-state FILE`: a sensor is learned while its touches are read.
 
-A recording is learned from before its touches are read; a port every `EVERY` touches, and at its
-end. What is known is kept in the file each time, whole or not at all.
+A recording is learned from before its touches are read, each by what others say; a port every
+`EVERY` touches, and at its end. What is known is kept in the file each time, whole or not at all.
 """
 
 from __future__ import annotations
@@ -9,11 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from encoded_objects.base.output import message, progress_bar
 from recognizer.errors import SensorStateError
 from recognizer.touch.reader import Reader
 from recognizer.touch.source import TouchImage, TouchSource
+
+if TYPE_CHECKING:
+    from recognizer.sensor.learn import LearnedSensor
 
 EVERY = 25  #: touches of a port after which the sensor is learned again
 MOST = 200  #: touches of a recording that are learned from
@@ -27,7 +31,8 @@ class SensorLearning:
     source: TouchSource
     path: Path | None  #: where it is kept; None: nothing is learned
     waiting: list[TouchImage] = field(default_factory=list)  #: touches not learned from yet
-    done: bool = False  #: whether the touches were learned from already
+    learned: LearnedSensor | None = None  #: of a recording whose touches are read next
+    taken: int = 0  #: touches of it that were read
 
     def learn_from(self, touches: Iterable[TouchImage]) -> None:
         """Learn from the touches of a recording, which are read afterwards."""
@@ -39,12 +44,15 @@ class SensorLearning:
                 bar.show(touch.seq + touch.frames, f"{len(self.waiting):,} touches")
                 if len(self.waiting) >= MOST:
                     break
-        self._learn()
-        self.done = True
+        self.learned = self._learn()
 
     def take(self, touch: TouchImage) -> Reader:
         """Return the reader of a touch; learn from those before it where there are enough."""
-        if self.path is not None and not self.done:
+        if self.learned is not None:
+            number, self.taken = self.taken, self.taken + 1
+            if number < MOST:
+                return replace(self.reader, state=self.learned.without(number))
+        elif self.path is not None:
             if len(self.waiting) >= EVERY:
                 self._learn()
             self.waiting.append(touch)
@@ -57,24 +65,22 @@ class SensorLearning:
         if len(self.waiting) >= LEAST_TOUCHES:
             self._learn()
 
-    def _learn(self) -> None:
+    def _learn(self) -> LearnedSensor:
         from recognizer.sensor.file import state_words, write_state
-        from recognizer.sensor.learn import learn_sensor
+        from recognizer.sensor.learn import learn_folds
 
-        if self.path is None:
-            return
+        assert self.path is not None
         images = [touch.counts for touch in self.waiting]
         with progress_bar("learning the sensor", 1.0) as bar:
-            state = learn_sensor(
+            learned = learn_folds(
                 self.reader, images, calibration=self.source.calibration, name=self.source.name,
                 done=bar.show,
             )  # fmt: skip
-        if self.reader.state is not None:
-            state = replace(state, mounting=self.reader.state.mounting)
-        write_state(state, self.path)
-        message(f"learned of {state_words(state)}; kept in {self.path}")
-        self.reader = replace(self.reader, state=state)
+        write_state(learned.state, self.path)
+        message(f"learned of {state_words(learned.state)}; kept in {self.path}")
+        self.reader = replace(self.reader, state=learned.state)
         self.waiting.clear()
+        return learned
 
 
 def learning_for(

@@ -47,6 +47,7 @@ MARGIN = 20.0  #: nats of an answer that gains and places are learned from
 ROUNDS = 2  #: of reading and learning
 TRIED = 6  #: touches that are read with the network inverted
 AGREE = 3  #: of them that must be answered
+FOLDS = 5  #: a touch that was learned from is read by what the other four fifths say
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,9 +59,31 @@ class Answering:
     offset: Array  #: reading without pressure, over the background; 0 where it is usual
 
 
-#: Normal equations of the unknowns (n, 3) of n tactels, log gain, x and y (mm): inverse covariance
-#: (3 n, 3 n), and slope of the log-likelihood by them (3 n,).
-TactelEvidence = tuple[Array, Array]
+@dataclass(frozen=True, slots=True, eq=False)
+class TactelEvidence:
+    """What touches say of n tactels: log gain, x and y (mm) of each."""
+
+    normal: Array  #: (3 n, 3 n) inverse covariance
+    slope: Array  #: (3 n,) of the log-likelihood
+
+    def __add__(self, other: TactelEvidence) -> TactelEvidence:
+        return TactelEvidence(self.normal + other.normal, self.slope + other.slope)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LearnedSensor:
+    """The state of a sensor by its touches."""
+
+    state: SensorState
+    folds: tuple[SensorState, ...]  #: each by all touches but every `FOLDS`-th
+
+    def without(self, number: int) -> SensorState:
+        """Return the state to read touch `number` (0, 1, ...) of those learned from.
+
+        By the state of all of them it would seem to fit too well: of 25 touches read so, 92 % lay
+        inside their 95 % ellipsoids, with 1.5 times the squared error that these tell.
+        """
+        return self.folds[number % FOLDS]
 
 
 def learn_sensor(
@@ -73,6 +96,8 @@ def learn_sensor(
 ) -> SensorState:
     """Return the state of a sensor by its touches and the reader's earlier state.
 
+    Read other touches with it; those learned from are read by `learn_folds(...).without(number)`.
+
     Parameters
     ----------
     images
@@ -82,31 +107,60 @@ def learn_sensor(
     done
         Gets the share of the work that is done, 0 ... 1.
     """
+    return learn_folds(reader, images, calibration=calibration, name=name, done=done).state
+
+
+def learn_folds(
+    reader: Reader,
+    images: Sequence[ArrayLike],
+    *,
+    calibration: Calibration | None = None,
+    name: str = "",
+    done: Callable[[float], None] | None = None,
+) -> LearnedSensor:
+    """Return the state of a sensor as `learn_sensor` does, and those to read `images` by."""
     newtons = calibration is not None
     known = reader.state or unknown_state(reader.sensor, newtons=newtons, name=name)
     readings = [np.asarray(one, np.float64) for one in images]
     floating = not newtons and (known.floating or _floats(reader, readings))
     inverted = [invert_floating(one) for one in readings] if floating else readings
     before = state = replace(known, floating=False)
+    found = None
+    if len(inverted) >= LEAST_TOUCHES:
+        found = answering_of(_forces(reader, state, inverted, calibration))
+        state = replace(state, dead=found.dead, hot=found.hot, offset=found.offset)
     for turn in range(ROUNDS):
-        if len(inverted) >= LEAST_TOUCHES:
-            found = answering_of(_forces(reader, state, inverted, calibration))
-            state = replace(state, dead=found.dead, hot=found.hot, offset=found.offset)
-        evidence: list[TactelEvidence] = []
+        evidence: list[TactelEvidence | None] = [None] * FOLDS
+        expected: list[Array] = []
+        read_with = state
         under = replace(reader, state=state)
         for number, image in enumerate(inverted):
             signal = under.signal(image, calibration=calibration)
             reading = read_touch(under, signal, number)
             answer, verified = reading.answer, reading.best
             if answer and verified is not None and (answer.margin or 0.0) > MARGIN:
-                evidence.append(evidence_of(verified))
+                one, forces = evidence_of(verified)
+                others = evidence[number % FOLDS]
+                evidence[number % FOLDS] = one if others is None else others + one
+                expected.append(forces.reshape(state.shape))
             if done is not None:
                 done((turn + (number + 1) / len(inverted)) / ROUNDS)
-        if known.touches + len(images) >= LEAST_TOUCHES:
-            state = refine_tactels(state, evidence, before)
-    return replace(
-        state, floating=floating, touches=known.touches + len(images), drift=_drift(readings)
+        if known.touches + len(images) < LEAST_TOUCHES:
+            evidence = [None] * FOLDS
+        state = refine_tactels(read_with, evidence, before)
+        if found is not None and expected:  # on round faces the outer tactels touch nothing
+            state = replace(state, dead=found.dead & ~answering_of(np.array(expected)).dead)
+
+    def finished(one: SensorState) -> SensorState:
+        touches = known.touches + len(images)
+        drift = _drift(readings)
+        return replace(one, dead=state.dead, floating=floating, touches=touches, drift=drift)
+
+    folds = (
+        refine_tactels(read_with, evidence[:fold] + evidence[fold + 1 :], before)
+        for fold in range(FOLDS)
     )
+    return LearnedSensor(finished(state), tuple(map(finished, folds)))
 
 
 def answering_of(forces: Array) -> Answering:
@@ -131,15 +185,19 @@ def answering_of(forces: Array) -> Answering:
     return Answering(dead & ~high, high & dead, np.where(high & ~dead, scale * free, 0.0))
 
 
-def evidence_of(verified: VerifiedHypothesis) -> TactelEvidence:
-    """Return the evidence of one recognised touch, under the state that it was read with."""
+def evidence_of(verified: VerifiedHypothesis) -> tuple[TactelEvidence, Array]:
+    """Return the evidence of one recognised touch, and the forces (n,) that it expects.
+
+    Both hold under the state that the touch was read with.
+    """
     fit, image = verified.fit, verified.image
     at = linearize_image(image, fit.pose[None], fit.gain[None], verified.labels_at)
     own, left = at.jacobian[0], at.left[0]
     sure = at.sure[0] * (FIRST_NOISE / fit.noise) ** 2
     c, s = np.cos(fit.theta_rad), np.sin(fit.theta_rad)
+    expected = image.forces - left
     by_tactel = np.stack(
-        [image.forces - left, c * own[:, 0] + s * own[:, 1], c * own[:, 1] - s * own[:, 0]], axis=1
+        [expected, c * own[:, 0] + s * own[:, 1], c * own[:, 1] - s * own[:, 0]], axis=1
     )
     count = len(left)
     normal = np.zeros((count, 3, count, 3))
@@ -151,23 +209,24 @@ def evidence_of(verified: VerifiedHypothesis) -> TactelEvidence:
     solved = np.linalg.solve(inner, cross.T)
     right = (by_tactel * (sure * left)[:, None]).ravel()
     right -= solved.T @ (weighed.T @ left - at.known[0] * at.precision)
-    return normal.reshape(3 * count, -1) - cross @ solved, right
+    return TactelEvidence(normal.reshape(3 * count, -1) - cross @ solved, right), expected
 
 
 def refine_tactels(
-    state: SensorState, found: Sequence[TactelEvidence], before: SensorState
+    state: SensorState, found: Sequence[TactelEvidence | None], before: SensorState
 ) -> SensorState:
     """Return a state with gains and tip places by the evidence of touches.
 
     They were read with `state`; `before` is the state before these touches.
     """
-    if not found:
+    evidence = [one for one in found if one is not None]
+    if not evidence:
         return state
     unknowns = _unknowns(state)
     known, deviation = _unknowns(before), _deviations(before)
     precision = 1.0 / deviation**2
-    normal = sum(one for one, _ in found) + np.diag(precision)
-    right = sum(one for _, one in found) + precision * (known - unknowns)
+    normal = sum(one.normal for one in evidence) + np.diag(precision)
+    right = sum(one.slope for one in evidence) + precision * (known - unknowns)
     covariance = np.linalg.inv(normal)
     values = (unknowns + covariance @ right).reshape(-1, 3)
     left = np.sqrt(np.diagonal(covariance)).reshape(-1, 3)

@@ -12,7 +12,7 @@ from probe.contact.tabs import tabs
 from probe.frame import frame_from
 from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
-from recognizer.errors import TouchError
+from recognizer.errors import LabError, TouchError
 from recognizer.touch.lab import open_lab
 from recognizer.touch.options import Effort, ReaderOptions
 from recognizer.touch.reader import Reader
@@ -113,6 +113,18 @@ def test_trust_must_fit_and_bad_tactels_are_not_believed(reader, counts):
 def test_knobs_that_mean_nothing_are_refused(wrong, said):
     with pytest.raises(UsageError, match=said):
         ReaderOptions(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("lab", "sensor", "said"),
+    [
+        ("lab.db", SensorType(), "'lab.db' is no open lab"),
+        (None, "fsr-8x8", "'fsr-8x8' is no sensor type"),
+    ],
+)
+def test_a_reader_takes_an_open_lab_and_a_type(reader, lab, sensor, said):
+    with pytest.raises(LabError, match=said):
+        Reader(lab or reader.lab, sensor)
 
 
 def test_an_effort_is_of_whole_numbers():

@@ -15,7 +15,7 @@ from recognizer.errors import SensorStateError, WiringError
 from recognizer.scan.session import Scan
 from recognizer.sensor import learn
 from recognizer.sensor.file import read_state, state_words, write_state
-from recognizer.sensor.learn import LEAST_TOUCHES, answering_of, learn_sensor
+from recognizer.sensor.learn import LEAST_TOUCHES, answering_of, learn_folds, learn_sensor
 from recognizer.sensor.wiring import find_mounting, wiring_hint, wiring_named
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
@@ -147,17 +147,23 @@ def reader(make_lab):
 def felt(reader):
     """Counts of 24 places under tips that stand aside, some tactels dead; and the tips."""
     rng = np.random.default_rng(6)
-    surface = registered_surface(reader.lab.url, "Cube", "F1").surface
     tips = Tips(shifts_mm=rng.normal(0, 0.1, (16, 16, 2)), lengths_mm=np.zeros((16, 16)))
     gain = np.exp(rng.normal(0, 0.15, (16, 16)))
+    return images_of(reader, rng, 24, (20, 40), 3, tips, gain), tips, gain
+
+
+def images_of(reader, rng, count, x_mm, turn, tips, gain):
+    """Counts of touches of a face that are turned by at most `turn`; some tactels are dead."""
+    surface = registered_surface(reader.lab.url, "Cube", "F1").surface
     images = []
-    for _ in range(24):
-        at = Touch(*rng.uniform(20, 40, 2), rng.uniform(-3, 3), rng.uniform(50, 90))
+    for _ in range(count):
+        x, y = rng.uniform(*np.transpose([x_mm, (20, 40)]))
+        at = Touch(x, y, rng.uniform(-turn, turn), rng.uniform(50, 90))
         forces = ENGINE.press(surface, SENSOR, at, tips).forces_n
         for place in DEAD:
             forces[place] = 0.0
         images.append(np.rint(8 + 150 * gain * forces + rng.normal(0, 1, (16, 16))).clip(0))
-    return images, tips, gain
+    return images
 
 
 def test_touches_tell_gains_and_where_tips_stand(reader, felt, monkeypatch):
@@ -181,6 +187,28 @@ def test_touches_tell_gains_and_where_tips_stand(reader, felt, monkeypatch):
     assert not signal.trust[state.dead].any()
     with pytest.raises(SensorStateError, match="for one of"):
         Reader(reader.lab, SensorType(rows=8), state=state)
+
+
+def test_tactels_that_no_touch_reached_are_not_dead(reader):
+    tips = Tips(shifts_mm=np.zeros((16, 16, 2)), lengths_mm=np.zeros((16, 16)))
+    rng = np.random.default_rng(8)
+    images = images_of(reader, rng, 20, (53, 54), 0.02, tips, np.ones((16, 16)))  # over an edge
+    state = learn_sensor(reader, images)
+    found = places_of(state.dead)
+    assert not state.dead[:, 13:].any()  # all 13 to 15 without touches that tell what they expect
+    assert [at for at in found if at[1] < 12] == [at for at in DEAD if at[1] < 12]
+    assert len(found) < 10
+
+
+def test_a_touch_does_not_judge_the_state_that_it_is_read_by(reader, felt, monkeypatch):
+    monkeypatch.setattr(learn, "ROUNDS", 1)
+    images = list(felt[0])
+    before = learn_folds(reader, images)
+    images[3] = images[4]
+    after = learn_folds(reader, images)
+    assert np.array_equal(before.without(3).aside_mm, after.without(3).aside_mm)
+    assert not np.array_equal(before.without(4).aside_mm, after.without(4).aside_mm)
+    assert not np.array_equal(before.state.aside_mm, after.state.aside_mm)
 
 
 def test_a_few_touches_tell_nothing_of_a_sensor(reader, felt):
