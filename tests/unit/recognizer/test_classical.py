@@ -85,9 +85,6 @@ def test_products_find_steps_to_a_quarter_of_a_tactel_where_something_is_felt_in
     assert apart.poses == pytest.approx(relative_poses(wrong))
 
 
-# --- reading ----------------------------------------------------------------------------
-
-
 def test_bad_tactels_are_filled_by_other_touches():
     poses = np.array([[0.0, 0, 0], [6.7, 0, 0]])
     trust = np.ones((16, 16))
@@ -98,6 +95,9 @@ def test_bad_tactels_are_filled_by_other_touches():
     inner = (np.abs(at[..., 0] - 2.4) < 0.5) & (np.abs(at[..., 1]) < 10)
     assert found.image.defined[inner].all()
     assert np.abs(found.image.values - pattern(at[..., 0], at[..., 1]))[inner].max() < 0.3
+
+
+# --- reading ----------------------------------------------------------------------------
 
 
 def test_a_scan_names_object_face_and_place(lab, scan):
