@@ -323,9 +323,7 @@ def _exchanged(
     number = EXCHANGED[plan.kind]
     for _ in range(DRAWS):
         touch = _draw_on_face(plan, scene, most, rng, ranges)
-        c, s = math.cos(touch.theta_rad), math.sin(touch.theta_rad)
-        own = (face.centres_mm - (touch.x_mm, touch.y_mm)) @ np.array([[c, -s], [s, c]])
-        whole = np.flatnonzero((np.abs(own) < inside).all(axis=1))
+        whole = np.flatnonzero((np.abs(touch.on_sensor(face.centres_mm)) < inside).all(axis=1))
         if len(whole) >= number:
             break
     chosen = rng.permutation(whole)[:number]
