@@ -20,8 +20,8 @@ from generator.database import tables
 from generator.database.read import list_objects, read_object
 from generator.database.registered import RegisteredFace, RegisteredObject
 from generator.database.transaction import of_rows
+from probe.simulate.registered import symbols_of
 from probe.surface.body import symbol_triangles, triangulate
-from probe.surface.symbols import Relief, emboss
 from recognizer.touch.lab import EmbossedArray, Lab
 
 Array = NDArray[np.float64]
@@ -207,12 +207,9 @@ def _mesh_json(held: RegisteredObject, face: RegisteredFace) -> dict[str, Any]:
 
 def _glyphs(held: RegisteredObject) -> list[list[float]]:
     """Return the triangles of every label's symbol, corner after corner."""
-    style = held.style
-    relief = Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
-    glyphs = held.alphabet["glyphs"]
-    strokes = tuple(tuple((tuple(a), tuple(b)) for a, b in glyph["strokes"]) for glyph in glyphs)
-    symbols = emboss(strokes, held.alphabet["reach"] * style.pitch_mm, relief)
-    return [_rounded(symbol_triangles(symbols, label).ravel()) for label in range(len(strokes))]
+    symbols = symbols_of(held)
+    labels = range(len(symbols.rings))
+    return [_rounded(symbol_triangles(symbols, label).ravel()) for label in labels]
 
 
 def _drawings(

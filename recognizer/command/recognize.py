@@ -346,7 +346,7 @@ def _draw_all(
 
 
 def _draw(reader: Reader, source: TouchSource, answer: Answer, path: Path) -> None:
-    from recognizer.command.picture import touch_picture
+    from recognizer.picture import touch_picture
 
     pose = None if answer.in_base is None else answer.in_base.T_robot_object
     with staged_file(path) as draft:

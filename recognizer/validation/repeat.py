@@ -91,7 +91,7 @@ def _draw_stages(axes: list[Axes], found: DrawnTouch, reader: Reader) -> None:
     """Draw the surface with the sensor on it, the counts, and the symbols that the fit sees."""
     from probe.plot.frame import UNITS, in_mm
     from probe.plot.touch import draw_image, draw_patch
-    from recognizer.command.picture import draw_touch, winning_lattice
+    from recognizer.picture import draw_touch, winning_lattice
 
     sensor, signal = reader.sensor, reader.signal(found.counts)
     draw_patch(axes[0], found.contact.scene.under(found.touch).surface, sensor, found.touch)
