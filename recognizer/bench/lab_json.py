@@ -49,10 +49,7 @@ def objects_json(connection: Connection) -> list[dict[str, Any]]:
 def object_json(connection: Connection, name: str) -> dict[str, Any]:
     """Return an object as solid and symbols.
 
-    Raises
-    ------
-    DatabaseError
-        No object has this name.
+    Raises DatabaseError: no object has this name.
     """
     held = read_object(connection, name)
     return {

@@ -47,10 +47,7 @@ def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]
     Returns the touch as a row of `trials.parquet` holds it; None for what is no number. Of touches
     that followed each other the picture shows the last.
 
-    Raises
-    ------
-    ValidationError
-        There is no such run, touch, or kind of picture.
+    Raises ValidationError: there is no such run, touch, or kind of picture.
     """
     if plot is not None and plot.suffix.lower() not in FORMATS:
         raise ValidationError(
