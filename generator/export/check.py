@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.errors import require
 from generator.errors import GeneratorError, SolidError
+from generator.polyhedron.read.kernel import step_shape, sub_shapes
 from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
 from generator.solid import Part, round_volume, volume
 from generator.solid.part import transform
@@ -191,37 +192,24 @@ def read_step(path: Path) -> StepReport:
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
-    from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.Message import Message
-    from OCP.STEPControl import STEPControl_Reader
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopAbs import TopAbs_SOLID
 
     # The kernel prints its complaints to stdout, where results belong: take its printers away.
     messenger: Any = Message.DefaultMessenger_s()
     printers = list(messenger.Printers())
     for printer in printers:
         messenger.RemovePrinter(printer)
-    reader: Any = STEPControl_Reader()
-    status = reader.ReadFile(str(path))
+    shape = step_shape(path)
     for printer in printers:
         messenger.AddPrinter(printer)
-    if status != IFSelect_ReturnStatus.IFSelect_RetDone:
-        return StepReport(0, False, math.nan, math.nan)
-    reader.TransferRoots()
-    shape: Any = reader.OneShape()
     if shape is None or shape.IsNull():
         return StepReport(0, False, math.nan, math.nan)
-    solids = 0
-    explorer: Any = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
-    while explorer.More():
-        solids += 1
-        explorer.Next()
+    solids = len(sub_shapes(shape, TopAbs_SOLID))
     properties: Any = GProp_GProps()
     BRepGProp.VolumeProperties_s(shape, properties)
-    return StepReport(
-        solids, bool(BRepCheck_Analyzer(shape).IsValid()), float(properties.Mass()), math.nan
-    )
+    valid = bool(BRepCheck_Analyzer(shape).IsValid())
+    return StepReport(solids, valid, float(properties.Mass()), math.nan)
 
 
 def read_stl(path: Path) -> MeshReport:
