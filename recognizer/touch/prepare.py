@@ -21,6 +21,7 @@ import recognizer.touch.symbols
 from encoded_objects.base.cache import cached_bytes, content_key
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import Alphabet, SymbolStyle
+from recognizer.errors import LabError
 from recognizer.touch.lab import EmbossedArray, Lab
 from recognizer.touch.options import DEFAULTS, ReaderOptions
 from recognizer.touch.signal import Signal
@@ -56,6 +57,15 @@ class PreparedLab:
     prepared: tuple[Prepared, ...] = field(init=False)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.lab, Lab):
+            raise LabError(
+                f"{self.lab!r} is no open lab", fix=f"open it first: open_lab({str(self.lab)!r})"
+            )
+        if not isinstance(self.sensor, SensorType):
+            raise LabError(
+                f"{self.sensor!r} is no sensor type",
+                fix="give a SensorType: SensorType() is fsr-16",
+            )
         made = tuple(
             Prepared(each, *template_and_bank(each.alphabet, each.style, self.sensor))
             for each in self.lab.arrays

@@ -59,6 +59,7 @@ class Reader(PreparedLab):
     state: SensorState | None = None
 
     def __post_init__(self) -> None:
+        PreparedLab.__post_init__(self)
         shape = (self.sensor.rows, self.sensor.columns)
         if self.state is not None and self.state.shape != shape:
             raise SensorStateError(
@@ -66,7 +67,6 @@ class Reader(PreparedLab):
                 fix="give what was learned of this sensor, or leave it out",
                 place=self.state.sensor,
             )
-        PreparedLab.__post_init__(self)
 
     def read(
         self,
