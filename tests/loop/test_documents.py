@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from corpora.commands import Commands, started_server
 
@@ -146,19 +144,6 @@ def test_mujoco_arm(tmp_path, said_by):
                       said_by("mujoco_arm", tmp_path), re.MULTILINE)  # fmt: skip
     assert [name for name, _ in told] == ["Cube", "Prism"]
     assert max(float(off) for _, off in told) < 1.0
-
-
-def test_robot_world(tmp_path):
-    """Three objects on a table, found by touch alone; poses as the simulator has them."""
-    script = ROOT / "tests" / "campaigns" / "robot_world.py"
-    said = subprocess.check_output([sys.executable, script], cwd=tmp_path, text=True)
-    told = [json.loads(line) for line in said.splitlines() if line.startswith("{")]
-    assert [one["answer"] for one in told] == [one["object"] for one in told]
-    assert {one["object"] for one in told} == {"Cube", "Box", "Prism"}
-    offs = np.array([one["fused"][0]["off"] for one in told])
-    assert np.linalg.norm(offs[:, :3], axis=1).max() < 2.0  # mm
-    assert np.degrees(np.linalg.norm(offs[:, 3:], axis=1)).max() < 2.0
-    assert max(one["fused"][0]["chi2"] for one in told) < 22.5  # 1 of 1,000 lies beyond
 
 
 def test_examples_are_short_and_all_shown_and_run():

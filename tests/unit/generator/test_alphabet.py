@@ -18,7 +18,6 @@ from generator.alphabet import (
 )
 from generator.alphabet.figures import FIGURES, figures_of, in_figures
 from generator.alphabet.outline import engrave
-from generator.alphabet.printable import gap_between_mm, gap_inside_mm
 from generator.alphabet.strokes import check_distinguishable, same_shape
 from generator.errors import AlphabetError
 from generator.plane.polygon import edges_cross, points_inside, signed_area
@@ -131,13 +130,6 @@ def test_what_cannot_be_printed_is_refused_with_ways_out_that_work(style, words)
 def test_a_chamfer_as_wide_as_the_stroke_is_refused():
     with pytest.raises(AlphabetError, match="a chamfer of 1 mm leaves"):
         check_printable(DENSE, SymbolStyle(chamfer_mm=1.0), FDM)
-
-
-def test_gaps_are_measured_on_the_outline():
-    assert gap_inside_mm(outlines(DENSE, SymbolStyle())[1]) == pytest.approx(0.42, rel=1e-12)
-    assert gap_inside_mm(outlines(DENSE, SymbolStyle())[0]) == math.inf
-    foot = 2 * 0.26 * 7 + 1.4 + 2 * math.tan(math.radians(10))
-    assert gap_between_mm(DENSE, SymbolStyle()) == pytest.approx(7 - foot, rel=1e-12)
 
 
 def test_rings_tell_crossings_and_points_inside():

@@ -1,4 +1,4 @@
-"""Sequences, folds and products: sizes, random access, errors with their way out, costs."""
+"""Sequences and folds: sizes, indices, errors with their way out, costs."""
 
 import numpy as np
 import pytest
@@ -41,16 +41,6 @@ def test_most_square_folds():
     assert [usual_fold(9, n) for n in (3, 6)] == [(8, 91), (80, 6643)]
     assert usual_fold(2, 13) is None
     assert folds(2, 6) == [(7, 9)]
-
-
-def test_two_to_the_64_sequence_has_indices_beyond_int64():
-    array = array_from({"family": "prbs", "degree": 64})
-    n = array.columns
-    assert (array.rows, n, array.window, array.family) == (1, 2**64 - 1, (1, 64), "prbs")
-    last = array.symbols(0, np.array([n - 1, 2**64 - 3], dtype=object))
-    assert last.tolist() == array.symbols(5, [-1, -2]).tolist()
-    assert array.symbols(0, [0, -1, 2**64 - 2]).tolist()[1:] == [last[0], last[0]]
-    assert array.symbols(0, np.array([2**64 - 2], dtype=np.uint64)).tolist() == [last[0]]
 
 
 def test_shapes_and_kinds_of_indices():
@@ -126,16 +116,6 @@ def test_definitions_that_make_no_array(definition, message):
     with pytest.raises(ArrayError, match=message) as caught:
         array_from(definition)
     assert caught.value.fix
-
-
-def test_product_law_and_sizes():
-    given = product("prpa", {"degree": 4}, {"degree": 6})
-    array = array_from(given | {"law": [[0, 2], [1, 3]]})
-    assert (array.rows, array.columns, array.order, array.window) == (15, 63, 4, (4, 6))
-    rows, columns = array.row_sequence, array.column_sequence
-    by_law = rows.symbols(block(15, 1)[0]) + 2 * columns.symbols(range(63))
-    assert np.array_equal(array.symbols(*block(15, 63)), by_law)
-    assert windows_are_unique(array, (4, 6))
 
 
 def test_a_definition_keeps_its_field():

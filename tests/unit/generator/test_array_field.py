@@ -37,19 +37,6 @@ def test_field_axioms_exhaustively(q):
     assert (mul[a[1:], field.inverse[1:]] == 1).all()
 
 
-@pytest.mark.parametrize("q", ORDERS)
-def test_labels_are_integers_or_powers_of_a(q):
-    field = field_of_order(q)
-    if field.degree == 1:
-        assert np.array_equal(field.addition[1], np.arange(1, q + 1) % q)
-    else:
-        powers = [1]
-        for _ in range(q - 1):
-            powers.append(int(field.multiplication[powers[-1], 2]))
-        assert powers == [*range(1, q), 1]
-    assert np.array_equal(field.labels(field.digits), np.arange(q))
-
-
 @pytest.mark.parametrize("q", sorted(MINIMAL_POLYNOMIALS))
 def test_minimal_polynomials_are_conways(q):
     """The definition: first in Conway's order, primitive, and compatible with each subfield."""

@@ -15,7 +15,6 @@ from reference.windows import windows_at
 
 from decoder import decode_exact
 from generator.array import FoldedArray, Sequence, array_from, next_larger, profile
-from generator.array.contract import touches_needed
 from generator.array.field import field_of_order
 from generator.array.fold import translation
 from generator.array.lab_key import (
@@ -157,16 +156,6 @@ def test_every_wrong_character_and_every_exchange_is_found():
     for typed in wrong - {plain}:
         with pytest.raises(LabKeyError):
             read_lab_key(typed)
-
-
-def test_profiles_are_read_by_as_many_touches_as_was_measured():
-    assert touches_needed(2, 63 * 65, 12.0) == 8  # thesis
-    assert touches_needed(8, 15 * 15, 15.0) == 5  # product, of the 80 mm cube
-    assert touches_needed(4, 63 * 65, 7.0) == 1  # one-touch
-    assert touches_needed(4, 1 << 62, 7.0) == touches_needed(4, 1 << 20, 7.0)
-    by_pitch = [touches_needed(2, 4095, pitch) for pitch in (5.0, 8.0, 12.0, 16.0)]
-    assert by_pitch == sorted(by_pitch)
-    assert touches_needed(2, 4095, 12.0, sensor_mm=50.0) == 1
 
 
 SENSOR = (12.7, 12.7)

@@ -25,7 +25,7 @@ from generator.database.cells import find_array, held_cells, mark_cells, occupie
 from generator.database.open import open_database
 from generator.database.read import find_object, list_objects
 from generator.database.register import ObjectRecord, register, remove_object
-from generator.database.registered import RegisteredPart, canonical, spec_hash
+from generator.database.registered import RegisteredPart
 from generator.database.rows import face_type
 from generator.database.transaction import (
     WriteConflictError,
@@ -116,13 +116,6 @@ def test_impossible_registrations_are_refused_before_anything_is_written(engine)
         register_one(engine, cube_on(0, layout=nowhere))
     with pytest.raises(ValueError, match="mm"):
         register_one(engine, cube_on(0, style=SymbolStyle(pitch_mm=6.0)))
-
-
-def test_canonical_text_is_one_for_equal_values():
-    assert canonical({"b": 0.1, "a": [1, None, "µ"]}) == '{"a":[1,null,"µ"],"b":0.1}'
-    assert spec_hash({"b": 1, "a": 2}) == spec_hash({"a": 2, "b": 1}) != spec_hash({"a": 2, "b": 2})
-    with pytest.raises(ValueError, match="JSON"):
-        canonical(math.nan)
 
 
 def test_face_types():

@@ -1,4 +1,4 @@
-"""Whole layouts of known objects, nets known by heart, and codes of objects."""
+"""Whole layouts of known objects, islands of nets, and codes of objects."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from generator.array.profiles import profile
 from generator.errors import LayoutError
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout, Layout, Placement, object_code
-from generator.layout.unfold import overlap, split, triangles_of, unfold
+from generator.layout.unfold import split, unfold
 from generator.polyhedron import shapes
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
@@ -63,23 +63,11 @@ CUBE = shapes.cube(60.0)
         (CUBE, {"occupied": (ROWS, COLUMNS), "kind": "faces"},
          r"needs 384 cells, 300 of 4095 are free[\s\S]*profile: auto"),
         (shapes.cube(180.0), {}, "not in blocks"),
-        (CUBE, {"kind": "nets"}, "unknown layout 'nets'"),
-        (CUBE, {"half": 4.0}, "8 mm do not fit a pitch of 7 mm"),
-        (CUBE, {"half": 0.0}, "0 mm do not fit"),
-        (CUBE, {"pitch": np.nan}, "pitch of nan mm"),
-        (CUBE, {"blank_faces": (7,)}, "no face 7"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_laid_out_is_refused(solid, options, message):
     with pytest.raises(LayoutError, match=message):
         laid_out(solid, **options)
-
-
-def test_clearances_must_match_the_edges():
-    good = clearances(CUBE)
-    for bad in (good[:5], [[np.ones(3)]] * 6, [[np.full(4, -1.0)]] * 6, [[np.full(4, np.inf)]] * 6):
-        with pytest.raises(LayoutError, match="clearance"):
-            lay_out(CUBE, ARRAY, 7.0, 2.7, bad, NONE)
 
 
 def code_at(*cells, rows=63, columns=65):
@@ -103,53 +91,7 @@ def test_codes_count_cells():
     assert "F" not in "".join(codes)
 
 
-@pytest.mark.parametrize(
-    "solid",
-    [CUBE, shapes.box((80.0, 60.0, 12.0)), shapes.triangular_prism(60.0, 80.0),
-     shapes.tetrahedron(80.0), shapes.octahedron(70.0), shapes.dodecahedron(30.0),
-     shapes.prism(17, 90.0, side=20.0), shapes.pyramid(24, 150.0, side=15.0)],
-    ids=lambda solid: solid.kind,
-)  # fmt: skip
-def test_solids_unfold_in_one_piece(solid):
-    net = unfold(solid)
-    assert sorted(net.pieces[0]) == list(range(len(solid.faces)))
-    assert net.parents.count(-1) == len(net.pieces) == 1
-
-
 def test_a_piece_is_split_into_halves():
     net = split(unfold(CUBE), 0)
     assert sorted(map(len, net.pieces)) in ([2, 4], [3, 3])
     assert net.parents.count(-1) == 2
-
-
-def square(x, y, side=1.0):
-    return triangles_of([np.array([[x, y], [x + side, y], [x + side, y + side], [x, y + side]])])
-
-
-RING = triangles_of(
-    [
-        np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]]),
-        np.array([[1.0, 1.0], [1.0, 2.0], [2.0, 2.0], [2.0, 1.0]]),
-    ]
-)
-BAY = triangles_of([np.array([[0.0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]])])
-
-
-@pytest.mark.parametrize(
-    ("one", "other", "overlaps"),
-    [
-        (square(0, 0), (1, 0), False),  # they touch
-        (square(0, 0), (1, 1), False),
-        (square(0, 0), (5, 5), False),
-        (square(0, 0), (0, 0), True),  # and cross no edge
-        (square(0, 0), (0.5, 0), True),
-        (square(0, 0), (0.4, 0.4, 0.1), True),
-        (square(0, 0), (1 - 1e-6, 0), True),
-        (RING, (1, 1), False),
-        (RING, (1.1, 1), True),
-        (BAY, (1, 1), False),
-        (BAY, (1, 0.9), True),
-    ],
-)
-def test_outlines_overlap_where_they_share_an_area(one, other, overlaps):
-    assert overlap(one, square(*other), 1e-9) == overlaps

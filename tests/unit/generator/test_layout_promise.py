@@ -8,13 +8,10 @@ import shapely
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet.outline import SymbolStyle
-from generator.array import profile
-from generator.layout.layout import lay_out
 from generator.layout.obstacle import solid_edges
 from generator.layout.placement import FaceLayout, Placement
 from generator.layout.recognition_rate import (
     answered_share,
-    measured_answers,
     measured_types,
 )
 from generator.layout.sensor_view import (
@@ -29,7 +26,6 @@ from generator.polyhedron import face_polygon, polyhedron, shapes
 from generator.polyhedron.development import development
 from generator.polyhedron.frame import face_frame, face_normal
 
-NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
 VIEW = SensorView((12.7, 9.0), 2.52)
 SQUARE = np.array([[0, 0], [40, 0], [40, 40], [0, 40]], dtype=float)
 HOLE = np.array([[12, 12], [12, 25], [30, 25], [30, 12]], dtype=float)  # clockwise
@@ -77,27 +73,6 @@ def test_views_are_those_of_each_pose_by_itself(loops):
         assert views.loaded[k] == pytest.approx(share, abs=1e-9)
         away = np.hypot(*(face.centres_mm - views.centre_mm[k]).T)
         assert views.around[k] == (away <= 20.0).sum()
-
-
-@pytest.mark.parametrize(
-    ("pitch_mm", "half_mm", "mean"), [(7.0, 2.73, (8.4, 5.4, 3.4)), (4.0, 1.6, (30.7, 19.3, 12.1))]
-)
-def test_a_60_mm_face_shows_what_was_measured(pitch_mm, half_mm, mean):
-    """Mid-face, edge (the centre within 9 mm of one) and corner, counted by another program."""
-    array, solid = profile().array(), shapes.cube(60.0)
-    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in solid.faces]
-    (face, *_) = lay_out(solid, array, pitch_mm, half_mm, clearances, NONE).faces
-    views = face_views(
-        face_polygon(solid, 0), face, pitch_mm, SensorView((12.7, 12.7), 0.36 * pitch_mm),
-        4000,
-    )  # fmt: skip
-    near = (np.minimum(views.centre_mm, 60 - views.centre_mm) < 9).sum(axis=1)
-    for sides, symbols in enumerate(mean):
-        assert views.seen[near == sides].mean() == pytest.approx(symbols, abs=0.35)
-
-
-def test_no_later_touch_is_answered_where_no_symbol_is_near():
-    assert (measured_answers().later([0, 4], [0, 0]) == 0).all()
 
 
 def test_a_type_of_your_own_is_taken_for_the_one_most_like_it():

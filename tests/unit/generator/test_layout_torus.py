@@ -17,12 +17,6 @@ def torus(rows, columns, cells=NONE, first=(0, 0)):
     return Occupancy.from_cells(*cells, SimpleNamespace(rows=rows, columns=columns, first=first))
 
 
-def cells_at(mask, at, rows, columns):
-    """The array rows and columns of a mask at a position, on the torus."""
-    r, c = np.nonzero(np.rot90(mask, at.quarter))
-    return (r.astype(object) + at.row) % rows, (c.astype(object) + at.column) % columns
-
-
 def block(rows, columns):
     return np.ones((rows, columns), dtype=bool)
 
@@ -32,29 +26,6 @@ def test_the_place_with_most_contact_is_taken():
     taken[5, 3:9] = taken[6, 3] = taken[6, 8] = True  # a bay, four cells wide
     (spot,) = place_pieces(torus(12, 12, np.nonzero(taken)), [(block(1, 4), TURNS)])
     assert spot == TorusPosition(6, 4, 0)
-
-
-@pytest.mark.parametrize(("rows", "columns"), [(2**32 - 1, 2**32 + 1), (2**63, 5)])
-def test_only_a_corner_of_a_large_array_is_looked_at(rows, columns):
-    pieces = [(block(4, 5), TURNS)] * 40
-    spots = place_pieces(torus(rows, columns), pieces)
-    assert all(spot is not None and spot.row < 192 and spot.column < 192 for spot in spots)
-    again = torus(rows, columns)
-    for (mask, _), spot in zip(pieces, spots, strict=True):
-        again = again.with_cells(*cells_at(mask, spot, rows, columns))
-    assert again.used == 40 * 20
-
-
-def test_the_corner_grows_when_it_is_full():
-    rows, columns = 4095, 4097
-    corner = np.mgrid[:192, :192].reshape(2, -1)
-    far = np.array([[4094], [4096]])
-    occupancy = torus(rows, columns, np.concatenate([corner, far], axis=1))
-    (spot,) = place_pieces(occupancy, [(block(30, 40), (0,))])
-    assert spot is not None
-    assert max(spot.row, spot.column) >= 192
-    (big,) = place_pieces(occupancy, [(block(700, 900), (0,))])
-    assert big is not None
 
 
 def test_a_narrow_large_array_wraps_along_its_short_side_alone():

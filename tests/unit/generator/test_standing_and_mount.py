@@ -1,4 +1,4 @@
-"""What a part stands on, and by what it is held: blank faces, tags, holes clear of symbols."""
+"""What a part stands on, and by what it is held: blank faces, tags, holes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from encoded_objects import Reader, encode, open_lab, simulate
+from encoded_objects import encode
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
@@ -197,28 +197,6 @@ def test_screws_of_a_flange_are_on_its_circle_and_the_pin_midway():
         assert turns[0] == pytest.approx(180 / count)  # the pin is at 0
         wide = np.hypot(*(loops[0] - loops[0].mean(axis=0)).T)
         assert wide == pytest.approx(SCREWS[thread].clear_mm / 2)
-
-
-def test_symbols_keep_clear_of_holes_and_files_read_back(tmp_path):
-    shape = {"tag": {"size": "40 x 40 mm", "frame": 10}}
-    made(tmp_path, shape, mount={"screws": "M3"}, formats=("step", "stl"), verify=True)
-    assert (tmp_path / "out/Part.step").read_text().count("CYLINDRICAL_SURFACE") == 4
-    known = registered(tmp_path)
-    assert bearing(tmp_path) == {"F1"}
-    for face in known.layout.faces:
-        for loop in face_polygon(known.polyhedron, face.face)[1:] if len(face.labels) else ():
-            radius = np.hypot(*(loop[0] - loop.mean(axis=0)))
-            away = np.hypot(*(face.centres_mm - loop.mean(axis=0)).T)
-            assert away.min() > radius + 2.0  # half a symbol of 5 mm, and the printer's edge
-
-
-def test_a_tag_of_one_line_is_made_and_read(tmp_path):
-    made(tmp_path, {"tag": "40 x 40 mm"}, formats=("stl",))
-    heights = np.unique(trimesh.load_mesh(tmp_path / "out/Part.stl").vertices[:, 2].round(3))
-    assert heights[:2] == pytest.approx([0.0, 0.32])  # its name, engraved in the back
-    touch = simulate(f"{tmp_path}/lab.db#Part/F1", x=20.0, y=20.0, force=40)
-    answer = Reader(open_lab(f"{tmp_path}/lab.db")).read(touch.counts)
-    assert (answer.object, answer.face) == ("Part", "F1")
 
 
 def test_a_mount_may_be_a_text_and_a_tag_is_as_thick_as_it_needs():

@@ -87,21 +87,6 @@ def test_forces_of_held_out_touches(readout):
     assert (usual > 8).mean() < 0.01  # spikes
 
 
-def test_a_preloaded_tactel_has_a_negative_break_force():
-    preload = NONE.copy()
-    preload[3, 4] = 0.4
-    fsr = replace(fsr_of(), preload_n=preload, hysteresis=0.0, drift=0.0, series_ohm=NONE)
-    board = replace(BOARD, noise=Noise(0.3, 0, 0.05, 0, 0), bits=12)
-    calibration = calibration_of(fsr, board=board)
-    assert calibration.condition[3, 4] == Condition.PRELOADED
-    assert calibration.break_n[3, 4] == pytest.approx(-0.39, abs=0.02)
-    assert calibration.break_n[5, 5] == pytest.approx(0.01, abs=0.01)
-    assert calibration.exponent[3, 4] == pytest.approx(1.0, abs=0.02)
-    assert (
-        calibrate_image(recorded(fsr, NONE, 1, board).mean(axis=0), calibration).values[3, 4] < 0.02
-    )
-
-
 STILL = replace(BOARD, noise=Noise(0.3, 0, 0.05, 0, 0))  # a contact that does not flutter
 DEAD = replace(fsr_of(), dead=NONE == 0)
 BRIGHT = replace(STILL, readout="virtual", feedback_ohm=1e5)

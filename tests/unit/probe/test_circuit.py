@@ -31,35 +31,6 @@ def test_any_force_stays_below_the_series_resistance_and_two_decades_are_those_o
         assert conductances(fsr, force * per_n_cm2)[0].max() <= 1 / 500 + fsr.leak_s
 
 
-def test_hysteresis_is_bounded_and_does_not_know_the_rate():
-    fsr = replace(fsr_of(), drift=0.0, series_ohm=np.zeros((16, 16)), break_n=np.zeros((16, 16)))
-    one = np.ones((16, 16))
-
-    def last(path, elapsed):
-        state = None
-        for force in path:
-            g, state = conductances(fsr, force * one, state, elapsed)
-        return g[0, 0] - fsr.leak_s
-
-    assert last([1.0], 0.1) == pytest.approx(1e-4)
-    assert last([2.0, 1.0], 0.1) == pytest.approx(1.1e-4)
-    assert last([2.0, 1.0], 9.0) == last([2.0, 1.5, 1.0], 0.1) == last([2.0, 1.0], 0.1)
-    assert last([2.0, 1.0, 1.05], 0.1) == pytest.approx(1.1e-4)  # inside the loop it stays
-    assert last([2.0, 1.0, 1.5], 0.1) == pytest.approx(1.5e-4)  # and leaves by the way up
-    assert last([2.0, 0.0], 0.1) == 0.0
-
-
-def test_creep_is_a_share_per_decade_of_time_and_starts_anew_with_a_new_load():
-    fsr = replace(fsr_of(), hysteresis=0.0, series_ohm=np.zeros((16, 16)))
-    one = np.ones((16, 16))
-    first, state = conductances(fsr, one)
-    later, state = conductances(fsr, one, state, 99.0)
-    assert (later - fsr.leak_s)[0, 0] / (first - fsr.leak_s)[0, 0] == pytest.approx(1.10)
-    _, off = conductances(fsr, 0 * one, state, 1.0)
-    again, _ = conductances(fsr, one, off, 1.0)
-    np.testing.assert_allclose(again, first, rtol=1e-12)
-
-
 def exact_resistances(g, digits=50):
     """Return the resistances by a 31x31 inverse in many digits."""
     rows, columns = g.shape

@@ -17,7 +17,7 @@ from probe.contact.press import accuracy_of, footprint, level_for, press
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
-from probe.surface.indenters import FlatPlate, RaisedStrip, RoughSurface, TiltedPlane, Washer
+from probe.surface.indenters import FlatPlate, RoughSurface, Washer
 
 TAB, PAD = (SensorType(overlay=Overlay(kind=kind)) for kind in ("tab", "pad"))
 LEVEL = Touch(0.0, 0.0, 0.0, 64.0)
@@ -38,20 +38,6 @@ def test_footprint_of_half_a_face_bears_on_half_the_tactels():
     # down to a quarter of the overlay
     assert (footprint(half_plane(-0.4), TAB, LEVEL).forces_n > 0).all()
     assert not footprint(half_plane(-0.6), TAB, LEVEL).forces_n[:, 8:].any()
-
-
-def test_footprint_of_a_pad_shares_by_area():
-    columns = footprint(RaisedStrip(1.5875 * 3.5), PAD, LEVEL).forces_n.sum(axis=0)
-    exact = np.clip(3.5 / 2 - np.abs(np.arange(16) - 7.5) + 0.5, 0, 1)
-    np.testing.assert_allclose(columns / 64, exact / exact.sum(), atol=0.05)
-
-
-def test_footprint_measures_a_tilt_against_the_plate():
-    tilted = TiltedPlane(slope_x=0.1)
-    assert footprint(tilted, TAB, LEVEL).forces_n[:, 0].sum() == 0
-    along = footprint(tilted, TAB, Touch(0.0, 0.0, 0.0, 256.0, tilt_y_rad=-0.1))
-    np.testing.assert_allclose(along.forces_n, 1.0)
-    assert along.tilt_y_rad == -0.1
 
 
 GEL = sensor_type_named("gel-24x32")

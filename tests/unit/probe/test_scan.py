@@ -83,22 +83,6 @@ def covered(places, theta, point, half=12.7):
     return inside.all(axis=1).any()
 
 
-def test_a_square_face():
-    plan = raster([SQUARE])
-    step = 4.25 * 1.5875
-    assert len(plan) == 49  # ceil((60 - 25.4) / 6.747) + 1 = 7, both ways
-    assert plan.lines.tolist() == sorted([*range(7)] * 7)
-    first, second, eighth = plan.places_mm[[0, 1, 7]]
-    assert second - first == pytest.approx([step, 0])  # left to right
-    assert eighth - first == pytest.approx([0, -step])  # top to bottom
-    assert plan.places_mm.mean(axis=0) == pytest.approx([30, 30])
-    overlap = 1 - step / 25.4
-    assert overlap == pytest.approx(0.734, abs=1e-3)
-    inside = plan.cover > 1 - 1e-9
-    assert inside.sum() == 25
-    assert plan.cover[0] == pytest.approx((1 - (3 * step + 12.7 - 30) / 25.4) ** 2)
-
-
 @pytest.mark.parametrize("theta", [0, 20])
 @pytest.mark.parametrize("sides", [3, 5])
 def test_every_point_of_a_regular_face_is_under_a_touch(sides, theta):

@@ -1,7 +1,7 @@
-"""Worlds: columns under load, mountings, scaled prints, neighbouring parts, worn symbols."""
+"""Worlds: columns under load, mountings, scaled prints."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,15 +17,9 @@ from probe.simulate.simulation import TouchOptions
 from probe.simulate.world.levels import SOUND
 from probe.simulate.world.sensor import MOUNTINGS, LevelSensor, mount
 from probe.simulate.world.surfaces import (
-    GAP_MM,
-    REACH_MM,
-    STEP_MM,
-    AdjacentParts,
     DistortedSurface,
     place_adjacent,
-    worn_scene,
 )
-from probe.surface.face import FaceSurface
 from probe.surface.indenters import RaisedStrip
 from probe.surface.polygon import polygon
 
@@ -119,69 +113,3 @@ def test_print_is_scaled_from_its_datum():
 
 
 OBLONG = polygon([np.array([(0, 0), (40, 0), (40, 30), (0, 30)])])
-TRIANGLE = polygon([np.array([(0, 0), (50, 0), (25, 45)])])
-
-
-@pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize(("first", "second"), [(OBLONG, TRIANGLE), (TRIANGLE, OBLONG)])
-def test_faces_lie_beside_each_other_and_the_sensor_near_both(first, second, seed):
-    place, at = place_adjacent(first, second, np.random.default_rng(seed))
-    both = AdjacentParts(FaceSurface(None, first), FaceSurface(None, second), place)
-    x, y = np.meshgrid(np.arange(-99.8, 140, 1.0), np.arange(-99.8, 140, 1.0))
-    points = np.column_stack([x.ravel(), y.ravel()])
-    on_first, on_second = first.contains(points), second.contains(place.into(points))
-    assert not (on_first & on_second).any()
-    area = {id(OBLONG): 1200.0, id(TRIANGLE): 1125.0}
-    assert on_second.sum() == pytest.approx(area[id(second)], rel=0.03)
-    heights = both.heights_mm(points)
-    assert (heights[on_first] == 0).all()
-    assert (heights[on_second] == place.z_mm).all()
-    assert (heights[~on_first & ~on_second] == -np.inf).all()
-    assert first.contains(at[None])[0]
-    assert first.distance_mm(at[None])[0] <= REACH_MM
-    beside = second.distance_mm(place.into(at[None]))[0]
-    assert beside <= REACH_MM + GAP_MM
-    assert abs(place.z_mm) <= STEP_MM
-
-
-TURN = 0.4  # of the face's x axis into the array's
-CENTRES = (
-    np.array([(i, j) for i in range(3) for j in range(3)])
-    * 7.0
-    @ np.array([[math.cos(TURN), -math.sin(TURN)], [math.sin(TURN), math.cos(TURN)]])
-)
-
-
-@dataclass(frozen=True)
-class Dots:
-    """Round dots of 2 mm at CENTRES, 1 mm high, on a face that stands .25 mm too high or low."""
-
-    base_mm: float
-    top_mm: float = 1.5
-
-    def heights_mm(self, points_mm: np.ndarray) -> np.ndarray:
-        away = np.linalg.norm(points_mm[:, None] - CENTRES, axis=2).min(axis=1)
-        return self.base_mm + np.where(away < 2.0, 1.0, 0.0)
-
-
-def worn_surface(surface, share, seed=1):
-    rng = np.random.default_rng(seed)
-    return worn_scene(bare_scene(surface), CENTRES, TURN, 7.0, share, rng).surface
-
-
-@pytest.mark.parametrize("base", [0.0, 0.25, -0.25])
-def test_a_worn_symbol_lies_level_with_the_face_around_it(base: float) -> None:
-    surface = Dots(base)
-    points = np.random.default_rng(1).uniform(-3.0, 14.0, (4000, 2))
-    worn = worn_surface(surface, 1.0)
-    assert worn.heights_mm(points) == pytest.approx(np.full(4000, base))
-    whole = worn_surface(surface, 0.0)
-    assert (whole.heights_mm(points) == surface.heights_mm(points)).all()
-
-
-def test_only_what_is_drawn_is_worn() -> None:
-    some = worn_surface(Dots(0.25), 0.5, seed=2)
-    assert 0 < len(some.centres_mm) < len(CENTRES)
-    left = some.heights_mm(CENTRES)
-    gone = (np.abs(CENTRES[:, None] - some.centres_mm).max(axis=2) < 1e-9).any(axis=1)
-    assert left == pytest.approx(np.where(gone, 0.25, 1.25))

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from encoded_objects import encode, simulate
 from generator.database.as_built import AsBuilt
 from probe.contact.contract import Touch
 from probe.contact.press import press
@@ -31,7 +30,6 @@ from recognizer.touch.as_built import (
     scales_and_skew,
 )
 from recognizer.touch.lab import open_lab
-from recognizer.touch.options import ReaderOptions
 from recognizer.touch.reader import Reader
 from recognizer.touch.source import TouchImage
 
@@ -168,21 +166,6 @@ def at_rest(x=0.0, y=0.0, turn=0.0):
 
 def felt(excess, sigma=1e-3, expected=1e9, with_pose=(0.0, 0.0, 0.0)):
     return TouchScale(excess, np.array([*with_pose, sigma**2]), expected)
-
-
-def test_a_reader_that_knows_parts_as_designed_is_surer_of_the_same_place(tmp_path):
-    database = f"{tmp_path}/lab.db"
-    spec = {"name": "Cube", "shape": {"cube": "40 mm"}}
-    encode(spec, database=database, folder=tmp_path, formats=())
-    touch = simulate(f"{database}#Cube/F1", x=26, y=14, theta=23, force=80)
-    counts, lab = next(touch.frames()).counts, open_lab(database)
-    usual = Reader(lab).read(counts)
-    known = Reader(lab, options=ReaderOptions(as_designed=True)).read(counts)
-    assert (usual.part, known.part) == ("not measured", "as designed")
-    assert str(usual).endswith("; part not measured")
-    assert known.as_json()["part"] == "as designed"
-    assert usual.index == known.index
-    assert (np.diag(known.covariance) < np.diag(usual.covariance)).all()
 
 
 def test_on_a_wall_the_height_is_as_designed_and_the_scale_felt_is_half():

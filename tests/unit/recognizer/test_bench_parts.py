@@ -1,17 +1,15 @@
-"""The bench without a server: files, watch, images, messages, board, time line, pictures."""
+"""The bench without a server: files, watch, images, messages, touches, time line, sheets."""
 
 from __future__ import annotations
 
 import asyncio
 import hashlib
 import json
-import re
 import struct
 import time
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -29,7 +27,7 @@ from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from recognizer.bench.answers import answer_json
-from recognizer.bench.broker import Broker, Subscriber
+from recognizer.bench.broker import Broker
 from recognizer.bench.errors import BenchError, BusyError, UnknownError
 from recognizer.bench.feed import PAUSE_S, ProbeFeed, ReplayFeed
 from recognizer.bench.files import (
@@ -41,7 +39,7 @@ from recognizer.bench.files import (
     part_to_send,
 )
 from recognizer.bench.frames import FrameHandler, page_guide
-from recognizer.bench.lab_json import drawn_faces, face_sheets, object_svg, symbol_poses
+from recognizer.bench.lab_json import drawn_faces, face_sheets, symbol_poses
 from recognizer.bench.message import FILTERS, filter_image, mosaic_message
 from recognizer.bench.reading import AGAIN_S, RESTLESS_S, ReadTrigger, RecognitionThread
 from recognizer.bench.touch_log import TouchLog
@@ -300,44 +298,12 @@ def test_a_mosaic_is_packed_thinned_and_tells_what_was_not_felt():
     assert len(mosaic_message(empty, 0)) == 32
 
 
-def test_a_page_gets_the_newest_of_every_topic_and_nothing_twice():
-    async def told():
-        board, page = Broker(), Subscriber()
-        board.attach(asyncio.get_running_loop())
-        board.subscribers.add(page)
-        for i in range(3):
-            board.publish("status", {"i": i})
-        board.publish("answer", {"face": "F1"})
-        await asyncio.wait_for(page.news.wait(), 5)
-        return [json.loads(text) for text in board.news(page)], board.news(page)
-
-    newest = [{"topic": "status", "i": 2}, {"topic": "answer", "face": "F1"}]
-    assert asyncio.run(told()) == (newest, [])
-
-
 def taken(feed, seconds):
     frames, end_s = [], time.monotonic() + seconds
     while time.monotonic() < end_s and feed.as_json()["playing"]:
         frames += feed.take(0.05)
     frames += feed.take(0.0)
     return [frame.seq for frame in frames]
-
-
-def test_a_recording_plays_in_order_goes_where_it_is_told_and_pauses_at_its_end(tmp_path):
-    feed = ReplayFeed(Recording(recorded(tmp_path / "x.h5", [0] * 20 + [200] * 20 + [0] * 20)))
-    assert feed.seconds == pytest.approx(0.59)
-    assert taken(feed, 5.0) == list(range(60))
-    assert feed.as_json()["at"] == pytest.approx(feed.seconds, abs=1e-3)
-    feed.play(playing=None, speed=None, at_s=0.305)
-    assert [frame.seq for frame in feed.take(0.0)] == [30]  # shown although it pauses
-    assert feed.take(0.0) == []
-    for at_s, first in ((0.205, 20), (None, 0)):  # from its beginning again
-        feed.play(playing=True, speed=20.0, at_s=at_s)
-        assert taken(feed, 5.0) == list(range(first, 60))
-    strength = np.array(feed.overview())
-    assert (strength[22:38].min(), strength[:18].max(), strength[42:].max()) == (1.0, 0.0, 0.0)
-    with pytest.raises(BenchError, match="speed"):
-        feed.play(playing=None, speed=1e9, at_s=None)
 
 
 def test_an_empty_recording_and_one_whose_clock_jumps(tmp_path):
@@ -425,32 +391,6 @@ def held(make_lab):
     folder = make_lab(*(f"name: {name}\nshape: {shape}\n" for name, shape in SHAPES.items()))
     with read_transaction(open_database(f"{folder}/lab.db", writable=False)) as connection:
         return {name: read_object(connection, name) for name in SHAPES}
-
-
-def polygons(svg):
-    """Return the polygons of a picture, and how many dots it has."""
-    root = ElementTree.fromstring(svg)
-    paths = [one.get("d") for one in root]
-    flat = [np.array(re.findall(r"-?[\d.]+", d), float) for d in paths if d.endswith("z")]
-    return flat, sum(d.count("h0") for d in paths if d.endswith("h0"))
-
-
-def test_a_picture_shows_what_looks_this_way_and_its_symbols_alone(held):
-    flat, dots = polygons(object_svg(held["Cube"]))
-    assert [len(one) for one in flat] == [8, 8, 8]
-    towards = [
-        len(layout.labels)
-        for face, layout in zip(held["Cube"].faces, held["Cube"].layout.faces, strict=True)
-        if face.T_object_face[:3, 2] @ (0.55, -1.0, 0.6) > 0
-    ]
-    assert (len(towards), dots) == (3, sum(towards))
-    svg = object_svg(held["Can"])
-    flat, dots = polygons(svg)
-    assert len(flat) > 20  # facets of the round face
-    assert dots > 10
-    x, y, w, h = map(float, re.search('viewBox="([^"]*)"', svg).group(1).split())
-    points = np.concatenate([one.reshape(-1, 2) for one in flat])
-    assert ((points >= [x, y]) & (points <= [x + w, y + h])).all()
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -11,13 +11,13 @@ from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.scan import JointErrors, follow_poses, raster, surface_to_sensor, touch_at
 from probe.simulate.registered import registered_surface
-from recognizer.scan.mosaic.planar import relative_pose, transform_points
+from recognizer.scan.mosaic.planar import transform_points
 from recognizer.thesis.merge import merge_touches, relative_poses
 from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_scan
 from recognizer.touch.lab import open_lab
 from recognizer.touch.recognition import NO_CONTACT
-from recognizer.touch.tactile_image import ImageError, tactile_image
+from recognizer.touch.tactile_image import tactile_image
 
 SENSOR = SensorType()
 CUBE = "{name: Cube, shape: {cube: 80 mm}, profile: thesis}"
@@ -71,32 +71,6 @@ def pattern(x, y):
 def felt_at(pose):
     at = transform_points(np.asarray(pose, float), SENSOR.centres_mm())
     return pattern(at[..., 0], at[..., 1])
-
-
-def test_poses_in_any_frame_become_those_in_the_first_sensor_frame():
-    planar = np.array([[3.0, 4.0, 0.5], [9.0, 4.5, 0.52]])
-    spatial = np.array([surface_to_sensor(*pose, 7.0) for pose in planar])
-    tilted = np.eye(4)
-    tilted[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # a wall
-    expected = relative_pose(planar[0], planar)
-    assert relative_poses(planar) == pytest.approx(expected)
-    assert relative_poses(tilted @ spatial) == pytest.approx(expected, abs=1e-9)
-    with pytest.raises(ImageError, match="shape"):
-        relative_poses(np.zeros((3, 2)))
-    with pytest.raises(ImageError, match="2 touches with 1 poses"):
-        merge_touches(SENSOR, [np.zeros((16, 16))] * 2, np.zeros((1, 3)))
-
-
-def test_touches_lie_where_they_were_felt():
-    poses = np.array([[0.0, 0, 0], [6.7, 0.3, 0.02], [6.9, -6.6, -0.01]])
-    found = merge_touches(SENSOR, [felt_at(pose) for pose in poses], poses, "believed")
-    image = found.image
-    assert image.step_mm == pytest.approx(SENSOR.pitch_mm / 4)
-    at = image.xy_mm(*np.indices(image.values.shape))
-    away = np.abs(image.values - pattern(at[..., 0], at[..., 1]))[image.defined]
-    assert away.max() < 0.25  # what straight lines between the tactels leave
-    assert np.sqrt((away**2).mean()) < 0.08
-    assert not image.defined.all()
 
 
 def test_products_find_steps_to_a_quarter_of_a_tactel_where_something_is_felt_in_common():

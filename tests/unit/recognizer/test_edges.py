@@ -18,13 +18,12 @@ from recognizer.thesis.edge_fit import (
 from recognizer.thesis.edges import (
     EdgePoints,
     classical_edges,
-    edge_points,
     fit_line,
     fuse_segments,
     segments,
     vertices,
 )
-from recognizer.touch.tactile_image import tactile_image, touch_image
+from recognizer.touch.tactile_image import touch_image
 
 SENSOR = SensorType()
 SQUARE = np.array([[0.0, 0], [80, 0], [80, 80], [0, 80]])
@@ -46,15 +45,6 @@ def joined(*parts):
 
 
 # --- points, lines, segments ------------------------------------------------------------
-
-
-def test_points_lie_on_the_step_of_an_image():
-    _, columns = np.indices((40, 40))
-    image = tactile_image(np.clip((columns - 12.3) / 3 + 0.5, 0, 1), step_mm=0.5)
-    points = edge_points(image)
-    assert len(points) == 40
-    assert points.at_mm[:, 0] == pytest.approx((12.3 - 19.5) * 0.5, abs=0.15)
-    assert points.normals == pytest.approx(np.tile([1.0, 0.0], (40, 1)), abs=1e-9)
 
 
 @pytest.mark.parametrize("degrees", range(-180, 180, 120))
@@ -91,17 +81,6 @@ def test_longest_segment_is_taken_first_and_noise_is_none():
 # --- production rules -------------------------------------------------------------------
 
 
-def test_pieces_that_run_on_are_one_edge_and_breaks_are_dropped():
-    rng = np.random.default_rng(3)
-    first = on_line(0.3, 2.0, np.linspace(-12, -4, 12), rng)
-    second = on_line(0.3, 2.0, np.linspace(2, 11, 12), rng)
-    stray = on_line(1.3, -7.0, np.linspace(0, 3, 5), rng)
-    pieces = segments(joined(first, second, stray))
-    assert len(pieces) == 3
-    (edge,) = fuse_segments(pieces)
-    assert edge.length_mm == pytest.approx(23, abs=0.5)
-
-
 def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
     rng = np.random.default_rng(4)
     below = on_line(math.pi / 2, -5.0, np.linspace(-9, 5, 20), rng, 0.02)
@@ -112,9 +91,6 @@ def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
     far = on_line(0.02, 8.0, np.linspace(-9, 5, 20), rng, 0.02)
     across = next(edge for edge in edges if abs(edge.angle_rad) < 0.1)
     assert vertices([across, fit_line(far.at_mm, far.normals), across]) == []
-
-
-# --- response ---------------------------------------------------------------------------
 
 
 # --- simulated touches ------------------------------------------------------------------

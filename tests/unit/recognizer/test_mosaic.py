@@ -19,7 +19,6 @@ from recognizer.scan.mosaic.canvas import (
     add_to_canvas,
     empty_canvas,
     image_of,
-    reference,
 )
 from recognizer.scan.mosaic.mosaic import ALONE, AMBIGUOUS, add_touch, no_touches
 from recognizer.scan.mosaic.patch import (
@@ -31,13 +30,11 @@ from recognizer.scan.mosaic.patch import (
 from recognizer.scan.mosaic.planar import (
     PlacedTouch,
     compose_poses,
-    composed_covariance,
     decoded_place,
     inverse,
     planar_belief,
     planar_covariance,
     planar_pose,
-    relative_covariance,
     relative_pose,
     transform_points,
     wrap_angle,
@@ -49,7 +46,7 @@ from recognizer.scan.mosaic.pose_graph import (
     solve_pose_graph,
 )
 from recognizer.scan.mosaic.register import APART, CONSTANT, NOISE, register_patches
-from recognizer.scan.mosaic.search import KnownRaster, cross_correlate, peaks, points_mm
+from recognizer.scan.mosaic.search import KnownRaster, cross_correlate, peaks
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
 
@@ -103,22 +100,6 @@ def test_a_quarter_turn_by_hand():
     assert transform_points(T_a_b, np.array([1.0, 0.0])) == pytest.approx([10, 6])
     assert compose_poses(T_a_b, np.array([1.0, 2.0, 0.0])) == pytest.approx([8, 6, math.pi / 2])
     assert inverse(T_a_b) == pytest.approx([-5, 10, -math.pi / 2])
-
-
-@pytest.mark.parametrize(
-    ("stated", "function"),
-    [(relative_covariance, relative_pose), (composed_covariance, compose_poses)],
-)
-def test_covariances_are_those_of_a_sample(stated, function):
-    rng = np.random.default_rng(3)
-    a, b = np.array([20.0, -7.0, 0.8]), np.array([31.0, 4.0, -0.3])
-    of_a, of_b = np.diag([0.04, 0.01, 1e-5]), np.diag([0.02, 0.03, 4e-5])
-    spread = stated(a, b, of_a, of_b)
-    some_a = a + rng.multivariate_normal(np.zeros(3), of_a, 40_000)
-    some_b = b + rng.multivariate_normal(np.zeros(3), of_b, 40_000)
-    scale = np.sqrt(np.diag(spread))
-    seen = np.cov(function(some_a, some_b).T)
-    assert np.abs((seen - spread) / np.outer(scale, scale)).max() < 0.03
 
 
 def test_poses_in_space_and_what_is_no_place():
@@ -245,27 +226,6 @@ def two(surface, true, trust=1.0, forces=(80.0, 80.0)):
     ]
 
 
-@pytest.mark.parametrize("dead", [False, True])
-@pytest.mark.parametrize("seed", range(3))
-def test_symbols_lock_to_a_tenth_of_a_tactel(seed, dead):
-    rng = np.random.default_rng(seed)
-    true = np.array([4.25 * P, 0.3 * P, 0.5 * DEG]) + rng.normal(0, [1, 1, 0.003])
-    trust = np.ones((16, 16))
-    if dead:
-        trust[5, :] = trust[2, 3] = trust[11, 9] = 0
-    start = true + np.array([0.5, -0.6, 0.01])
-    a, b = two(symbols(seed), true, trust, (30.0, 60.0))
-    found = register_patches(a, b, start, BELIEF, start)
-    assert found
-    away = found.pose - true
-    assert math.hypot(*away[:2]) < 0.2 * P
-    assert abs(away[2]) < 0.6 * DEG
-    assert away @ found.information @ away < 16
-    assert found.gain == pytest.approx(0.5, rel=0.25)
-    back = register_patches(b, a, inverse(start), BELIEF, inverse(start))
-    assert inverse(back.pose)[:2] == pytest.approx(found.pose[:2], abs=0.1)
-
-
 @pytest.mark.parametrize("angle", [0.0, 0.6, 1.9])
 def test_ridges_define_the_motion_across_them(angle):
     true = np.array([3.0, 2.0, 0.01])
@@ -305,7 +265,6 @@ def test_reasons_for_no_answer():
 # --- the pose graph -------------------------------------------------------------------------
 
 BELIEVED, PAIR = np.diag([0.4, 0.4, 4e3]), np.diag([90.0, 60.0, 6e4])
-DECODED_INFORMATION = np.diag([1e3, 1e3, 3e5])
 
 
 def scene(rng, n=12):
@@ -326,17 +285,6 @@ def measured(true, near, rng=None):
         Constraint(a, b, noisy(rng, pose, sure) if rng else pose, sure)
         for a, b, pose, sure in seen
     ]  # fmt: skip
-
-
-def test_constraints_without_errors_give_the_truth_from_afar():
-    rng = np.random.default_rng(1)
-    true, near = scene(rng)
-    constraints = measured(true, near)
-    constraints += [Constraint(PLANE, n, true[n], DECODED_INFORMATION) for n in (0, 7)]
-    start = true + rng.normal(0, [2, 2, 0.02], true.shape)
-    found = solve_pose_graph(constraints, start)
-    assert found.poses == pytest.approx(true, abs=1e-5)
-    assert found.cost < 1e-6
 
 
 def test_wrong_pairs_are_switched_off():
@@ -382,16 +330,6 @@ def test_the_image_is_the_weighted_mean():
         assert image.corner_mm == pytest.approx((-31.5 * P / 4, 31.5 * P / 4))
     # variances go with the level: weights 1, 1, 1 / 1.69
     assert image.values == pytest.approx((1 + 1 + 1.3 / 1.69) / (2 + 1 / 1.69), abs=1e-6)
-
-
-def test_the_canvas_shows_a_touch_where_it_lies():
-    how = CanvasEntry(np.array([30.0, -20.0, 0.4]), SURE, 1.0)
-    canvas = add_to_canvas(empty_canvas(P), patch(sampled()), how)
-    shown = reference(canvas, 30.0, -20.0, 12.0)
-    at = transform_points(inverse(how.pose), points_mm(shown)[shown.known])
-    inside = (np.abs(at) < 9).all(axis=1)
-    assert inside.sum() > 1000
-    assert np.abs(shown.values[shown.known] - waves(at))[inside].max() < 0.15
 
 
 # --- scans: without and with decoded places, blank, wrong, by steps ---------------------------

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from probe.arm import Arm, SensorPose
 from probe.errors import PoseError
-from probe.wrist import Wrist, counts_of, distances_at
+from probe.wrist import Wrist
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.robot import (
     MOVED_CHANCE,
@@ -98,21 +98,6 @@ def test_the_covariance_is_that_of_drawn_errors():
     assert np.cov(whitened) == pytest.approx(np.eye(6), abs=6 / math.sqrt(number))
 
 
-def test_a_joint_error_moves_the_object_as_its_covariance_says():
-    arm, wrist = Arm(), Wrist()
-    counts = counts_of(wrist, distances_at(wrist, 4.0, 0.01, -0.02))
-    errors = np.array([0.01, 0.0, 0.0, 0.0, 0.0])
-    at = carried_pose(arm, wrist, JOINTS, errors, counts)
-    turned = carried_pose(arm, wrist, JOINTS + errors, np.zeros(5), counts)
-    known = answer()
-    placed, other = object_pose(known, at, EXACT), object_pose(known, turned, EXACT)
-    alone = object_pose(known, carried_pose(arm, wrist, JOINTS, np.zeros(5), counts), EXACT)
-    step = other.T_robot_object[:3, 3] - placed.T_robot_object[:3, 3]
-    grown = placed.covariance[:3, :3] - alone.covariance[:3, :3]
-    assert np.linalg.norm(step) > 1.0
-    assert grown == pytest.approx(np.outer(step, step), abs=0.02 * step @ step)
-
-
 def test_what_is_not_known():
     sensor = SensorPose(np.eye(4), np.zeros((6, 6)))
     assert object_pose(refusal(0, "ambiguous"), sensor) is None
@@ -173,14 +158,6 @@ def test_an_object_that_lies_still_is_not_taken_for_moved():
     alarms = sum(fuse_poses(drawn(rng, 2 + k % 4)).moved for k in range(number))
     assert alarms <= 4  # MOVED_CHANCE of them, .4
     assert MOVED_CHANCE == 1e-3
-
-
-def test_one_pose_fused_is_itself():
-    placed = ObjectPose(BASE, SPREAD)
-    fused = fuse_poses([placed])
-    assert fused.pose.T_robot_object == pytest.approx(placed.T_robot_object, abs=1e-12)
-    assert fused.pose.covariance == pytest.approx(placed.covariance, rel=1e-6)
-    assert (fused.moved, fused.since) == (False, 0)
 
 
 @pytest.mark.parametrize(("by", "noticed"), [(0.99, False), (1.01, True)])

@@ -16,7 +16,7 @@ from probe.simulate.world.sensor import LevelSensor
 from probe.surface.polygon import polygon
 from recognizer.errors import MosaicError
 from recognizer.scan.belief import ScanHypothesis, begin_scan, extend_scan
-from recognizer.scan.mosaic.planar import BY_HAND_SD, PlacedTouch, compose_poses, planar_belief
+from recognizer.scan.mosaic.planar import PlacedTouch, compose_poses, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces, _Face, join_faces
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import open_lab
@@ -82,33 +82,6 @@ def test_a_surface_that_is_not_registered_is_no_object(reader):
     for touch in scanned(foreign(reader), PLACES[:8], 0.5, {}):
         scan = extend_scan(scan, touch)
         assert not scan.recognition
-
-
-def true_pose(x, y, theta, base=(300.0, 20.0, 0.4)):
-    """T_base_sensor of a touch, the face lying somewhere in the base's frame, upside down."""
-    T_face_sensor = surface_to_sensor(x, y, theta)
-    over = np.diag([1.0, -1.0, -1.0, 1.0])
-    return over @ surface_to_sensor(*base, 50.0) @ T_face_sensor
-
-
-def test_places_follow_from_poses_steps_or_a_hand():
-    signal = signal_of(np.ones((16, 16)))
-    poses = [true_pose(10, 20, 0.1), true_pose(16, 20, 0.1), true_pose(16, 27, 0.2)]
-    known = TouchPlaces()
-    for pose in poses:
-        touch = known.place(signal, pose, 0)
-        known.keep(pose)
-    c, s = math.cos(0.1), math.sin(0.1)
-    assert touch.believed.pose == pytest.approx([6 * c + 7 * s, 7 * c - 6 * s, 0.1])
-    assert touch.stepped is None
-    loose = known.place(signal, None, 0)
-    assert loose.believed is None
-    assert np.sqrt(np.diag(loose.stepped.covariance)) == pytest.approx(BY_HAND_SD)
-    late = TouchPlaces()  # the first touch had no pose
-    late.keep(None)
-    assert late.place(signal, poses[0], 0).stepped.pose == pytest.approx([0, 0, 0])
-    late.keep(poses[0])
-    assert late.place(signal, poses[1], 0).stepped.pose == pytest.approx([6 * c, -6 * s, 0])
 
 
 @pytest.fixture(scope="module")

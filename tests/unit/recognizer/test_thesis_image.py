@@ -8,10 +8,10 @@ from scipy import ndimage
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import SymbolStyle, alphabet_named
-from recognizer.thesis.filters import magnify_image, median, sobel, subtract_bias
+from recognizer.thesis.filters import magnify_image, median, sobel
 from recognizer.thesis.grid import grid
 from recognizer.thesis.merge import magnify_samples
-from recognizer.thesis.skeleton import graph, length, points_of_glyph, points_of_skeleton
+from recognizer.thesis.skeleton import points_of_glyph, points_of_skeleton
 from recognizer.thesis.symbols import COUNTS, CUT, Symbol, symbols
 from recognizer.touch.tactile_image import ImageError, tactile_image, touch_image
 
@@ -48,25 +48,6 @@ def test_frame_has_x_along_columns_and_y_against_rows():
 def test_no_image_is_refused(values, kwargs, match):
     with pytest.raises(ImageError, match=match):
         tactile_image(values, **kwargs)
-
-
-def test_nan_where_undefined_stays_outside():
-    values, known = noise(), np.ones((16, 16), bool)
-    values[3, 4], known[3, 4] = np.nan, False
-    image = tactile_image(values, step_mm=1.0, defined=known)
-    for made in (subtract_bias(image), median(image), magnify_image(image)):
-        assert np.isfinite(made.values).all()
-    # beside the hole counts what is left
-    assert magnify_image(image).values[12, 19] == pytest.approx(values[3, 5])
-    assert not magnify_image(image).defined[12, 16]
-
-
-def test_median_over_holes_is_that_of_what_is_known():
-    values, known = noise(2), np.random.default_rng(3).random((16, 16)) > 0.3
-    found = median(tactile_image(values, step_mm=1.0, defined=known)).values
-    padded = np.pad(np.where(known, values, np.nan), 1, mode="edge")
-    for r, c in np.argwhere(known):
-        assert found[r, c] == pytest.approx(np.nanmedian(padded[r : r + 3, c : c + 3]))
 
 
 def test_median_takes_spikes_and_keeps_edges_but_erases_thin_lines():
@@ -140,20 +121,6 @@ def test_glyphs_have_the_end_points_and_vertices_of_the_thesis(name, expected):
     assert [points_of_glyph(glyph).counts for glyph in alphabet_named(name).glyphs] == expected
 
 
-@pytest.mark.parametrize(
-    ("rows", "ends", "length_px"),
-    [
-        ("......... .#######. ....#.... ....#.... ....#.... ....#....", [1, 1, 1, 3], 10),
-        (".......... .########. ....#..... ..........", [1, 1], 7),  # without its spur
-    ],
-)
-def test_graph_of_a_line_that_branches(rows, ends, length_px):
-    line = np.array([[c == "#" for c in row] for row in rows.split()], bool)
-    found = graph(line, shortest=2.0)
-    assert sorted(found.degree(node) for node in found.nodes if found.degree(node)) == ends
-    assert sum(length(one.path) for one in found.branches) == pytest.approx(length_px, abs=1.5)
-
-
 def test_a_ring_is_one_loop_without_ends():
     ring = np.zeros((5, 5), bool)
     ring[[1, 2, 2, 3], [2, 1, 3, 2]] = True
@@ -208,42 +175,6 @@ def laid(labels, theta=0.0, at=(0.0, 0.0), rng=None, place=0.0, turn=0.0):
         if label >= 0:
             found.append(symbol(z.real + at[0] + dx, z.imag + at[1] + dy, theta + dt, int(label)))
     return found
-
-
-@pytest.mark.parametrize("theta", [0.0, 0.4, math.pi / 2, -2.5])
-def test_window_is_read_at_any_turn(theta):
-    found = grid(laid(LABELS, theta, (30.0, -7.0)), PITCH)
-    assert np.array_equal(found.window, LABELS)
-    assert len(found.members) == 12
-    assert found.off_mm < 1e-9
-    # an image point s lies at R s + (x, y): the upper left symbol is the centre of its cell
-    c, s = math.cos(found.theta_rad), math.sin(found.theta_rad)
-    i, j = found.first
-    at = (found.x_mm + c * 30 + s * 7, found.y_mm + s * 30 - c * 7)
-    assert at == pytest.approx(((i + 0.5) * PITCH, (j + 0.5) * PITCH), abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("missing", "others", "window"),
-    [
-        # what stands or turns otherwise is expelled
-        ([(1, 1)], [symbol(18, -5, 0.0), symbol(6, 6, 0.0), symbol(12, -12, 0.7)], None),
-        # of two candidates the better fit is chosen
-        ([(0, 1)], [symbol(12 + 2.0, 0, 0.0, 0), symbol(12 - 0.5, 0.3, 0.0, 1)], LABELS),
-        ([(0, 2), (1, 2), (2, 2)], [], None),  # symbols beyond a gap join the grid
-    ],
-)
-def test_which_symbols_are_of_the_grid(missing, others, window):
-    labels = LABELS.copy()
-    for cell in missing:
-        labels[cell] = -1
-    found = grid(laid(labels) + others, PITCH)
-    assert np.array_equal(found.window, labels if window is None else window)
-
-
-def test_the_largest_grid_counts():
-    found = grid(laid(np.array([[1, 0]]), at=(130.0, 40.0)) + laid(LABELS), PITCH)
-    assert np.array_equal(found.window, LABELS)
 
 
 def test_a_symbol_is_off_by_a_quarter_of_the_pitch_at_most():
