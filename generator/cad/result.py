@@ -14,6 +14,7 @@ from encoded_objects.base.errors import require
 from generator.cad.encode import EncodedSolid
 from generator.errors import SolidError
 from generator.export.step import step_chunks
+from generator.polyhedron.read.kernel import step_shape, sub_shapes
 from generator.solid import Part
 
 
@@ -51,25 +52,17 @@ def _kernel_solid(part: Part) -> Any:
     """Return a part as the kernel's solid, in the object frame."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
     from OCP.gp import gp_Trsf
-    from OCP.IFSelect import IFSelect_RetDone
-    from OCP.STEPControl import STEPControl_Reader
     from OCP.TopAbs import TopAbs_SOLID
-    from OCP.TopExp import TopExp_Explorer
     from OCP.TopoDS import TopoDS
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "part.step"
         with path.open("wb") as file:
             file.writelines(step_chunks(part))
-        reader = STEPControl_Reader()
-        done = reader.ReadFile(str(path)) == IFSelect_RetDone
-    if done:
-        reader.TransferRoots()
-        explorer = TopExp_Explorer(reader.OneShape(), TopAbs_SOLID)
-        done = explorer.More()
-    if not done:
+        solids = sub_shapes(step_shape(path), TopAbs_SOLID)
+    if not solids:
         raise SolidError("the CAD kernel does not read the part back", place=part.name)
     motion = gp_Trsf()
     motion.SetValues(*part.T_object_part[:3].ravel().tolist())
-    moved = BRepBuilderAPI_Transform(explorer.Current(), motion, True).Shape()
+    moved = BRepBuilderAPI_Transform(solids[0], motion, True).Shape()
     return TopoDS.Solid_s(moved)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.errors import require
 from generator.errors import GeneratorError, SolidError
+from generator.polyhedron.read.kernel import step_shape, sub_shapes
 from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
 from generator.solid import Part, round_volume, volume
 from generator.solid.part import transform
@@ -48,7 +49,6 @@ class StepReport:
     solids: int
     valid: bool
     volume_mm3: float
-    volume_error: float  #: relative to the analytic volume
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,16 +61,6 @@ class MeshReport:
     non_manifold_vertices: int
     self_intersections: int  #: triangles that cut or touch another, decided in integers
     volume_mm3: float
-    volume_error: float  #: relative to the analytic volume
-
-
-@dataclass(frozen=True, slots=True)
-class PanelFile:
-    """A written panel and where it belongs."""
-
-    name: str
-    path: Path  #: binary STL
-    T_object_part: Floats  #: (4, 4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,21 +78,21 @@ def verify_step(part: Part, path: Path) -> StepReport:
     Raises `SolidError` if it is not one valid solid of the part's volume, `MissingExtraError`
     without the CAD kernel.
     """
-    read = read_step(path)
+    report = read_step(path)
     excess = round_volume(part)
     allowed = STEP_VOLUME if excess is None else BENT_VOLUME
     volume_mm3 = volume(part) + (excess or 0.0)
-    report = replace(read, volume_error=float(read.volume_mm3 / volume_mm3 - 1.0))
+    error = report.volume_mm3 / volume_mm3 - 1.0
     if report.solids != 1:
         raise _failure(part.name, path, f"holds {report.solids} solids where one is allowed")
     if not report.valid:
         raise _failure(part.name, path, "holds a solid that the CAD kernel finds invalid")
-    if not abs(report.volume_error) <= allowed:
+    if not abs(error) <= allowed:
         raise _failure(
             part.name,
             path,
-            f"has a volume of {read.volume_mm3:.6f} mm3 where {volume_mm3:.6f} mm3 was meant "
-            f"(relative error {report.volume_error:.1e}, allowed {allowed:.0e})",
+            f"has a volume of {report.volume_mm3:.6f} mm3 where {volume_mm3:.6f} mm3 was meant "
+            f"(relative error {error:.1e}, allowed {allowed:.0e})",
         )
     return report
 
@@ -113,8 +103,7 @@ def verify_stl(part: Part, path: Path) -> MeshReport:
     Raises `SolidError` if it is not one closed mesh of the part's volume, `MissingExtraError`
     without the mesh library, `GeneratorError` if that lacks a library of the system.
     """
-    read, volume_mm3 = read_stl(path), volume(part)
-    report = replace(read, volume_error=float(read.volume_mm3 / volume_mm3 - 1.0))
+    report, volume_mm3 = read_stl(path), volume(part)
     faults = {
         "open edges": report.boundary_edges,
         "edges with more than two triangles": report.non_manifold_edges,
@@ -126,25 +115,22 @@ def verify_stl(part: Part, path: Path) -> MeshReport:
         found = ["no triangles that can be read"]
     if found:
         raise _failure(part.name, path, "has " + ", ".join(found))
-    if not abs(report.volume_error) <= STL_VOLUME:
-        raise _failure(
-            part.name,
-            path,
-            f"has a volume of {read.volume_mm3:.3f} mm3 where {volume_mm3:.3f} mm3 was meant",
-        )
+    if not abs(report.volume_mm3 / volume_mm3 - 1.0) <= STL_VOLUME:
+        meant = f"{report.volume_mm3:.3f} mm3 where {volume_mm3:.3f} mm3 was meant"
+        raise _failure(part.name, path, f"has a volume of {meant}")
     return report
 
 
-def verify_fit(panels: Sequence[PanelFile], gap_mm: float) -> FitReport:
-    """Put written panels together and measure.
+def verify_fit(parts: Sequence[Part], files: Sequence[Path], gap_mm: float) -> FitReport:
+    """Put written panels, binary STL, together and measure.
 
     Raises `SolidError` if two panels overlap or are nearer than `gap_mm`.
     """
-    solids = [_solid(panel) for panel in panels]
+    solids = [_solid(part, path) for part, path in zip(parts, files, strict=True)]
     boxes = np.array([solid.bounding_box() for solid in solids]).reshape(-1, 2, 3)
     reach = max(REACH_MM, 2 * gap_mm)
     pairs, total, smallest = 0, 0.0, reach
-    for one, other in itertools.combinations(range(len(panels)), 2):
+    for one, other in itertools.combinations(range(len(parts)), 2):
         apart = np.maximum(boxes[one, 0] - boxes[other, 1], boxes[other, 0] - boxes[one, 1])
         if apart.max() >= reach:
             continue
@@ -152,80 +138,63 @@ def verify_fit(panels: Sequence[PanelFile], gap_mm: float) -> FitReport:
         overlap = 0.0
         if apart.max() < 0:
             overlap = float((solids[one] ^ solids[other]).volume())
-        names = f"panels '{panels[one].name}' and '{panels[other].name}'"
+        names = f"panels '{parts[one].name}' and '{parts[other].name}'"
         if overlap > OVERLAP_MM3:
-            raise _misfit(f"{names} overlap by {overlap:.4f} mm3", panels[one])
+            raise _misfit(f"{names} overlap by {overlap:.4f} mm3", files[one])
         if gap < gap_mm - ROUNDING_MM:
-            raise _misfit(f"{names} are {gap:.4f} mm apart where {gap_mm:g} mm was meant",
-                          panels[one])  # fmt: skip
+            apart_by = f"{gap:.4f} mm apart where {gap_mm:g} mm was meant"
+            raise _misfit(f"{names} are {apart_by}", files[one])
         pairs += gap < reach
         total += overlap
         smallest = min(smallest, gap)
     return FitReport(pairs, total, smallest if pairs else None)
 
 
-def _solid(panel: PanelFile) -> Manifold:
+def _solid(part: Part, path: Path) -> Manifold:
     """Return a written panel as it stands in the object."""
-    corners = stl_triangles(
-        panel.path.read_bytes(), str(panel.path), most=MOST_PART_TRIANGLES, padded=False
-    )
+    content = path.read_bytes()
+    corners = stl_triangles(content, str(path), most=MOST_PART_TRIANGLES, padded=False)
     points, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    seated = transform(panel.T_object_part, points)
+    seated = transform(part.T_object_part, points)
     solid = Manifold(Mesh64(seated, numbers.reshape(-1, 3).astype(np.uint64)))
     if solid.status() != Error.NoError:
-        raise _misfit(f"'{panel.name}' is no closed mesh", panel)
+        raise _misfit(f"'{part.name}' is no closed mesh", path)
     return solid
 
 
-def _misfit(cause: str, panel: PanelFile) -> SolidError:
-    return SolidError(
-        cause,
-        fix="do not print them; report the spec together with this message",
-        place=str(panel.path),
-    )
+def _misfit(cause: str, path: Path) -> SolidError:
+    fix = "do not print them; report the spec together with this message"
+    return SolidError(cause, fix=fix, place=str(path))
 
 
 def read_step(path: Path) -> StepReport:
-    """Return what the CAD kernel makes of a file; the volume error is not known (NaN)."""
+    """Return what the CAD kernel makes of a file."""
     require("OCP.BRepCheck", extra=_EXTRAS, purpose="--verify")
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
-    from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.Message import Message
-    from OCP.STEPControl import STEPControl_Reader
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopAbs import TopAbs_SOLID
 
     # The kernel prints its complaints to stdout, where results belong: take its printers away.
     messenger: Any = Message.DefaultMessenger_s()
     printers = list(messenger.Printers())
     for printer in printers:
         messenger.RemovePrinter(printer)
-    reader: Any = STEPControl_Reader()
-    status = reader.ReadFile(str(path))
+    shape = step_shape(path)
     for printer in printers:
         messenger.AddPrinter(printer)
-    if status != IFSelect_ReturnStatus.IFSelect_RetDone:
-        return StepReport(0, False, math.nan, math.nan)
-    reader.TransferRoots()
-    shape: Any = reader.OneShape()
     if shape is None or shape.IsNull():
-        return StepReport(0, False, math.nan, math.nan)
-    solids = 0
-    explorer: Any = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
-    while explorer.More():
-        solids += 1
-        explorer.Next()
+        return StepReport(0, False, math.nan)
+    solids = len(sub_shapes(shape, TopAbs_SOLID))
     properties: Any = GProp_GProps()
     BRepGProp.VolumeProperties_s(shape, properties)
-    return StepReport(
-        solids, bool(BRepCheck_Analyzer(shape).IsValid()), float(properties.Mass()), math.nan
-    )
+    valid = bool(BRepCheck_Analyzer(shape).IsValid())
+    return StepReport(solids, valid, float(properties.Mass()))
 
 
 def read_stl(path: Path) -> MeshReport:
-    """Return what the mesh library makes of a file; the volume error is not known (NaN)."""
+    """Return what the mesh library makes of a file."""
     require("pymeshlab", extra=_EXTRAS, purpose="--verify")
     import pymeshlab
 
@@ -238,7 +207,7 @@ def read_stl(path: Path) -> MeshReport:
                 f"--verify needs all of the mesh library, which did not load ({error})",
                 fix="run: apt-get install libopengl0",
             ) from error
-        return MeshReport(0, 0, 0, 0, 0, math.nan, math.nan)
+        return MeshReport(0, 0, 0, 0, 0, math.nan)
     meshes.meshing_remove_duplicate_vertices()
     topology = meshes.get_topological_measures()
     meshes.compute_selection_by_self_intersections_per_face()
@@ -254,16 +223,12 @@ def read_stl(path: Path) -> MeshReport:
         non_manifold_vertices=int(topology["non_two_manifold_vertices"]),
         self_intersections=int(cut_triangles(points[faces], suspects).sum()),
         volume_mm3=float(meshes.get_geometric_measures().get("mesh_volume", math.nan)),
-        volume_error=math.nan,
     )
 
 
 def _failure(part: str, path: Path, reason: str) -> SolidError:
-    return SolidError(
-        f"part '{part}': {path.name} {reason}",
-        fix="do not print it; report the spec together with this message",
-        place=str(path),
-    )
+    fix = "do not print it; report the spec together with this message"
+    return SolidError(f"part '{part}': {path.name} {reason}", fix=fix, place=str(path))
 
 
 FOLDED_COS = -0.999  #: between neighbours, from which the exact test looks at them

@@ -130,26 +130,19 @@ def decimal_numbers(values: NDArray[np.float64], width: int, places: int) -> Byt
     Zero has no sign. `width` is at least `decimal_width` of the largest value.
     """
     scaled = np.rint(values * 10.0**places).astype(np.int64)
-    rest = np.abs(scaled)
+    digits = whole_numbers(np.abs(scaled), width - 1)
+    point = width - 1 - places
+    out = np.empty((*values.shape, width), np.uint8)
+    out[..., :point], out[..., point], out[..., point + 1 :] = (
+        digits[..., :point], _POINT, digits[..., point:]
+    )  # fmt: skip
+    assert np.abs(scaled).max(initial=0) < 10 ** (width - 2), "a number is wider than its field"
     unsigned = scaled >= 0
-    out = np.full((*values.shape, width), _SPACE, np.uint8)
-    for column in range(width - 1, width - 1 - places, -1):
-        quotient = rest // 10
-        out[..., column] = rest - 10 * quotient + _ZERO
-        rest = quotient
-    out[..., width - 1 - places] = _POINT
-    for column in range(width - 2 - places, -1, -1):
-        quotient = rest // 10
-        digit = (rest - 10 * quotient + _ZERO).astype(np.uint8)
-        if column == width - 2 - places:  # the digit before the point is always written
-            out[..., column] = digit
-        else:
-            ended = rest == 0
-            sign = np.where(unsigned, _SPACE, _MINUS).astype(np.uint8)
-            out[..., column] = np.where(ended, sign, digit)
-            unsigned = unsigned | ended
-        rest = quotient
-    assert not rest.any(), "a number is wider than its field"
+    for column in range(point - 2, -1, -1):  # the digit before the point is always written
+        ended = np.abs(scaled) < 10 ** (width - 2 - column)
+        sign = np.where(unsigned, _SPACE, _MINUS).astype(np.uint8)
+        out[..., column] = np.where(ended, sign, out[..., column])
+        unsigned |= ended
     return out
 
 

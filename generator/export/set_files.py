@@ -12,11 +12,15 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from generator.export.bed import BedPlace
+from generator.export.bed import BedPlace, Plate
 from generator.export.colours import BODY_RGB, hexadecimal
 from generator.export.lettering import transliterate
+
+if TYPE_CHECKING:
+    from generator.export.threemf import SlicerSettings
+    from generator.printers import Printer
 
 COLUMNS = (
     "object", "part", "printer", "plate", "x_mm", "y_mm", "turned",
@@ -29,47 +33,60 @@ _TABLE = (("object", 0.0), ("parts", 0.56), ("symbols", 0.67), ("plates", 0.8))
 
 
 @dataclass(frozen=True, slots=True)
-class PackedPart:
-    """One part of a set and its place."""
+class SetPart:
+    """One part of a set, as its file has it."""
 
-    order: tuple[int, int]  #: object and part, as the set lists them
+    number: int  #: of its object in the set
     object: str
-    part: str
-    plate: int  #: from 1
-    printer: str
-    place: BedPlace
-    size_mm: tuple[float, float, float]  #: as it comes from the file, before it is turned
+    name: str
+    size_mm: tuple[float, float, float]
     symbols: int
-    fits: bool  #: whether the plate fits the bed
+    volume_mm3: float
+
+
+@dataclass(frozen=True, slots=True)
+class SetPlate:
+    """One plate, and the parts that its places count: all that its printer prints so."""
+
+    printer: Printer
+    settings: SlicerSettings | None
+    plate: Plate
+    parts: tuple[SetPart, ...]
 
     @property
-    def lying_mm(self) -> tuple[float, float]:
-        """Width and depth as it lies on the bed."""
-        width, depth, _ = self.size_mm
-        return (depth, width) if self.place.turned else (width, depth)
+    def held(self) -> list[tuple[SetPart, BedPlace]]:
+        """The parts that lie on it, those of an object together."""
+        return [(self.parts[place.part], place) for place in self.plate.places]
 
 
-def packing_csv(packed: Sequence[PackedPart]) -> bytes:
+def packing_csv(plates: Sequence[SetPlate]) -> bytes:
     """Return the list, one line for each part."""
     text = io.StringIO(newline="")
     table = csv.writer(text)
     table.writerow(COLUMNS)
-    for one in packed:
-        width, depth = one.lying_mm
+    rows = [
+        (number, plate, part, place)
+        for number, plate in enumerate(plates, 1)
+        for part, place in plate.held
+    ]
+    for number, plate, part, place in sorted(rows, key=lambda row: (row[2].number, row[3].part)):
+        lengths = (*_lying_mm(part, place), part.size_mm[2])
         table.writerow(
             [
-                one.object,
-                one.part,
-                one.printer,
-                one.plate,
-                *(f"{value + 0.0:.1f}" for value in (one.place.x_mm, one.place.y_mm)),
-                "yes" if one.place.turned else "no",
-                *(f"{value:.1f}" for value in (width, depth, one.size_mm[2])),
-                one.symbols,
-                "yes" if one.fits else "no",
+                part.object, part.name, plate.printer.name, number,
+                *(f"{value + 0.0:.1f}" for value in (place.x_mm, place.y_mm)),
+                "yes" if place.turned else "no",
+                *(f"{value:.1f}" for value in lengths), part.symbols,
+                "yes" if plate.plate.fits else "no",
             ]
-        )
+        )  # fmt: skip
     return text.getvalue().encode()
+
+
+def _lying_mm(part: SetPart, place: BedPlace) -> tuple[float, float]:
+    """Return width and depth of a part as it lies on the bed."""
+    width, depth, _ = part.size_mm
+    return (depth, width) if place.turned else (width, depth)
 
 
 def can_draw() -> bool:
@@ -77,10 +94,8 @@ def can_draw() -> bool:
     return find_spec("matplotlib") is not None
 
 
-def overview_pdf(
-    title: str, plates: Sequence[Sequence[PackedPart]], beds_mm: Sequence[tuple[float, float]]
-) -> bytes:
-    """Return the pages: the parts on each plate, and width and depth of its bed."""
+def overview_pdf(title: str, plates: Sequence[SetPlate]) -> bytes:
+    """Return the pages: the objects, and the plan of each plate."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_pdf import PdfPages
 
@@ -90,15 +105,16 @@ def overview_pdf(
     with rc_context(fonts), PdfPages(buffer, metadata={**dateless, "Title": title}) as pages:
         for page in _object_pages(title, plates):
             pages.savefig(page)
-        for number, (packed, bed) in enumerate(zip(plates, beds_mm, strict=True), 1):
-            pages.savefig(_plate_page(title, number, packed, bed))
+        for number, plate in enumerate(plates, 1):
+            pages.savefig(_plate_page(title, number, plate))
     return buffer.getvalue()
 
 
-def _object_pages(title: str, plates: Sequence[Sequence[PackedPart]]) -> list[Any]:
-    of: dict[tuple[int, str], list[PackedPart]] = {}
-    for row in (row for packed in plates for row in packed):
-        of.setdefault((row.order[0], row.object), []).append(row)
+def _object_pages(title: str, plates: Sequence[SetPlate]) -> list[Any]:
+    of: dict[tuple[int, str], list[tuple[int, SetPart]]] = {}
+    for number, plate in enumerate(plates, 1):
+        for part, _ in plate.held:
+            of.setdefault((part.number, part.object), []).append((number, part))
     objects = sorted(of.items())
     counts = f"{len(objects)} objects, {sum(map(len, of.values()))} parts, {len(plates)} plates"
     pages = []
@@ -109,8 +125,8 @@ def _object_pages(title: str, plates: Sequence[Sequence[PackedPart]]) -> list[An
         for text, x in _TABLE:
             axes.text(x, 0.5, text, weight="bold", size=9, color=_INK, va="center")
         for line, ((_, name), rows) in enumerate(objects[first : first + _LINES], 1):
-            on = ", ".join(str(number) for number in sorted({row.plate for row in rows}))
-            symbols = sum(row.symbols for row in rows)
+            on = ", ".join(map(str, sorted({number for number, _ in rows})))
+            symbols = sum(part.symbols for _, part in rows)
             texts = (transliterate(name), str(len(rows)), str(symbols), on)
             for (_, x), text in zip(_TABLE, texts, strict=True):
                 axes.text(x, line + 0.5, text, size=9, color=_INK, va="center")
@@ -119,27 +135,23 @@ def _object_pages(title: str, plates: Sequence[Sequence[PackedPart]]) -> list[An
     return pages
 
 
-def _plate_page(
-    title: str, number: int, packed: Sequence[PackedPart], bed_mm: tuple[float, float]
-) -> Any:
+def _plate_page(title: str, number: int, plate: SetPlate) -> Any:
     """Return the plan of one plate: every part as a rectangle with its name."""
     from matplotlib.patches import Rectangle
 
-    beyond = "" if all(row.fits for row in packed) else "; larger than the bed"
-    head = (
-        f"{transliterate(title)}: plate {number}, {packed[0].printer}, {len(packed)} parts{beyond}"
-    )
+    parts = f"{len(plate.held)} parts{'' if plate.plate.fits else '; larger than the bed'}"
+    head = f"{transliterate(title)}: plate {number}, {plate.printer.name}, {parts}"
     page, axes = _page(head, (0.08, 0.08, 0.84, 0.8))
-    width, depth = bed_mm
+    width, depth = plate.printer.bed_mm
     axes.add_patch(Rectangle((0, 0), width, depth, facecolor="#F1F5F9", edgecolor=_EDGE))
     ends = [(width, depth)]
-    for row in packed:
-        x, y, (w, d) = row.place.x_mm, row.place.y_mm, row.lying_mm
+    for part, place in plate.held:
+        x, y, (w, d) = place.x_mm, place.y_mm, _lying_mm(part, place)
         axes.add_patch(
             Rectangle((x, y), w, d, facecolor=hexadecimal(BODY_RGB), edgecolor=_EDGE, linewidth=0.6)
         )
         upright = d > 1.5 * w
-        text = transliterate(row.part)
+        text = transliterate(part.name)
         room = (d if upright else w) / width * 0.84 * _PAGE[0] * 72  # points
         size = max(3.0, min(9.0, 0.9 * room / (0.62 * max(1, len(text)))))
         axes.text(

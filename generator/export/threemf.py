@@ -196,71 +196,31 @@ def print_file(
 
 
 @dataclass(frozen=True, slots=True)
-class _BedMesh:
-    """A mesh whose vertices are all in use."""
-
-    name: str
-    material: int  #: `BODY` or `SYMBOLS`
-    vertices: NDArray[np.float64]  #: (N, 3) mm
-    triangles: NDArray[np.int64]  #: (M, 3)
-
-    def vertex_text(self) -> DeflatedText:
-        words = ('<vertex x="', '" y="', '" z="', '"/>\n')
-        blocks = range(0, len(self.vertices), _BLOCK)
-        rows = (self.vertices[start : start + _BLOCK] for start in blocks)
-        return deflate_text(number_lines(words, some, PLACES) for some in rows)
-
-    def triangle_text(self, first: int = 0, properties: str = "") -> DeflatedText:
-        """Return the elements of its triangles, whose vertices are numbered from `first`."""
-        words = ('<triangle v1="', '" v2="', '" v3="', f'"{properties}/>\n')
-        blocks = range(0, len(self.triangles), _BLOCK)
-        rows = (self.triangles[start : start + _BLOCK] + first for start in blocks)
-        return deflate_text(number_lines(words, some, 0) for some in rows)
-
-
-@dataclass(frozen=True, slots=True)
 class _BedPart:
-    """What one part puts on the bed: body and symbols (None without symbols)."""
+    """What one part puts on the bed."""
 
     name: str
-    body: _BedMesh
-    symbols: _BedMesh | None
+    #: vertices (N, 3) mm, all in use, and triangles (M, 3): of the body, and of symbols if any
+    meshes: tuple[tuple[NDArray[np.float64], NDArray[np.int64]], ...]
     low: NDArray[np.float64]  #: (3,) lowest x, y, z, mm
     size: Size
 
-    @property
-    def meshes(self) -> tuple[_BedMesh, ...]:
-        return (self.body,) if self.symbols is None else (self.body, self.symbols)
-
 
 def _bed_part(part: Part | tuple[str, Mesh]) -> _BedPart:
-    symbols: list[tuple[NDArray[np.float64], NDArray[np.int64]]] = []
+    symbols: list[Mesh] = []
     if isinstance(part, Part):
         name, body = part.name, body_mesh(part)
-        stands = symbol_meshes(part)
-        symbols = [(one.vertices, one.triangles) for one in stands if len(one.triangles)]
+        symbols = [mesh for mesh in symbol_meshes(part) if len(mesh.triangles)]
     else:
         name, body = part
-    own = _BedMesh(f"{name} body", BODY, *join_meshes([(body.vertices, body.triangles)]))
-    points, stuck = own.vertices, None
-    if symbols:
-        stuck = _BedMesh(f"{name} symbols", SYMBOLS, *join_meshes(symbols))
-        points = np.vstack([points, stuck.vertices])
+    joined = [
+        join_meshes((mesh.vertices, mesh.triangles) for mesh in own)
+        for own in ([body], symbols)
+        if own
+    ]
+    points = np.vstack([vertices for vertices, _ in joined])
     low, high = points.min(axis=0), points.max(axis=0)
-    return _BedPart(name, own, stuck, low, (float(high[0] - low[0]), float(high[1] - low[1])))
-
-
-def _move_to_bed(mesh: _BedMesh, part: _BedPart, place: BedPlace) -> _BedMesh:
-    """Return a mesh of a part where it lies on the bed."""
-    x, y, z = part.low.tolist()
-    points = mesh.vertices
-    if place.turned:  # (x, y) -> (-y, x)
-        points = np.column_stack([-points[:, 1], points[:, 0], points[:, 2]])
-        corner = (-(y + part.size[1]), x)
-    else:
-        corner = (x, y)
-    shift = np.array([place.x_mm - corner[0], place.y_mm - corner[1], -z])
-    return _BedMesh(mesh.name, mesh.material, points + shift, mesh.triangles)
+    return _BedPart(name, tuple(joined), low, (float(high[0] - low[0]), float(high[1] - low[1])))
 
 
 def _print_file(
@@ -271,20 +231,37 @@ def _print_file(
 
 
 def _part_text(part: _BedPart, place: BedPlace) -> PartText:
-    meshes = [_move_to_bed(mesh, part, place) for mesh in part.meshes]
+    """Return a part where it lies on the bed."""
+    x, y, z = part.low.tolist()
+    corner = (-(y + part.size[1]), x) if place.turned else (x, y)
+    shift = np.array([place.x_mm - corner[0], place.y_mm - corner[1], -z])
+    texts = []
+    for material, (points, triangles) in enumerate(part.meshes):
+        if place.turned:  # (x, y) -> (-y, x)
+            points = np.column_stack([-points[:, 1], points[:, 0], points[:, 2]])
+        words = ('<vertex x="', '" y="', '" z="', '"/>\n')
+        name = f"{part.name} {('body', 'symbols')[material]}"
+        vertices = _lines(words, points + shift, PLACES)
+        texts.append(MeshText(name, material, vertices, _triangles(triangles), len(triangles)))
     after = None
-    if part.symbols is not None:
-        after = meshes[0].triangle_text(len(part.symbols.vertices), f' pid="1" p1="{BODY}"')
+    if len(part.meshes) > 1:
+        (_, triangles), (stuck, _) = part.meshes
+        after = _triangles(triangles + len(stuck), f' pid="1" p1="{BODY}"')
     width, depth = part.size[::-1] if place.turned else part.size
-    return PartText(
-        part.name,
-        (round(place.x_mm + width / 2, PLACES), round(place.y_mm + depth / 2, PLACES)),
-        tuple(
-            MeshText(m.name, m.material, m.vertex_text(), m.triangle_text(), len(m.triangles))
-            for m in meshes
-        ),
-        after,
-    )
+    middle = round(place.x_mm + width / 2, PLACES), round(place.y_mm + depth / 2, PLACES)
+    return PartText(part.name, middle, tuple(texts), after)
+
+
+def _triangles(triangles: NDArray[np.int64], properties: str = "") -> DeflatedText:
+    return _lines(('<triangle v1="', '" v2="', '" v3="', f'"{properties}/>\n'), triangles, 0)
+
+
+def _lines(
+    words: tuple[str, ...], rows: NDArray[np.float64] | NDArray[np.int64], places: int
+) -> DeflatedText:
+    """Return an element for each row of numbers, `words` around them."""
+    blocks = (rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK))
+    return deflate_text(number_lines(words, some, places) for some in blocks)
 
 
 def mesh_object(number: int, mesh: MeshText, properties: str = "") -> list[str | DeflatedText]:

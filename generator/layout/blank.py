@@ -59,7 +59,7 @@ def remedies(
     rows, columns = request.window
     ways.append(f"take a profile with a smaller window than {rows}x{columns}")
     scale = max(_scale(region, request) for region in different.values())
-    if np.isfinite(scale):
+    if math.isfinite(scale):
         ways.append(f"make the object {scale:g} times larger")
     return ", ".join(ways) + ", or leave the faces blank"
 
@@ -81,11 +81,9 @@ def smallest_mm(region: Region, request: LatticeRequest) -> tuple[float, float]:
     works, fails = (1.0, 1.0 / SIZE_RANGE) if shows(1.0) else (SIZE_RANGE, 1.0)
     if works == SIZE_RANGE and not shows(SIZE_RANGE):
         return math.inf, math.inf
-    for _ in range(SIZE_BISECTIONS):
-        middle = math.sqrt(works * fails)
-        works, fails = (middle, fails) if shows(middle) else (works, middle)
+    scale = _bisect(shows, works, fails, SIZE_BISECTIONS)
     width, height = extent_mm(region)
-    return width * works, height * works
+    return width * scale, height * scale
 
 
 def _pitch(region: Region, request: LatticeRequest) -> float:
@@ -95,9 +93,11 @@ def _pitch(region: Region, request: LatticeRequest) -> float:
         half, pitch = request.half_mm * share, request.pitch_mm * share
         return _shows_place(region, replace(request, half_mm=half, pitch_mm=pitch))
 
-    share = _largest_share(shows, LEAST_PITCH, 1.0)
+    if not shows(LEAST_PITCH):
+        return 0.0
+    share = _bisect(shows, LEAST_PITCH, 1.0, HINT_BISECTIONS)
     for step in (0.1, 0.05, 0.01):  # the roundest number that still works
-        pitch = float(np.floor(share * request.pitch_mm / step + 1e-9)) * step
+        pitch = math.floor(share * request.pitch_mm / step + 1e-9) * step
         if pitch > 0.0 and shows(pitch / request.pitch_mm):
             return round(pitch, 2)
     return 0.0
@@ -110,27 +110,22 @@ def _scale(region: Region, request: LatticeRequest) -> float:
         larger = Region(region.start / inverse, region.end / inverse, region.clearance)
         return _shows_place(larger, request)
 
-    inverse = _largest_share(shows, 1.0 / MOST_SIZE, 1.0)
-    if inverse == 0.0:
-        return float(np.inf)
+    if not shows(1.0 / MOST_SIZE):
+        return math.inf
+    inverse = _bisect(shows, 1.0 / MOST_SIZE, 1.0, HINT_BISECTIONS)
     for step in (0.1, 0.01):
-        scale = float(np.ceil(1.0 / inverse / step - 1e-9)) * step
+        scale = math.ceil(1.0 / inverse / step - 1e-9) * step
         if shows(1.0 / scale):
             return round(scale, 2)
-    return float(np.inf)
+    return math.inf
 
 
-def _largest_share(shows: Callable[[float], bool], low: float, high: float) -> float:
-    """Return a share from low (works) to high (does not) that works, by bisection; 0 if none."""
-    if not shows(low):
-        return 0.0
-    for _ in range(HINT_BISECTIONS):
-        middle = float(np.sqrt(low * high))
-        if shows(middle):
-            low = middle
-        else:
-            high = middle
-    return low
+def _bisect(shows: Callable[[float], bool], works: float, fails: float, steps: int) -> float:
+    """Return the share next to one that fails, of those that are tried in so many steps."""
+    for _ in range(steps):
+        middle = math.sqrt(works * fails)
+        works, fails = (middle, fails) if shows(middle) else (works, middle)
+    return works
 
 
 def _shows_place(region: Region, request: LatticeRequest) -> bool:

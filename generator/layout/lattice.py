@@ -70,74 +70,116 @@ class LatticeRequest:
     half_mm: float  #: half side of a symbol's footprint
     pitch_mm: float
     window: tuple[int, int]  #: rows, columns
-    identifies: Identifies
+    #: rank test for faces into which the window does not fit; None leaves it out
+    identifies: Identifies | None = None
 
-    def choose(self, regions: Sequence[Region], *, search: bool) -> Lattice:
-        """Return the best lattice of faces; see `choose_lattice`."""
-        return choose_lattice(
-            regions, self.half_mm, self.pitch_mm, self.window, self.identifies, search=search
-        )
+    def choose(self, regions: Sequence[Region], *, search: bool = True) -> Lattice:
+        """Return the lattice that shows a place on the most faces, then the most places, mm.
 
+        Ties are broken by more cells, then by the rotation (that of the first edge, then of longer
+        edges), then by the largest margin to the edges; at last the lattice is centred. `search`
+        tries rotations other than along the edges too.
+        """
+        found = self._candidates(regions, search)
+        if not found:
+            none = np.empty((0, 2), dtype=np.int64)
+            return Lattice(0.0, 0.0, 0.0, (none,) * len(regions), (0,) * len(regions), 0, 0.0)
+        best = max((c.worth, c.cells) for c in found)
+        if best[0] == 0 and self.identifies is not None:
+            for candidate in sorted(found, key=lambda c: -c.cells):
+                for cells in candidate.sets:
+                    if any(any(self._places(cells.cells, k)) for k in range(4)):
+                        return self._with_places(self._centre(regions, candidate.rotation, cells))
+        head = next(c for c in found if (c.worth, c.cells) == best)
+        choice = [self._centre(regions, head.rotation, cells) for cells in head.sets]
+        lattice = max(choice, key=lambda lattice: lattice.margin_mm)
+        return self._with_places(lattice)
 
-def choose_lattice(
-    regions: Sequence[Region],
-    half_mm: float,
-    pitch_mm: float,
-    window: tuple[int, int],
-    identifies: Identifies | None = None,
-    *,
-    search: bool = True,
-) -> Lattice:
-    """Return the lattice that shows a place on the most faces, then the most places, mm.
-
-    Ties are broken by more cells, then by the rotation (that of the first edge, then of longer
-    edges), then by the largest margin to the edges; at last the lattice is centred. `identifies` is
-    the rank test for faces into which the window does not fit; None leaves it out. `search` tries
-    rotations other than along the edges too.
-    """
-    found = lattice_candidates(regions, half_mm, pitch_mm, window, search)
-    if not found:
-        none = np.empty((0, 2), dtype=np.int64)
-        return Lattice(0.0, 0.0, 0.0, (none,) * len(regions), (0,) * len(regions), 0, 0.0)
-    best = max((c.worth, c.cells) for c in found)
-    if best[0] == 0 and identifies is not None:
-        for candidate in sorted(found, key=lambda c: -c.cells):
-            for cells in candidate.sets:
-                if any(any(_places(cells.cells, k, window, identifies)) for k in range(4)):
-                    lattice = _centre(regions, half_mm, pitch_mm, candidate.rotation, cells)
-                    return _with_places(lattice, window, identifies)
-    head = next(c for c in found if (c.worth, c.cells) == best)
-    choice = [_centre(regions, half_mm, pitch_mm, head.rotation, cells) for cells in head.sets]
-    lattice = max(choice, key=lambda lattice: lattice.margin_mm)
-    return _with_places(lattice, window, identifies)
-
-
-def lattice_candidates(
-    regions: Sequence[Region],
-    half: float,
-    pitch: float,
-    window: tuple[int, int],
-    search: bool,
-) -> list[LatticeCandidate]:
-    """Return the best shifts (mm) for every rotation worth a look, edge directions first."""
-    area = sum(abs(_area(region)) for region in regions) / pitch**2
-    fine = int(np.clip(np.sqrt(CENTRES / (2.0 * area + 8.0)), 4, 16))
-    found = []
-    best = (0, 0)
-    for rotation in edge_rotations(regions):
-        found += _best_shifts(regions, half, pitch, window, rotation, fine, best)
-        best = max(((c.worth, c.cells) for c in found), default=best)
-    if search:
-        steps = SEARCH_ROTATIONS
-        for rotation in (np.arange(1, steps) / steps * np.pi / 2).tolist():
+    def _candidates(self, regions: Sequence[Region], search: bool) -> list[LatticeCandidate]:
+        """Return the best shifts (mm) for every rotation worth a look, edge directions first."""
+        area = sum(abs(_area(region)) for region in regions) / self.pitch_mm**2
+        fine = int(np.clip(np.sqrt(CENTRES / (2.0 * area + 8.0)), 4, 16))
+        found = []
+        best = (0, 0)
+        for rotation in edge_rotations(regions):
+            found += self._best_shifts(regions, rotation, fine, best)
+            best = max(((c.worth, c.cells) for c in found), default=best)
+        others = np.arange(1, SEARCH_ROTATIONS) / SEARCH_ROTATIONS * np.pi / 2
+        for rotation in others.tolist() if search else ():
             # A coarse look is enough to see whether a rotation may win.
-            coarse = _best_shifts(regions, half, pitch, window, rotation, 4, best)
+            coarse = self._best_shifts(regions, rotation, 4, best)
             if best[0] == 0:
                 found += coarse
             elif coarse:
-                found += _best_shifts(regions, half, pitch, window, rotation, fine, best)
+                found += self._best_shifts(regions, rotation, fine, best)
             best = max(((c.worth, c.cells) for c in found), default=best)
-    return found
+        return found
+
+    def _best_shifts(
+        self, regions: Sequence[Region], rotation: float, steps: int, best: tuple[int, int]
+    ) -> list[LatticeCandidate]:
+        """Return the shifts with the most places, then cells, at one rotation.
+
+        None without cells, nor if it falls short of the best (worth, cells) so far.
+        """
+        half, pitch = self.half_mm, self.pitch_mm
+        turned = [move_region(region, rotation) for region in regions]
+        ys = _shifts(turned, half, pitch, steps)
+        xs = _shifts([mirror_region(region) for region in turned], half, pitch, steps)
+        along = np.zeros((len(ys), len(xs)), dtype=np.int64)
+        across, cells = along.copy(), along.copy()
+        grids: list[tuple[NDArray[np.bool_], tuple[int, int]]] = []
+        for region in turned:
+            j, y = _lines(region.start[:, 1], ys, pitch)
+            i, x = _lines(region.start[:, 0], xs, pitch)
+            free = free_grid(region, half, y.ravel(), x.ravel())
+            free = free.reshape(len(y), len(ys), len(x), len(xs))
+            grids.append((free, (j, i)))
+            cells += free.sum(axis=(0, 2))
+            for total, shape in ((along, self.window), (across, self.window[::-1])):
+                here = windows_in(free, *shape).sum(axis=(0, 2))
+                total += here + FACE_WORTH * (here > 0)
+        if cells.max() == 0:
+            return []
+        worth = np.maximum(along, across)
+        cells[worth < worth.max()] = -1
+        at = np.argwhere(cells == cells.max())
+        reached = int(worth.max()), int(cells.max())
+        if best[0] > 0 and reached < best:
+            return []
+        return [LatticeCandidate(*reached, rotation, _unique_sets(grids, at, ys, xs))]
+
+    def _centre(self, regions: Sequence[Region], rotation: float, shown_set: CellSet) -> Lattice:
+        """Move the lattice to the middle of its play along x and y, keeping its cells."""
+        half, pitch = self.half_mm, self.pitch_mm
+        cells, y, x = shown_set.cells, shown_set.y, shown_set.x
+        turned = [move_region(region, rotation) for region in regions]
+        shown = [(r, mirror_region(r), c) for r, c in zip(turned, cells, strict=True) if len(c)]
+        margin = 0.0
+        for _ in range(3):
+            sides = [slack(r, half, c[:, ::-1] * pitch + np.array([x, y])) for r, _, c in shown]
+            left, right = min(s[0] for s in sides), min(s[1] for s in sides)
+            x += (right - left) / 2
+            sides = [slack(m, half, c * pitch + np.array([y, x])) for _, m, c in shown]
+            down, up = min(s[0] for s in sides), min(s[1] for s in sides)
+            y += (up - down) / 2
+            margin = min(left + right, down + up) / 2
+            if abs(right - left) + abs(up - down) < 1e-9 * pitch:
+                break
+        places = (0,) * len(regions)
+        # Rounded, so that mirror images tie and the first of them is taken.
+        return Lattice(rotation, x, y, cells, places, 0, round(margin / pitch, 6) * pitch)
+
+    def _with_places(self, lattice: Lattice) -> Lattice:
+        """Count the places and choose the quarter turn that shows the most."""
+        turns = [self._places(lattice.cells, quarter) for quarter in range(4)]
+        quarter = max(range(4), key=lambda k: sum(n + FACE_WORTH * (n > 0) for n in turns[k]))
+        return replace(lattice, places=turns[quarter], quarter=quarter)
+
+    def _places(self, cells: Sequence[Cells], quarter: int) -> tuple[int, ...]:
+        return tuple(
+            count_places(*array_cells(own, quarter), self.window, self.identifies) for own in cells
+        )
 
 
 def edge_rotations(regions: Sequence[Region]) -> list[float]:
@@ -158,46 +200,6 @@ def edge_rotations(regions: Sequence[Region]) -> list[float]:
         if len(rotations) == EDGE_ROTATIONS:
             break
     return rotations
-
-
-def _best_shifts(
-    regions: Sequence[Region],
-    half: float,
-    pitch: float,
-    window: tuple[int, int],
-    rotation: float,
-    steps: int,
-    best: tuple[int, int],
-) -> list[LatticeCandidate]:
-    """Return the shifts with the most places, then cells, at one rotation.
-
-    None without cells, nor if it falls short of the best (worth, cells) so far.
-    """
-    turned = [move_region(region, rotation) for region in regions]
-    ys = _shifts(turned, half, pitch, steps)
-    xs = _shifts([mirror_region(region) for region in turned], half, pitch, steps)
-    along = np.zeros((len(ys), len(xs)), dtype=np.int64)
-    across, cells = along.copy(), along.copy()
-    grids: list[tuple[NDArray[np.bool_], tuple[int, int]]] = []
-    for region in turned:
-        j, y = _lines(region.start[:, 1], ys, pitch)
-        i, x = _lines(region.start[:, 0], xs, pitch)
-        free = free_grid(region, half, y.ravel(), x.ravel())
-        free = free.reshape(len(y), len(ys), len(x), len(xs))
-        grids.append((free, (j, i)))
-        cells += free.sum(axis=(0, 2))
-        for total, shape in ((along, window), (across, window[::-1])):
-            here = windows_in(free, *shape).sum(axis=(0, 2))
-            total += here + FACE_WORTH * (here > 0)
-    if cells.max() == 0:
-        return []
-    worth = np.maximum(along, across)
-    cells[worth < worth.max()] = -1
-    at = np.argwhere(cells == cells.max())
-    reached = int(worth.max()), int(cells.max())
-    if best[0] > 0 and reached < best:
-        return []
-    return [LatticeCandidate(*reached, rotation, _unique_sets(grids, at, ys, xs))]
 
 
 def _unique_sets(
@@ -248,57 +250,3 @@ def _lines(values: Points, shifts: Points, pitch: float) -> tuple[int, Points]:
 def _area(region: Region) -> float:
     (ax, ay), (bx, by) = region.start.T, region.end.T
     return 0.5 * float(np.sum(ax * by - ay * bx))
-
-
-def _centre(
-    regions: Sequence[Region],
-    half: float,
-    pitch: float,
-    rotation: float,
-    shown_set: CellSet,
-) -> Lattice:
-    """Move the lattice to the middle of its play along x and y, keeping its cells."""
-    cells, y, x = shown_set.cells, shown_set.y, shown_set.x
-    turned = [move_region(region, rotation) for region in regions]
-    shown = [(r, mirror_region(r), c) for r, c in zip(turned, cells, strict=True) if len(c)]
-    margin = 0.0
-    for _ in range(3):
-        sides = [slack(r, half, _centres(c[:, ::-1], pitch, x, y)) for r, _, c in shown]
-        left, right = min(s[0] for s in sides), min(s[1] for s in sides)
-        x += (right - left) / 2
-        sides = [slack(m, half, _centres(c, pitch, y, x)) for _, m, c in shown]
-        down, up = min(s[0] for s in sides), min(s[1] for s in sides)
-        y += (up - down) / 2
-        margin = min(left + right, down + up) / 2
-        if abs(right - left) + abs(up - down) < 1e-9 * pitch:
-            break
-    places = (0,) * len(regions)
-    # Rounded, so that mirror images tie and the first of them is taken.
-    return Lattice(rotation, x, y, cells, places, 0, round(margin / pitch, 6) * pitch)
-
-
-def _centres(cells: Cells, pitch: float, first: float, second: float) -> Points:
-    return np.asarray(cells * pitch + np.array([first, second]), dtype=np.float64)
-
-
-def _with_places(
-    lattice: Lattice, window: tuple[int, int], identifies: Identifies | None
-) -> Lattice:
-    """Count the places and choose the quarter turn that shows the most."""
-    best: tuple[int, ...] = ()
-    quarter = 0
-    for turn in range(4):
-        places = _places(lattice.cells, turn, window, identifies)
-        if not best or _worth(places) > _worth(best):
-            best, quarter = places, turn
-    return replace(lattice, places=best, quarter=quarter)
-
-
-def _places(
-    cells: Sequence[Cells], quarter: int, window: tuple[int, int], identifies: Identifies | None
-) -> tuple[int, ...]:
-    return tuple(count_places(*array_cells(own, quarter), window, identifies) for own in cells)
-
-
-def _worth(places: Sequence[int]) -> int:
-    return sum(n + FACE_WORTH * (n > 0) for n in places)

@@ -44,8 +44,6 @@ Outlines = Mapping[int, Sequence[NDArray[np.float64]]]  #: face -> loops (k, 2) 
 
 NONE: Outlines = MappingProxyType({})
 
-KINDS = ("auto", "faces", "net")
-
 
 def lay_out(
     polyhedron: Polyhedron,
@@ -88,24 +86,17 @@ def lay_out(
     Raises
     ------
     LayoutError
-        A face shows no place, the array is full, or a length is impossible.
+        A face shows no place, or the array is full.
     """
     outlines = [
         developed.get(face) or face_polygon(polyhedron, face)
         for face in range(len(polyhedron.faces))
     ]
-    _check(polyhedron, outlines, pitch_mm, footprint_half_mm, clearances_mm, kind)
     round_faces = bool(developed or polyhedron.surfaces or polyhedron.blank)
     if round_faces and kind == "net":
         raise LayoutError(
             "an object with round or covered faces has no net",
             fix="set layout to faces, or leave it out",
-        )
-    unknown = sorted(set(blank_faces) - set(range(len(polyhedron.faces))))
-    if unknown:
-        raise LayoutError(
-            f"there is no face {unknown[0]} to leave blank",
-            fix=f"give face numbers from 0 to {len(polyhedron.faces) - 1}",
         )
     regions = tuple(
         region_of(outline, clearances)
@@ -246,39 +237,3 @@ def _full_array_error(plan: LayoutPlan, occupancy: Occupancy) -> LayoutError:
         cause += ", but not in blocks that hold its faces"
     fix = "set profile: auto, which takes an array that is large enough"
     return LayoutError(cause, fix=f"{fix}, or start a new database" if occupancy.used else fix)
-
-
-def _check(
-    polyhedron: Polyhedron,
-    outlines: Sequence[Sequence[NDArray[np.float64]]],
-    pitch_mm: float,
-    half_mm: float,
-    clearances: Clearances,
-    kind: str,
-) -> None:
-    if kind not in KINDS:
-        raise LayoutError(f"unknown layout '{kind}'", fix=f"choose one of {', '.join(KINDS)}")
-    if not (math.isfinite(pitch_mm) and 0.0 < 2 * half_mm <= pitch_mm):
-        raise LayoutError(
-            f"symbols of {2 * half_mm:g} mm do not fit a pitch of {pitch_mm:g} mm",
-            fix=f"set pitch to {2 * half_mm:g} mm or more, or take smaller symbols",
-        )
-    if len(clearances) != len(polyhedron.faces):
-        raise LayoutError(
-            f"clearances are given for {len(clearances)} of {len(polyhedron.faces)} faces",
-            fix="give one array per loop of every face",
-        )
-    for face, outline, given in zip(polyhedron.faces, outlines, clearances, strict=True):
-        if [len(loop) for loop in given] != [len(loop) for loop in outline]:
-            raise LayoutError(
-                "clearances do not match the edges",
-                fix="give one array per loop with one entry per edge",
-                place=face.name,
-            )
-        least = min(float(np.min(loop)) for loop in given)
-        if not (least >= 0.0 and all(np.isfinite(loop).all() for loop in given)):
-            raise LayoutError(
-                f"a clearance of {least:g} mm is not a length",
-                fix="give clearances of 0 mm or more",
-                place=face.name,
-            )

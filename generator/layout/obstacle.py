@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.layout.footprint import Points
-from generator.plane.polygon import face_vector
+from generator.polyhedron.frame import face_vectors
 from generator.polyhedron.winged import Polyhedron
 
 Box = tuple[Points, Points]  #: lowest and highest x and y, mm
@@ -112,10 +112,9 @@ class SolidEdges:
 
 def solid_edges(polyhedron: Polyhedron) -> SolidEdges:
     """Return the edges of a solid, face by face."""
-    loops = [[polyhedron.vertices[list(loop)] for loop in face.loops] for face in polyhedron.faces]
-    rings = [ring for face in loops for ring in face]
-    vectors = np.array([face_vector(face) for face in loops])
-    sizes = [sum(map(len, face)) for face in loops]
+    rings = [polyhedron.vertices[list(loop)] for face in polyhedron.faces for loop in face.loops]
+    vectors = face_vectors(polyhedron)
+    sizes = [sum(map(len, face.loops)) for face in polyhedron.faces]
     return SolidEdges(
         np.concatenate(rings),
         np.concatenate([np.roll(ring, -1, axis=0) for ring in rings]),

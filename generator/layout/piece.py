@@ -111,36 +111,43 @@ def _piece(
     task: LayoutTask, faces: tuple[int, ...], poses: tuple[PiecePose, ...], *, search: bool
 ) -> Piece:
     """Choose the lattice of some faces and drop the cells of those that it does not identify."""
-    request = task.request
     if not faces:
         return Piece((), (), np.empty((0, 0), dtype=np.int64), (), (0,))
     regions = [
         move_region(task.regions[face], pose.rotation_rad, pose.x_mm, pose.y_mm)
         for face, pose in zip(faces, poses, strict=True)
     ]
-    lattice = request.choose(regions, search=search)
-    cells = tuple(
-        own if places else own[:0]
-        for own, places in zip(lattice.cells, lattice.places, strict=True)
-    )
-    lattice = replace(lattice, cells=cells)
-    return piece_of(faces, poses, lattice, request)
+    lattice = task.request.choose(regions, search=search)
+    shown = zip(lattice.cells, lattice.places, strict=True)
+    lattice = replace(lattice, cells=tuple(own if places else own[:0] for own, places in shown))
+    return piece_of(faces, poses, lattice, task.request)
 
 
 def piece_of(
-    faces: Sequence[int],
-    poses: Sequence[PiecePose],
-    lattice: Lattice,
-    request: LatticeRequest,
+    faces: tuple[int, ...], poses: Sequence[PiecePose], lattice: Lattice, request: LatticeRequest
 ) -> Piece:
     """Return the piece that a lattice shows of faces, whose poses T_net_face lie in its plane."""
-    owner, low, high = _grid(lattice)
-    lattice_poses = [
-        _turn_pose(pose, lattice.rotation_rad, *_corner(lattice, low, high, request.pitch_mm))
+    pitch, cells = request.pitch_mm, np.concatenate(lattice.cells)
+    low, high = np.zeros(2, np.int64), np.full(2, -1)
+    if len(cells):
+        low, high = cells.min(axis=0), cells.max(axis=0)
+    owner = np.full(high - low + 1, -1, dtype=np.int64)
+    for k, own in enumerate(lattice.cells):
+        owner[high[0] - own[:, 0], own[:, 1] - low[1]] = k
+    # The grid's upper left corner comes to the origin.
+    x = -(lattice.x_mm + (int(low[1]) - 0.5) * pitch)
+    y = -(lattice.y_mm + (int(high[0]) + 0.5) * pitch)
+    c, s = float(np.cos(lattice.rotation_rad)), float(np.sin(lattice.rotation_rad))
+    turned = tuple(
+        PiecePose(
+            pose.rotation_rad + lattice.rotation_rad,
+            c * pose.x_mm - s * pose.y_mm + x,
+            s * pose.x_mm + c * pose.y_mm + y,
+        )
         for pose in poses
-    ]
-    piece = Piece(tuple(faces), tuple(lattice_poses), owner, lattice.places, (0,))
-    piece = turn_piece(piece, lattice.quarter, request.pitch_mm)
+    )
+    piece = Piece(faces, turned, owner, lattice.places, (0,))
+    piece = turn_piece(piece, lattice.quarter, pitch)
     return replace(piece, turns=_turns(piece, request))
 
 
@@ -160,51 +167,15 @@ def turn_piece(piece: Piece, quarter: int, pitch_mm: float) -> Piece:
     return replace(piece, poses=poses, owner=owner)
 
 
-def _grid(lattice: Lattice) -> tuple[NDArray[np.int64], tuple[int, int], tuple[int, int]]:
-    """Return the owner of every cell in the bounding box, and its least and greatest (j, i)."""
-    cells = np.concatenate(lattice.cells)
-    if len(cells) == 0:
-        return np.empty((0, 0), dtype=np.int64), (0, 0), (0, 0)
-    low, high = cells.min(axis=0), cells.max(axis=0)
-    owner = np.full(high - low + 1, -1, dtype=np.int64)
-    for k, own in enumerate(lattice.cells):
-        owner[high[0] - own[:, 0], own[:, 1] - low[1]] = k
-    return owner, (int(low[0]), int(low[1])), (int(high[0]), int(high[1]))
-
-
-def _corner(
-    lattice: Lattice, low: tuple[int, int], high: tuple[int, int], pitch: float
-) -> tuple[float, float]:
-    """Return the shift that brings the grid's upper left corner to the origin, mm."""
-    return (
-        -(lattice.x_mm + (low[1] - 0.5) * pitch),
-        -(lattice.y_mm + (high[0] + 0.5) * pitch),
-    )
-
-
-def _turn_pose(pose: PiecePose, rotation: float, x: float, y: float) -> PiecePose:
-    """Return the pose followed by a rotation about the origin and a shift."""
-    c, s = float(np.cos(rotation)), float(np.sin(rotation))
-    return PiecePose(
-        pose.rotation_rad + rotation,
-        c * pose.x_mm - s * pose.y_mm + x,
-        s * pose.x_mm + c * pose.y_mm + y,
-    )
-
-
 def _turns(piece: Piece, request: LatticeRequest) -> tuple[int, ...]:
     """Return the quarter turns under which no face loses a place."""
     allowed = [0]
     for quarter in (1, 2, 3):
         owner = np.rot90(piece.owner, quarter)
-        if all(
-            count_places(*_cells(owner == k), request.window, request.identifies) >= places
-            for k, places in enumerate(piece.places)
-        ):
+        cells = (np.argwhere(owner == k).astype(np.int64) for k in range(len(piece.places)))
+        counts = [
+            count_places(own[:, 0], own[:, 1], request.window, request.identifies) for own in cells
+        ]
+        if all(count >= least for count, least in zip(counts, piece.places, strict=True)):
             allowed.append(quarter)
     return tuple(allowed)
-
-
-def _cells(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    rows, columns = np.nonzero(mask)
-    return rows.astype(np.int64), columns.astype(np.int64)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from manifold3d import triangulate
@@ -31,6 +32,8 @@ TOLERANCE = 1e-7  #: faces that overlap by less than this share of the net's siz
 FACES_LAID = 6000  #: over all trees at most: bounds the time for objects of many faces
 BREADTH_ROOTS = 12  #: faces from which a tree by breadth is begun
 RANDOM_TREES = 24  #: in random order of edges, after those by breadth and by direction
+#: In general position: no edge of a usual solid is level for them.
+_DIRECTIONS = np.array([*product((1, -1), repeat=3)]) * (0.53, 0.31, 0.79)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,18 +67,12 @@ Priority = Callable[[int, int], float]  # (edge, faces between this one and the 
 def unfold(polyhedron: Polyhedron) -> Net:
     """Return the net with the fewest pieces among the trees that are tried."""
     surface = _surface(polyhedron)
-    best: Net | None = None
-    work = 0
+    nets: list[Net] = []
     for root, priority in _trees(polyhedron, surface):
-        net = _lay_flat(surface, root, priority)
-        if best is None or len(net.pieces) < len(best.pieces):
-            best = net
-        work += len(polyhedron.faces)
-        if len(best.pieces) == 1 or work >= FACES_LAID:
+        nets.append(_lay_flat(surface, root, priority))
+        if len(nets[-1].pieces) == 1 or len(nets) * len(polyhedron.faces) >= FACES_LAID:
             break
-    if best is None:
-        raise ValueError("a polyhedron without faces has no net")
-    return best
+    return min(nets, key=lambda net: len(net.pieces))
 
 
 def split(net: Net, piece: int) -> Net:
@@ -117,7 +114,7 @@ def _trees(polyhedron: Polyhedron, surface: _Surface) -> Iterator[tuple[int, Pri
     roots = sorted(range(len(areas)), key=lambda face: (-round(areas[face], 6), face))
     for root in roots[:BREADTH_ROOTS]:
         yield root, lambda _edge, depth: float(depth)
-    for direction in _directions():
+    for direction in _DIRECTIONS:
         yield roots[0], _uncut_first(_steepest_edges(polyhedron, direction))
     random = np.random.default_rng(0)
     for _ in range(RANDOM_TREES):
@@ -132,12 +129,6 @@ def _uncut_first(cuts: NDArray[np.bool_]) -> Priority:
 def _edge_order(order: NDArray[np.int64]) -> Priority:
     """Fold along edges in a given order."""
     return lambda edge, _depth: float(order[edge])
-
-
-def _directions() -> Points:
-    """Return eight directions in general position: no edge of a usual solid is level for them."""
-    corners = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)])
-    return corners * (0.53, 0.31, 0.79)
 
 
 def _steepest_edges(polyhedron: Polyhedron, direction: Points) -> NDArray[np.bool_]:

@@ -92,14 +92,10 @@ def stage(
     )
     fit = None
     if verify and "stl" in staged and len(parts) > 1:
-        from generator.export.check import PanelFile, verify_fit  # loads the readers of models
+        from generator.export.check import verify_fit  # loads the readers of models
 
         progress("putting the panels together", 0.8)
-        panel_files = [
-            PanelFile(part.name, file.staged, part.T_object_part)
-            for part, file in zip(parts, staged["stl"], strict=True)
-        ]
-        fit = verify_fit(panel_files, spec.gap_mm)
+        fit = verify_fit(parts, [file.staged for file in staged["stl"]], spec.gap_mm)
     on_sheet: list[SheetPlate] = []
     plates = exported.plates if {"3mf", "bambu"} & staged.keys() else ()
     if plates:

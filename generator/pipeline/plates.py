@@ -11,17 +11,16 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from generator.export.atomic import Staging
 from generator.export.bambu import PLATES_MAX, project_3mf, project_names
 from generator.export.bed import Plate, arrange_plates
 from generator.export.drawing import draw_boxes
-from generator.export.set_files import PackedPart, can_draw, overview_pdf, packing_csv
+from generator.export.set_files import SetPart, SetPlate, can_draw, overview_pdf, packing_csv
 from generator.export.sheet import Figure, Mark, Section, sheet_html
 from generator.export.threemf import PrintFile, SlicerSettings, print_file
 from generator.layout.placement import Layout, object_code
@@ -39,27 +38,6 @@ if TYPE_CHECKING:
     from generator.printed.slicer import PlateCost
 
 SetObject = tuple[MakeJob, Layout]  #: one object of a set, as it was made
-
-
-@dataclass(frozen=True, slots=True)
-class SetPart:
-    """One part and the room it takes."""
-
-    number: int  #: of the object
-    name: str
-    size_mm: tuple[float, float, float]
-    symbols: int
-    volume_mm3: float
-
-
-@dataclass(frozen=True, slots=True)
-class SetPlate:
-    """One plate, and the parts that its places count."""
-
-    printer: Printer
-    settings: SlicerSettings | None
-    plate: Plate
-    parts: tuple[SetPart, ...]
 
 
 def write_set(
@@ -84,61 +62,48 @@ def write_set(
         progress(f"measuring {job.plan.spec.name}", 0.3 * number / len(objects))
         measured += _measure(number, job.plan, layout)
     plates = _plates(objects, measured)
-    packed = [_packing_rows(objects, plate, number) for number, plate in enumerate(plates, 1)]
-    rows = sorted((row for some in packed for row in some), key=lambda row: row.order)
-    listed = packing_csv(rows)
+    listed = packing_csv(plates)
     with_models = any("3mf" in job.formats for job, _ in objects)
     of_bambu = {job.plan.printer for job, _ in objects if "bambu" in job.formats}
-    models = [
-        f"{name}-plate-{number}{kind}.3mf"
-        for number in range(1, len(plates) + 1)
-        for kind in ("", "-prusaslicer")
-        if with_models
-    ]
+    models = [f"{name}-plate-{number}" for number in range(1, len(plates) + 1)]
+    written = [f"{m}{kind}.3mf" for m in models for kind in ("", "-prusaslicer") if with_models]
     projects = _projects(name, plates, of_bambu)
-    models += [project.file for project in projects]
-    packed_in = {number for project in projects for number in project.plates}
-    to_print = tuple(folder / project.file for project in projects) + tuple(
-        folder / f"{name}-plate-{number + 1}.3mf"
-        for number in range(len(plates))
-        if with_models and number not in packed_in
-    )
+    written += projects
+    packed_in = {number for numbers in projects.values() for number in numbers}
+    alone = [f"{m}.3mf" for k, m in enumerate(models) if with_models and k not in packed_in]
+    to_print = tuple(folder / each for each in (*projects, *alone))
     overview = [f"{name}-overview.pdf"] if can_draw() else []
-    names = [f"{name}-packing.csv", f"{name}-build.html", *overview, *models]
+    names = [f"{name}-packing.csv", f"{name}-build.html", *overview, *written]
     if not slice_plates and _same_files(folder, names, listed):
         return tuple(folder / each for each in names), to_print
     costs: list[PlateCost | None] = [None] * len(plates)
     with Staging(folder) as staging:
-        if models:
-            contents = workers.done(
-                [
-                    Task(f"plate {number}", _plate_files, _plate_task(objects, name, plate))
-                    for number, plate in enumerate(plates, 1)
-                ],
-                part_of_progress(progress, 0.3, 0.9),
-            )
-            for project in projects:
-                held = [contents[number] for number in project.plates]
-                staging.write(project.file, project_3mf(name, held))
-            for number, content in enumerate(contents if with_models else (), 1):
-                staging.write(f"{name}-plate-{number}.3mf", content.content)
-                file = f"{name}-plate-{number}-prusaslicer.3mf"
-                twin = staging.write(file, content.prusaslicer)
-                if slice_plates:
-                    progress(f"slicing plate {number}", 0.9)
-                    from generator.printed.slicer import slice_plate
+        contents = workers.done(
+            [
+                Task(f"plate {number}", _plate_files, _plate_task(objects, name, plate))
+                for number, plate in enumerate(plates if written else (), 1)
+            ],
+            part_of_progress(progress, 0.3, 0.9),
+        )
+        for project, numbers in projects.items():
+            staging.write(project, project_3mf(name, [contents[k] for k in numbers]))
+        for k, content in enumerate(contents if with_models else ()):
+            staging.write(f"{models[k]}.3mf", content.content)
+            twin = staging.write(f"{models[k]}-prusaslicer.3mf", content.prusaslicer)
+            if slice_plates:
+                progress(f"slicing plate {k + 1}", 0.9)
+                from generator.printed.slicer import slice_plate
 
-                    costs[number - 1] = slice_plate(twin.staged)
-        files = [f"{name}-plate-{number}.3mf" for number in range(1, len(plates) + 1)]
-        for project in projects:
-            for k, number in enumerate(project.plates, 1):
-                files[number] = f"{project.file}, plate {k}"
+                costs[k] = slice_plate(twin.staged)
+        files = [f"{model}.3mf" for model in models]
+        for project, numbers in projects.items():
+            for k, number in enumerate(numbers, 1):
+                files[number] = f"{project}, plate {k}"
         page = _set_sheet(name, objects, folder, plates, costs, files)
         staging.write(f"{name}-build.html", page.encode())
         if overview:
             progress("drawing the overview", 0.9)
-            beds = [plate.printer.bed_mm for plate in plates]
-            staging.write(overview[0], overview_pdf(name, packed, beds))
+            staging.write(overview[0], overview_pdf(name, plates))
         staging.write(f"{name}-packing.csv", listed)  # last: it says that the others are there
         if not replace:
             staging.refuse_others()
@@ -162,7 +127,8 @@ def _measure(number: int, plan: ObjectPlan, layout: Layout) -> list[SetPart]:
     for part in parts_of(plan, layout)[0]:
         low, high = box(part)
         x, y, z = (high - low).tolist()
-        found.append(SetPart(number, part.name, (x, y, z), part.symbols, volume(part)))
+        own = plan.spec.name, part.name, (x, y, z), part.symbols, volume(part)
+        found.append(SetPart(number, *own))
     return found
 
 
@@ -179,17 +145,10 @@ def _plates(objects: Sequence[SetObject], parts: Sequence[SetPart]) -> list[SetP
     return plates
 
 
-class _Project(NamedTuple):
-    """A project for Bambu Studio, and the numbers of its plates, from 0."""
-
-    file: str
-    plates: Sequence[int]
-
-
 def _projects(
     name: str, plates: Sequence[SetPlate], printers: Collection[Printer]
-) -> list[_Project]:
-    """Return the projects of the plates of some printers, as many for each as they need."""
+) -> dict[str, list[int]]:
+    """Return the projects for Bambu Studio of some printers' plates, with the plates' numbers."""
     by_printer: dict[Printer, list[int]] = {}
     for number, plate in enumerate(plates):
         by_printer.setdefault(plate.printer, []).append(number)
@@ -199,39 +158,18 @@ def _projects(
         if printer in printers
         for k in range(0, len(own), PLATES_MAX)
     ]
-    return [_Project(*one) for one in zip(project_names(name, len(batches)), batches, strict=True)]
-
-
-def _packing_rows(objects: Sequence[SetObject], plate: SetPlate, number: int) -> list[PackedPart]:
-    rows = []
-    for place in plate.plate.places:
-        part = plate.parts[place.part]
-        rows.append(
-            PackedPart(
-                order=(part.number, place.part),
-                object=objects[part.number][0].plan.spec.name,
-                part=part.name,
-                plate=number,
-                printer=plate.printer.name,
-                place=place,
-                size_mm=part.size_mm,
-                symbols=part.symbols,
-                fits=plate.plate.fits,
-            )
-        )
-    return rows
+    return dict(zip(project_names(name, len(batches)), batches, strict=True))
 
 
 def _plate_task(
     objects: Sequence[SetObject], title: str, plate: SetPlate
 ) -> tuple[str, list[tuple[ObjectPlan, Layout, list[str]]], Plate, SlicerSettings | None]:
     """Return the arguments of `_plate_files`: objects on a plate, and the plate of them alone."""
-    places = plate.plate.places
-    held = [plate.parts[place.part] for place in places]  # those of an object together
     wanted = [
-        (objects[number][0].plan, objects[number][1], [part.name for part in own])
-        for number, own in groupby(held, key=lambda part: part.number)
+        (objects[number][0].plan, objects[number][1], [part.name for part, _ in own])
+        for number, own in groupby(plate.held, key=lambda held: held[0].number)
     ]
+    places = plate.plate.places
     alone = tuple(dataclasses.replace(place, part=k) for k, place in enumerate(places))
     return title, wanted, Plate(alone, plate.plate.overhang_mm), plate.settings
 
@@ -270,7 +208,7 @@ def _set_sheet(
     printers = list(dict.fromkeys(plate.printer for plate in plates))
     drawings, lying = [], [list[str]() for _ in objects]
     for number, (plate, cost, file) in enumerate(zip(plates, costs, files, strict=True), 1):
-        held = sorted({plate.parts[place.part].number for place in plate.plate.places})
+        held = sorted({part.number for part, _ in plate.held})
         for one in held:
             lying[one].append(str(number))
         what = ", ".join(objects[one][0].plan.spec.name for one in held)
@@ -311,12 +249,11 @@ def _facts(
     costs: Sequence[PlateCost | None],
     printers: Sequence[Printer],
 ) -> Rows:
-    parts = [plate.parts[place.part] for plate in plates for place in plate.plate.places]
-    rows = [("objects", str(len(objects))), ("parts", str(len(parts)))]
-    rows.append(("plates", str(len(plates))))
+    counts = len(objects), sum(len(plate.held) for plate in plates), len(plates)
+    rows = list(zip(("objects", "parts", "plates"), map(str, counts), strict=True))
     for printer in printers:
-        rows += [("printer", f"{printer.name}: {printer.description}")]
-        rows += [("layers", layers_text(printer))]
+        rows.append(("printer", f"{printer.name}: {printer.description}"))
+        rows.append(("layers", layers_text(printer)))
     by_way: dict[str, list[str]] = {}
     for job, layout in objects:
         by_way.setdefault(overhangs(job.plan, layout).text, []).append(job.plan.spec.name)
@@ -324,12 +261,8 @@ def _facts(
         rows.append(("on the bed", way if len(by_way) == 1 else f"{', '.join(names)}: {way}"))
     rows.append(("scale", "100 %"))
     for resin in sorted({not printer.nozzle_mm for printer in printers}):
-        volume_mm3 = sum(
-            plate.parts[place.part].volume_mm3
-            for plate in plates
-            for place in plate.plate.places
-            if (not plate.printer.nozzle_mm) == resin
-        )
+        alike = [plate for plate in plates if (not plate.printer.nozzle_mm) == resin]
+        volume_mm3 = sum(part.volume_mm3 for plate in alike for part, _ in plate.held)
         rows.append(("material", material_text(volume_mm3, resin=resin)))
     if plates and (printing := cost_text(costs)):
         rows.append(("printing", printing))

@@ -10,7 +10,6 @@ from generator.polyhedron.frame import (
     face_frame,
     face_normal,
     face_polygon,
-    side_of_face,
     surface_areas,
     volume,
 )
@@ -30,7 +29,6 @@ __all__ = [
     "face_normal",
     "face_polygon",
     "polyhedron",
-    "side_of_face",
     "surface_areas",
     "volume",
 ]

@@ -9,14 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from generator.plane.polygon import (
-    area_vector,
-    side_of_polygon,
-    signed_area,
-    signed_volume,
-)
+from generator.plane.polygon import area_vector, face_vector, signed_area, signed_volume
 from generator.polyhedron.check import face_axes, flat_loops
 from generator.polyhedron.winged import Polyhedron
 
@@ -59,12 +54,11 @@ def face_normal(polyhedron: Polyhedron, face: int) -> Matrix:
     return normal / math.sqrt(float(normal @ normal))
 
 
-def side_of_face(polyhedron: Polyhedron, face: int, points: ArrayLike) -> NDArray[np.int8]:
-    """Return for points (n, 2), face frame: +1 inside, 0 on an edge, -1 outside; (n,) int8.
-
-    Exact: right for non-convex faces, holes and slivers, where thesis 6.3's sum of areas is wrong.
-    """
-    return side_of_polygon(face_polygon(polyhedron, face), points)
+def face_vectors(polyhedron: Polyhedron) -> Matrix:
+    """Return the outward normal of each face times its area, (F, 3) mm^2, as `face_vector` sums."""
+    vertices = polyhedron.vertices
+    loops = ([vertices[list(loop)] for loop in face.loops] for face in polyhedron.faces)
+    return np.array([face_vector(face) for face in loops])
 
 
 def edge_length(polyhedron: Polyhedron, edge: int) -> float:

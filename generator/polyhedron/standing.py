@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.plane.polygon import face_vector, plane_axes
-from generator.polyhedron.frame import dihedral, face_normal, face_polygon
+from generator.plane.polygon import plane_axes
+from generator.polyhedron.frame import dihedral, face_normal, face_polygon, face_vectors
 from generator.polyhedron.winged import Polyhedron
 
 Floats = NDArray[np.float64]
@@ -52,14 +52,14 @@ def stance_on(polyhedron: Polyhedron, face: int, steepest_sine: float) -> Stance
 
     `steepest_sine`: of the steepest overhang, from the vertical, that prints without supports.
     """
-    return _stance(polyhedron, face, steepest_sine, _vectors(polyhedron))
+    return _stance(polyhedron, face, steepest_sine, face_vectors(polyhedron))
 
 
 def best_stance(
     polyhedron: Polyhedron, flat: Collection[int], steepest_sine: float
 ) -> Stance | None:
     """Return how the solid stands best on one of its `flat` faces; None where it stands on none."""
-    vectors = _vectors(polyhedron)
+    vectors = face_vectors(polyhedron)
     areas = np.linalg.norm(vectors, axis=1)
     order = sorted(flat, key=lambda face: (-areas[face], face))
     lowest = polyhedron.vertices[:, 2].min() + LEVEL * np.ptp(polyhedron.vertices, axis=0).max()
@@ -104,16 +104,6 @@ def bridges(polyhedron: Polyhedron, down: Floats) -> frozenset[int]:
         face
         for face, own in edges.items()
         if all(dihedral(polyhedron, edge) > np.pi + 1e-6 for edge in own)
-    )
-
-
-def _vectors(polyhedron: Polyhedron) -> Floats:
-    """Return the outward normal of each face times its area, (F, 3)."""
-    return np.array(
-        [
-            face_vector([polyhedron.vertices[list(loop)] for loop in face.loops])
-            for face in polyhedron.faces
-        ]
     )
 
 

@@ -125,7 +125,8 @@ def _faces(part: Part) -> list[int]:
 def check_png(title: str, tiles: Sequence[SymbolTile], names: Sequence[str] = ()) -> bytes:
     """Return the picture: its first line, all symbols, and their names in the alphabet by label."""
     labels = sorted({tile.check.label for tile in tiles})
-    pairs = [_median_and_worst([t for t in tiles if t.check.label == label]) for label in labels]
+    worst_first = sorted(tiles, key=lambda tile: tile.check.overlap)
+    alike = [[tile for tile in worst_first if tile.check.label == label] for label in labels]
     width = _MARGIN * 2 + _NAME + 6 * TILE + 6 * _GAP + 2 * _MARGIN
     height = _HEAD + len(labels) * (TILE + _GAP) + _FOOT
     image = Image.new("RGB", (width, height), _PAPER)
@@ -137,12 +138,12 @@ def check_png(title: str, tiles: Sequence[SymbolTile], names: Sequence[str] = ()
         words = (f"{what}: designed", "deposited", "difference")
         for k, word in enumerate(words):
             draw.text((x + k * (TILE + _GAP), _HEAD - 24), word, _INK, small)
-    for row, (label, pair) in enumerate(zip(labels, pairs, strict=True)):
+    for row, (label, own) in enumerate(zip(labels, alike, strict=True)):
         y = _HEAD + row * (TILE + _GAP)
-        check = pair[1].check
+        pair = own[len(own) // 2], own[0]
+        check = own[0].check
         name = names[label] if label < len(names) else str(label)
-        count = sum(tile.check.label == label for tile in tiles)
-        lines = (f"symbol {name}, {count} of them", f"overlap {pair[0].check.overlap:.3f}",
+        lines = (f"symbol {name}, {len(own)} of them", f"overlap {pair[0].check.overlap:.3f}",
                  f"worst {check.overlap:.3f}: {check.verdict}", f"{check.face} {check.name}",
                  f"height {check.height_mm:.2f} of {check.designed_mm:.2f} mm")  # fmt: skip
         for k, line in enumerate(lines):
@@ -159,11 +160,6 @@ def check_png(title: str, tiles: Sequence[SymbolTile], names: Sequence[str] = ()
     stored = io.BytesIO()
     image.save(stored, "PNG", optimize=True)
     return stored.getvalue()
-
-
-def _median_and_worst(tiles: list[SymbolTile]) -> tuple[SymbolTile, SymbolTile]:
-    order = sorted(tiles, key=lambda tile: tile.check.overlap)
-    return order[len(order) // 2], order[0]
 
 
 def _three_views(tile: SymbolTile) -> tuple[Pixels, Pixels, Pixels]:

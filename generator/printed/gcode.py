@@ -33,21 +33,9 @@ Index = NDArray[np.int64]
 
 #: What a move is for; slicers' own words become these. The last four leave nothing on the part.
 ROLES = (
-    "unknown",
-    "outer wall",
-    "inner wall",
-    "overhang",
-    "top",
-    "solid",
-    "infill",
-    "bridge",
-    "gap fill",
-    "ironing",
-    "travel",
-    "skirt",
-    "support",
-    "custom",
-)
+    "unknown", "outer wall", "inner wall", "overhang", "top", "solid", "infill", "bridge",
+    "gap fill", "ironing", "travel", "skirt", "support", "custom",
+)  # fmt: skip
 _OF_PART = ROLES.index("travel")
 
 
@@ -99,8 +87,6 @@ class Toolpath:
 
 
 LEVEL_MM = 1e-3  #: heights that differ by less are one layer
-
-
 CHORD_MM = 0.005
 _MOST = 100_000  # chords of one arc: a sound file has some hundreds
 _ROUND = 0.05  # mm by which the two radii of an arc may differ: files round to 0.001
@@ -166,47 +152,26 @@ HEIGHT_NOTES = ("HEIGHT", "LAYER_HEIGHT")
 #: Comments by which Cura says that E is a volume.
 VOLUMETRIC = (";FLAVOR:Marlin(Volumetric)", ";FLAVOR:UltiGCode")
 
-_DIALECTS = (
-    ("prusaslicer", "prusaslicer"),
-    ("superslicer", "prusaslicer"),
-    ("slic3r", "prusaslicer"),
-    ("bambustudio", "bambu"),
-    ("orcaslicer", "orca"),
-    ("cura_steamengine", "cura"),
-    ("flavor:", "cura"),
-)
-
-# The first entry whose words all stand in a feature's name names its role.
-_FEATURES = (
-    ("skirt", ("skirt",)),
-    ("skirt", ("brim",)),
-    ("support", ("support",)),
-    ("support", ("tower",)),
-    ("support", ("wipe",)),
-    ("support", ("prime",)),
-    ("custom", ("custom",)),
-    ("ironing", ("ironing",)),
-    ("overhang", ("overhang",)),
-    ("bridge", ("bridge",)),
-    ("gap fill", ("gap",)),
-    ("gap fill", ("thin wall",)),
-    ("outer wall", ("external perimeter",)),
-    ("outer wall", ("outer",)),
-    ("inner wall", ("perimeter",)),
-    ("inner wall", ("inner",)),
-    ("top", ("top",)),
-    ("solid", ("solid",)),
-    ("solid", ("bottom",)),
-    ("solid", ("skin",)),
-    ("infill", ("fill",)),
-    ("infill", ("sparse",)),
-)
+#: Marks in comments by which a slicer is known.
+_DIALECTS = {
+    "prusaslicer": "prusaslicer", "superslicer": "prusaslicer", "slic3r": "prusaslicer",
+    "bambustudio": "bambu", "orcaslicer": "orca", "cura_steamengine": "cura", "flavor:": "cura",
+}  # fmt: skip
+#: The first of these words that stands in a feature's name names its role.
+_FEATURES = {
+    "skirt": "skirt", "brim": "skirt", "support": "support", "tower": "support", "wipe": "support",
+    "prime": "support", "custom": "custom", "ironing": "ironing", "overhang": "overhang",
+    "bridge": "bridge", "gap": "gap fill", "thin wall": "gap fill",
+    "external perimeter": "outer wall", "outer": "outer wall", "perimeter": "inner wall",
+    "inner": "inner wall", "top": "top", "solid": "solid", "bottom": "solid", "skin": "solid",
+    "fill": "infill", "sparse": "infill",
+}  # fmt: skip
 
 
 def dialect_of(comment: str) -> str:
     """Return the dialect that a comment names, or nothing."""
     text = comment.lower()
-    return next((dialect for mark, dialect in _DIALECTS if mark in text), "")
+    return next((dialect for mark, dialect in _DIALECTS.items() if mark in text), "")
 
 
 def role_of(feature: str) -> int:
@@ -216,10 +181,7 @@ def role_of(feature: str) -> int:
     ('outer wall', 'outer wall')
     """
     text = feature.strip().lower()
-    for role, words in _FEATURES:
-        if all(word in text for word in words):
-            return ROLES.index(role)
-    return 0
+    return ROLES.index(next((role for word, role in _FEATURES.items() if word in text), "unknown"))
 
 
 _INCH_MM = 25.4
@@ -310,10 +272,8 @@ class Machine:
         return values
 
     def _set(self, command: str, words: list[str]) -> None:
-        if command == "G20":
-            self.unit = _INCH_MM
-        elif command == "G21":
-            self.unit = 1.0
+        if command in ("G20", "G21"):
+            self.unit = _INCH_MM if command == "G20" else 1.0
         elif command in ("G90", "G91"):
             self.relative = command == "G91"
         elif command in ("M82", "M83"):

@@ -14,7 +14,6 @@ import hashlib
 import os
 import re
 import shutil
-import struct
 import subprocess
 import tempfile
 from collections.abc import Sequence
@@ -29,7 +28,8 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.files import staged_file
 from encoded_objects.base.foreign import foreign_bytes
-from generator.errors import PrintError
+from generator.errors import PrintError, ShapeError
+from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
 from generator.printed.gcode import Toolpath, read_gcode
 from generator.printers import Printer
 
@@ -183,7 +183,6 @@ _AGREE_MM = 0.25  # by which plastic may reach beyond the part's box: half a bea
 _POINTED_WIDTHS = 3.0  # by which it may fall short: beads are round in corners of 20 degrees
 #: Of the slicer: a variable more or less moves its memory.
 _ENVIRONMENT = {"PATH": "/usr/local/bin:/usr/bin:/bin", "HOME": ".", "LC_ALL": "C"}
-_KINDS = (".stl", ".3mf", ".obj", ".amf")
 
 # The machine's own business: nothing of it is on the part.
 _WITHOUT = {
@@ -224,7 +223,8 @@ def slice_part(
     folder that keeps G-code by the part's bytes and all settings. Raises `PrintError` if
     PrusaSlicer is missing or refuses, or the plastic is not where the part is.
     """
-    low, high = stl_box(file)
+    corners = stl_corners(file)
+    low, high = corners.min(axis=0), corners.max(axis=0)
     size = high - low
     settings = settings_of(profile) | _WITHOUT | {"support_material": str(int(supports))}
     bed = np.ceil(np.maximum(size[:2] + 2 * _BED_MARGIN_MM, 100.0))
@@ -251,22 +251,21 @@ def slice_part(
     return sliced
 
 
-def stl_box(file: Path) -> tuple[Floats, Floats]:
-    """Return the lowest and highest x, y, z of a binary STL, mm; raises `PrintError`."""
+def stl_corners(file: Path) -> Floats:
+    """Return the corners (n, 3) of a part's STL, mm; raises `PrintError`."""
+    place = str(file)
     try:
         content = file.read_bytes()
+        corners = stl_triangles(content, place, most=MOST_PART_TRIANGLES, padded=False)
     except OSError as error:
-        raise PrintError(
-            f"cannot read the part: {error.strerror}", fix="check the name", place=str(file)
-        ) from None
-    count = struct.unpack_from("<I", content, 80)[0] if len(content) >= 84 else 0
-    if not count or len(content) != 84 + 50 * count:
-        raise PrintError(
-            "not a binary STL", fix="give a part's STL as encode-object writes it", place=str(file)
-        )
-    facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    corners = np.frombuffer(content, facet, offset=84)["corners"].reshape(-1, 3).astype(np.float64)
-    return corners.min(axis=0), corners.max(axis=0)
+        cause = f"cannot read the part: {error.strerror}"
+        raise PrintError(cause, fix="check the name", place=place) from None
+    except ShapeError:
+        corners = np.empty(0)
+    if not len(corners):
+        fix = "give a part's STL as encode-object writes it"
+        raise PrintError("not a binary STL", fix=fix, place=place)
+    return corners.reshape(-1, 3)
 
 
 def find_slicer() -> str:

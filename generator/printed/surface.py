@@ -47,20 +47,23 @@ class PrintedSurface:
 
     def heights_mm(self, points_mm: Floats) -> Floats:
         """Return the heights at points (n, 2) of the surface frame; -inf off the grid."""
-        T = self.T_surface_grid
-        at = ((points_mm - T[:2, 3]) @ T[:2, :2] - np.array(self.origin_mm)) / self.step_mm
-        return interpolate(at, self.heights.shape, lambda i, j: self.heights[i, j])
+        shape = self.heights.shape
+        return interpolate(self, points_mm, shape, lambda i, j: self.heights[i, j])
 
 
 def interpolate(
-    at: Floats, shape: tuple[int, ...], height: Callable[[Index, Index], NDArray[np.floating]]
+    surface: PrintedSurface | SurfaceFile,
+    points_mm: Floats,
+    shape: tuple[int, ...],
+    height: Callable[[Index, Index], NDArray[np.floating]],
 ) -> Floats:
-    """Return heights (n,) between the places of a grid of `shape` ny, nx, -inf off it.
+    """Return heights (n,) at points (n, 2) between places of a grid of `shape` ny, nx, -inf off it.
 
-    Bilinear at (n, 2) columns and rows, the nearest place's where a neighbour is empty. `height`
-    gives heights (m,) of rows and columns (m,).
+    Bilinear, the nearest place's where a neighbour is empty. `height` gives heights (m,) of rows
+    and columns (m,).
     """
-    ny, nx = shape
+    T, (ny, nx) = np.array(surface.T_surface_grid), shape
+    at = ((points_mm - T[:2, 3]) @ T[:2, :2] - np.array(surface.origin_mm)) / surface.step_mm
     nearest = np.rint(at).astype(np.int64)
     inside = ((nearest >= 0) & (nearest < [nx, ny])).all(axis=1)
     j, i = nearest.clip(0, [nx - 1, ny - 1]).T
@@ -98,14 +101,12 @@ class SurfaceFile:
     def heights_mm(self, points_mm: Floats) -> Floats:
         """Return the heights at points (n, 2) of the surface frame; see `interpolate`."""
         levels = map_levels(self.path)
-        T = np.array(self.T_surface_grid)
-        at = ((points_mm - T[:2, 3]) @ T[:2, :2] - np.array(self.origin_mm)) / self.step_mm
 
         def height(i: Index, j: Index) -> Floats:
             level = levels[i, j]
             return np.where(level > 0, self.low_mm + UNIT_MM * level, -np.inf)
 
-        return interpolate(at, levels.shape, height)
+        return interpolate(self, points_mm, levels.shape, height)
 
 
 def write_surface(

@@ -7,7 +7,7 @@ symbol from its place is given apart). Symbol frame: its centre, its own axes, m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,34 +168,32 @@ def survey_face(
         pixel = STEP_MM**2
         top = found[design.top]
         height = float(np.median(top)) if len(top) and np.isfinite(base) else 0.0
+        height = max(height, 0.0)
+        overlap = _overlap(printed, design.footprint)
+        rival = max((_best_overlap(printed, other) for other in rivals), default=0.0)
         check = SymbolCheck(
             part=part,
             face=face,
             name=embossing.names[number],
             label=label,
-            overlap=_overlap(printed, design.footprint),
-            rival_overlap=max((_best_overlap(printed, r) for r in rivals), default=0.0),
+            overlap=overlap,
+            rival_overlap=rival,
             area_mm2=float(design.footprint.sum()) * pixel,
             lost_mm2=float((design.footprint & ~printed).sum()) * pixel,
             widened_mm2=float((printed & ~design.footprint).sum()) * pixel,
-            height_mm=max(height, 0.0),
+            height_mm=height,
             designed_mm=design.height_mm,
             moved_mm=(float(moved[0]), float(moved[1])),
-            verdict="",
+            verdict=_verdict(overlap, overlap - rival, height / design.height_mm),
         )
-        tiles.append(SymbolTile(_judge(check), design.heights, found))
+        tiles.append(SymbolTile(check, design.heights, found))
     return tiles
 
 
-def _judge(check: SymbolCheck) -> SymbolCheck:
-    ahead = check.overlap - check.rival_overlap
-    height = check.height_mm / check.designed_mm
-    verdict = DOUBTFUL
-    if check.overlap >= _OVERLAP and ahead >= _AHEAD and height >= _HEIGHT:
-        verdict = SURVIVES
-    elif check.overlap < _OVERLAP_LEAST or ahead <= 0 or height < _HEIGHT_LEAST:
-        verdict = LOST
-    return replace(check, verdict=verdict)
+def _verdict(overlap: float, ahead: float, height: float) -> str:
+    if overlap >= _OVERLAP and ahead >= _AHEAD and height >= _HEIGHT:
+        return SURVIVES
+    return LOST if overlap < _OVERLAP_LEAST or ahead <= 0 or height < _HEIGHT_LEAST else DOUBTFUL
 
 
 def _overlap(a: Mask, b: Mask) -> float:

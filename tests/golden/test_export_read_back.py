@@ -67,10 +67,10 @@ def test_step_and_stl_are_one_valid_closed_solid(part, tmp_path):
     solid, mesh = verify_step(part, step), verify_stl(part, stl)
     assert solid.solids == 1
     assert solid.valid
-    assert abs(solid.volume_error) <= STEP_VOLUME
+    assert solid.volume_mm3 == pytest.approx(volume(part), rel=STEP_VOLUME)
     assert mesh.boundary_edges == mesh.non_manifold_edges == 0
     assert mesh.self_intersections == 0
-    assert abs(mesh.volume_error) <= 1e-6
+    assert mesh.volume_mm3 == pytest.approx(volume(part), rel=1e-6)
 
 
 def test_engraved_symbols(panel, tmp_path):

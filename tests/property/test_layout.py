@@ -12,7 +12,7 @@ from random_shapes import random_convex, random_nonconvex
 from generator.array.profiles import profile
 from generator.errors import LayoutError
 from generator.layout.footprint import region_of
-from generator.layout.lattice import choose_lattice
+from generator.layout.lattice import LatticeRequest
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Occupancy
 from generator.layout.places import array_cells, count_places
@@ -67,7 +67,7 @@ def check_clearance(loops, clearances, centres, rotation, half=HALF):
 @settings(max_examples=60, deadline=None)
 def test_footprints_lie_in_the_face_and_keep_every_clearance(face, window):
     loops, clearances = face
-    lattice = choose_lattice([region_of(loops, clearances)], HALF, PITCH, window)
+    lattice = LatticeRequest(HALF, PITCH, window).choose([region_of(loops, clearances)])
     (cells,) = lattice.cells
     assume(len(cells))
     j, i = cells.T

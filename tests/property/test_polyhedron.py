@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from random_shapes import random_convex, random_nonconvex
 
 from generator.errors import ShapeError
-from generator.plane.polygon import orientations
+from generator.plane.polygon import orientations, side_of_polygon
 from generator.polyhedron import (
     dihedral,
     face_area,
@@ -22,7 +22,6 @@ from generator.polyhedron import (
     face_normal,
     face_polygon,
     polyhedron,
-    side_of_face,
     volume,
 )
 from generator.polyhedron.read import read_shape
@@ -89,10 +88,11 @@ def test_share_of_points_inside_is_the_area(solid, seed):
     outer = face_polygon(solid, face)[0]
     low, high = outer.min(axis=0), outer.max(axis=0)
     points = rng.uniform(low, high, size=(4000, 2))
-    share = (side_of_face(solid, face, points) >= 0).mean()
+    share = (side_of_polygon(face_polygon(solid, face), points) >= 0).mean()
     expected = face_area(solid, face) / np.prod(high - low)
     assert share == pytest.approx(expected, abs=5 * math.sqrt(0.25 / 4000))
-    assert (side_of_face(solid, face, np.concatenate(face_polygon(solid, face))) == 0).all()
+    loops = face_polygon(solid, face)
+    assert (side_of_polygon(loops, np.concatenate(loops)) == 0).all()
 
 
 @settings(max_examples=40, deadline=None)

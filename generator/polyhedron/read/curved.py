@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from generator.errors import ShapeError
+from generator.polyhedron.read.kernel import wires_of
 from generator.polyhedron.read.soup import MOST_FACETS
 from generator.polyhedron.shapes import CHORD_ERROR_MM, FACETS
 
@@ -177,33 +178,17 @@ class _Nodes:
     def wires(self, face: Any) -> list[list[tuple[Any, list[int]]]]:
         """Return the wires, outer first: edges in order with their points, material to the left."""
         from OCP.BRep import BRep_Tool
-        from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
-        from OCP.TopAbs import TopAbs_WIRE
-        from OCP.TopExp import TopExp_Explorer
         from OCP.TopLoc import TopLoc_Location
-        from OCP.TopoDS import TopoDS
 
         self.location = TopLoc_Location()
         self.mesh = BRep_Tool.Triangulation_s(face, self.location)
         if self.mesh is None:
             raise ShapeError("the CAD kernel cannot divide face", fix=_REMAKE)
         self.of_face, self.dropped = {}, set()
-        outer = BRepTools.OuterWire_s(face)
-        explorer, wires = TopExp_Explorer(face, TopAbs_WIRE), []
-        while explorer.More():
-            wires.append(TopoDS.Wire_s(explorer.Current()))
-            explorer.Next()
-        wires.sort(key=lambda wire: not wire.IsSame(outer))
         found = []
-        for wire in wires:
-            walk, edges = BRepTools_WireExplorer(wire, face), []
-            while walk.More():
-                edge = walk.Current()
-                numbers = self._along(edge)
-                if not BRep_Tool.Degenerated_s(edge):
-                    edges.append((edge, numbers))
-                walk.Next()
-            found.append(edges)
+        for wire in wires_of(face):
+            edges = [(edge, self._along(edge)) for edge, _ in wire]
+            found.append([each for each in edges if not BRep_Tool.Degenerated_s(each[0])])
         return found
 
     def triangles(self, face: Any) -> list[list[int]]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,10 @@ def _read_model(model: str, scale: float) -> dict[str, Any]:
             fix=f"{install_line('cad')}, or save the model as STL",
         ) from None
     try:
-        return describe_shape(_scale(_model(model), scale))
+        shape = step_shape(model)
+        if shape is None:
+            raise ShapeError("the CAD kernel finds no STEP data in it", fix=AGAIN)
+        return describe_shape(_scale(shape, scale))
     except OCP.Standard.Standard_Failure as error:
         reason = str(error).strip().splitlines()
         cause = f"the CAD kernel cannot read it: {reason[0] if reason else 'no reason given'}"
@@ -58,7 +62,7 @@ def describe_shape(shape: Any) -> dict[str, Any]:
     """
     from OCP.TopAbs import TopAbs_SOLID
 
-    solids = [] if shape is None or shape.IsNull() else _sub_shapes(shape, TopAbs_SOLID)
+    solids = sub_shapes(shape, TopAbs_SOLID)
     if len(solids) != 1:
         raise ShapeError(
             f"it holds {_content_of(shape, len(solids))}; one solid is needed",
@@ -73,19 +77,19 @@ def _content_of(shape: Any, solids: int) -> str:
 
     if solids:
         return f"{solids} solids"
-    faces = 0 if shape is None or shape.IsNull() else len(_sub_shapes(shape, TopAbs_FACE))
-    if faces:
+    if faces := len(sub_shapes(shape, TopAbs_FACE)):
         return f"no solid, but {faces} loose {'face' if faces == 1 else 'faces'}"
     return "no faces: it may be an assembly whose parts are in other files"
 
 
-def _model(model: str) -> Any:
+def step_shape(path: Path | str) -> Any:
+    """Return the kernel's shape of a STEP file; None where it finds no STEP data."""
     from OCP.IFSelect import IFSelect_RetDone
     from OCP.STEPControl import STEPControl_Reader
 
     reader = STEPControl_Reader()
-    if reader.ReadFile(model) != IFSelect_RetDone:
-        raise ShapeError("the CAD kernel finds no STEP data in it", fix=AGAIN)
+    if reader.ReadFile(str(path)) != IFSelect_RetDone:
+        return None
     reader.TransferRoots()
     return reader.OneShape()
 
@@ -109,7 +113,7 @@ def _faces(solid: Any) -> dict[str, Any]:
     from OCP.TopoDS import TopoDS
     from OCP.TopTools import TopTools_IndexedMapOfShape
 
-    faces = [TopoDS.Face_s(face) for face in _sub_shapes(solid, TopAbs_FACE)]
+    faces = [TopoDS.Face_s(face) for face in sub_shapes(solid, TopAbs_FACE)]
     kinds = [_kind(face) for face in faces]
     if set(kinds) != {"plane"}:
         from generator.polyhedron.read.curved import curved_faces
@@ -138,23 +142,34 @@ def _kind(face: Any) -> str:
 
 def _loops(face: Any, numbers: Any) -> list[list[int]]:
     """Return the wires of a planar face as vertex numbers, counter-clockwise from outside."""
-    from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
+    loops = []
+    for wire in wires_of(face):
+        loop = []
+        for edge, vertex in wire:
+            _refuse_bent(edge)
+            loop.append(numbers.FindIndex(vertex) - 1)
+        loops.append(loop)
+    return loops
+
+
+def wires_of(face: Any) -> Iterator[Iterator[tuple[Any, Any]]]:
+    """Yield the wires of a face, outer first: edges with their first vertices, material left."""
+    from OCP.BRepTools import BRepTools
     from OCP.TopAbs import TopAbs_WIRE
-    from OCP.TopoDS import TopoDS
 
     outer = BRepTools.OuterWire_s(face)
-    wires = [TopoDS.Wire_s(wire) for wire in _sub_shapes(face, TopAbs_WIRE)]
-    wires.sort(key=lambda wire: not wire.IsSame(outer))
-    loops = []
-    for wire in wires:
-        loop = []
-        walk = BRepTools_WireExplorer(wire, face)
-        while walk.More():
-            _refuse_bent(walk.Current())
-            loop.append(numbers.FindIndex(walk.CurrentVertex()) - 1)
-            walk.Next()
-        loops.append(loop)  # the explorer keeps the material on its left, from outside
-    return loops
+    for wire in sorted(sub_shapes(face, TopAbs_WIRE), key=lambda wire: not wire.IsSame(outer)):
+        yield _edges_of(wire, face)
+
+
+def _edges_of(wire: Any, face: Any) -> Iterator[tuple[Any, Any]]:
+    from OCP.BRepTools import BRepTools_WireExplorer
+    from OCP.TopoDS import TopoDS
+
+    walk = BRepTools_WireExplorer(TopoDS.Wire_s(wire), face)
+    while walk.More():
+        yield walk.Current(), walk.CurrentVertex()
+        walk.Next()
 
 
 def _refuse_bent(edge: Any) -> None:
@@ -179,11 +194,13 @@ def _refuse_bent(edge: Any) -> None:
         )
 
 
-def _sub_shapes(shape: Any, kind: Any) -> list[Any]:
-    """Return the sub-shapes of one kind, each once, in the kernel's order."""
+def sub_shapes(shape: Any, kind: Any) -> list[Any]:
+    """Return the sub-shapes of one kind, each once, in the kernel's order; of None, none."""
     from OCP.TopExp import TopExp
     from OCP.TopTools import TopTools_IndexedMapOfShape
 
+    if shape is None or shape.IsNull():
+        return []
     found = TopTools_IndexedMapOfShape()
     TopExp.MapShapes_s(shape, kind, found)
     return [found.FindKey(k + 1) for k in range(found.Extent())]

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 
 from generator.errors import ShapeError
 from generator.plane.polygon import area_vector
-from generator.polyhedron.read.soup import MOST_FACETS, Soup, cluster_labels, split_at_tees
+from generator.polyhedron.read.soup import (
+    MOST_FACETS,
+    Soup,
+    cluster_labels,
+    middle_text,
+    split_at_tees,
+)
 
 COPLANAR = 1e-5  #: coplanar points lie this near to a plane, as a share of the size
 COPLANAR_RAD = 1e-3  #: coplanar polygons turn by no more than this, besides the noise
@@ -130,14 +136,19 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
     turn = np.arctan2(cross, np.einsum("ij,ij->i", normal[large], normal[small]))
     allowed = np.maximum(COPLANAR_RAD, 4.0 * soup.noise / np.maximum(width[small], soup.noise))
     flat = (off <= tolerance) & (turn <= allowed) & ~sliver[large] & ~sliver[small]
-    group = cluster_labels(np.arange(count), large[flat], small[flat])
-    plane = (normal, corner)
-    group = _with_slivers(soup, group, sliver, large, small, off, turn, plane)
+    touching = np.flatnonzero((sliver[large] | sliver[small]) & (off <= tolerance))
+    touching = touching[np.argsort(turn[touching], kind="stable")]
+    pairs = np.stack([large, small], axis=1)[touching].tolist()
+
+    def grouped(flat: NDArray[np.bool_]) -> Integers:
+        group = cluster_labels(np.arange(count), large[flat], small[flat])
+        _join_slivers(soup, group, sliver, pairs, normal, corner)
+        return group
+
+    group = grouped(flat)
     bent = _bends(soup, group, vector, corner) > 2.0 * tolerance
     if bent[group].any():  # of a curved surface: each of its polygons is a face
-        flat &= ~bent[group[large]]
-        group = cluster_labels(np.arange(count), large[flat], small[flat])
-        group = _with_slivers(soup, group, sliver, large, small, off, turn, plane)
+        group = grouped(flat & ~bent[group[large]])
     _check_groups(soup, group, vector, corner)
     return group
 
@@ -163,32 +174,22 @@ def _farthest_off_plane(
     return off
 
 
-def _with_slivers(
-    soup: Soup,
-    group: Integers,
-    sliver: NDArray[np.bool_],
-    large: Integers,
-    small: Integers,
-    off: Floats,
-    turn: Floats,
-    plane: tuple[Floats, Integers],
-) -> Integers:
+def _join_slivers(
+    soup: Soup, group: Integers, sliver: NDArray[np.bool_], pairs: list[list[int]], normal: Floats,
+    corner: Integers,
+) -> None:  # fmt: skip
     """Join each sliver to the one neighbour that it fits best, its normal being noise.
 
-    Through another sliver it joins the face that this one lies in, if it lies in that plane too:
-    slivers of an upright wall meet those of a top.
+    `pairs`: neighbours of which one is a sliver at least, the best first. Through another sliver it
+    joins the face that this one lies in, if it lies in that plane too: slivers of an upright wall
+    meet those of a top.
     """
-    group = group.copy()
-    normal, corner = plane
     tolerance = _distance(soup)
-    waiting = {int(f) for f in np.flatnonzero(sliver)}
+    waiting = set(np.flatnonzero(sliver).tolist())
     host = np.arange(len(group))  # the polygon, no sliver, in whose plane a polygon lies
-    pairs = np.flatnonzero((sliver[large] | sliver[small]) & (off <= tolerance))
-    pairs = pairs[np.argsort(turn[pairs], kind="stable")]
     while waiting:
         before = len(waiting)
-        for k in pairs:
-            f, g = int(large[k]), int(small[k])
+        for f, g in pairs:
             if (f in waiting) == (g in waiting):
                 continue
             thin, other = (f, g) if f in waiting else (g, f)
@@ -201,7 +202,6 @@ def _with_slivers(
             waiting.discard(thin)
         if len(waiting) == before:
             break
-    return group
 
 
 def _bends(soup: Soup, group: Integers, vector: Floats, corner: Integers) -> Floats:
@@ -307,21 +307,16 @@ def _check_one_body(soup: Soup, twin: NDArray[np.intp]) -> None:
     bodies = np.unique(label)
     if len(bodies) == 1:
         return
-    boxes, volumes = [], []
-    for body in bodies:
-        own = label[soup.face] == body
-        points = soup.points[soup.origin[own]]
-        boxes.append((points.min(axis=0), points.max(axis=0)))
-        volumes.append(_signed_volume(soup, own))
+    owned = [label[soup.face] == body for body in bodies]
+    volumes = [_signed_volume(soup, own) for own in owned]
     order = np.argsort(-np.abs(volumes), kind="stable")
     sign = np.sign(volumes[order[0]])
     words = []
-    for k in order[:LISTED]:
-        low, high = boxes[k]
-        size = " x ".join(f"{x:.4g}" for x in high - low)
-        middle = ", ".join(f"{x:.4g}" for x in (low + high) / 2)
+    for k in order[:LISTED].tolist():
+        points = soup.points[soup.origin[owned[k]]]
+        size = " x ".join(f"{x:.4g}" for x in np.ptp(points, axis=0))
         void = "a void of " if np.sign(volumes[k]) == -sign else ""
-        words.append(f"{void}{size} mm about ({middle})")
+        words.append(f"{void}{size} mm about {middle_text(points)}")
     if len(bodies) > LISTED:
         words.append(f"{len(bodies) - LISTED} smaller")
     raise ShapeError(

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.errors import ShapeError
-from generator.plane.polygon import face_vector
+from generator.polyhedron.frame import face_vectors, size
 from generator.polyhedron.read.merge import merge_triangles
-from generator.polyhedron.read.soup import Soup, cluster_labels, weld_coarsely
+from generator.polyhedron.read.soup import Soup, cluster_labels, middle_text, weld_coarsely
 from generator.polyhedron.read.walls import BEND, SMOOTH_RAD, round_walls
 from generator.polyhedron.winged import Face, Polyhedron, polyhedron, winged_edges
 
@@ -51,24 +51,21 @@ def solid_of_soup(soup: Soup, kind: str, scale: float = 1.0) -> Polyhedron:
 
 
 def _solid(soup: Soup, kind: str, scale: float) -> Polyhedron:
-    vertices, faces = merge_triangles(soup)
-    return _mesh_polyhedron(kind, scale * vertices, faces)
-
-
-def _mesh_polyhedron(kind: str, vertices: Floats, faces: list[Loops]) -> Polyhedron:
     """Return the solid of a mesh; of more than `MOST_FACES`, curved regions stay blank.
 
     Planar faces are called F1, F2, ... in the order of the file, then each round wall and each
     curved region is one face of many facets: F9, F9.2, F9.3, ...
     """
-    solid = polyhedron(kind, vertices, faces)
-    vertices, loops = solid.vertices, [face.loops for face in solid.faces]
-    normals, areas = _normals(vertices, loops)
+    vertices, faces = merge_triangles(soup)
+    solid = polyhedron(kind, scale * vertices, faces)
+    vectors, loops = face_vectors(solid), [face.loops for face in solid.faces]
+    lengths = np.linalg.norm(vectors, axis=1)
+    normals = vectors / np.maximum(lengths, 1e-300)[:, None]
     walls = round_walls(solid, normals)
     round_facets = {facet for wall, _ in walls for facet in wall.facets}
     regions = []
     if len(faces) > MOST_FACES:
-        regions = _curved_regions(vertices, loops, normals, areas)
+        regions = _curved_regions(solid, normals, lengths / 2)
         regions = [[f for f in region if f not in round_facets] for region in regions]
         regions = [region for region in regions if region]
     if not walls and not regions:
@@ -89,49 +86,29 @@ def _mesh_polyhedron(kind: str, vertices: Floats, faces: list[Loops]) -> Polyhed
         edges=winged_edges(loops),
         surfaces=tuple(wall for wall, _ in walls),
         blank=tuple(sorted(blank)),
-        notes=(*solid.notes, *_notes(vertices, loops, regions, first + len(walls))),
+        notes=(*solid.notes, *_notes(solid.vertices, loops, regions, first + len(walls))),
     )
 
 
-def _curved_regions(
-    vertices: Floats, faces: list[Loops], normals: Floats, areas: Floats
-) -> list[list[int]]:
-    """Return the faces of each curved surface, in order."""
-    owner: dict[tuple[int, int], int] = {}
-    pairs: list[tuple[int, int]] = []
-    lengths: list[float] = []
-    for number, loops in enumerate(faces):
-        for loop in loops:
-            for a, b in zip(loop, (*loop[1:], loop[0]), strict=True):
-                if (b, a) in owner:
-                    pairs.append((owner.pop((b, a)), number))
-                    lengths.append(float(np.linalg.norm(vertices[a] - vertices[b])))
-                else:
-                    owner[a, b] = number
-    one, other = np.array(pairs, np.intp).T
-    length = np.array(lengths)
+def _curved_regions(solid: Polyhedron, normals: Floats, areas: Floats) -> list[list[int]]:
+    """Return the faces of each curved surface, in order; of all: normals (F, 3), areas (F,)."""
+    one, other = np.array([(edge.left, edge.right) for edge in solid.edges], np.intp).T
+    ends = solid.vertices[[(edge.start, edge.end) for edge in solid.edges]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     cross = np.linalg.norm(np.cross(normals[one], normals[other]), axis=1)
     turn = np.arctan2(cross, np.einsum("ij,ij->i", normals[one], normals[other]))
-    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     joined = turn <= SMOOTH_RAD
     for face in (one, other):
         width = areas[face] / np.maximum(length, 1e-9)
-        strip = (turn <= FAINT_RAD) & (width < STRIP * size)
-        joined &= strip | (width < BEND * size * turn)
-    label = cluster_labels(np.arange(len(faces)), one[joined], other[joined])
-    curved = np.zeros(len(faces), bool)
+        strip = (turn <= FAINT_RAD) & (width < STRIP * size(solid))
+        joined &= strip | (width < BEND * size(solid) * turn)
+    label = cluster_labels(np.arange(len(solid.faces)), one[joined], other[joined])
+    curved = np.zeros(len(solid.faces), bool)
     curved[one[joined]] = curved[other[joined]] = True
     found: dict[int, list[int]] = {}
     for face in np.flatnonzero(curved).tolist():
         found.setdefault(int(label[face]), []).append(face)
     return [found[key] for key in sorted(found)]
-
-
-def _normals(vertices: Floats, faces: list[Loops]) -> tuple[Floats, Floats]:
-    """Return unit normals (n, 3) and areas (n,)."""
-    vectors = np.array([face_vector([vertices[list(loop)] for loop in f]) for f in faces])
-    lengths = np.linalg.norm(vectors, axis=1)
-    return vectors / np.maximum(lengths, 1e-300)[:, None], lengths / 2
 
 
 def _notes(
@@ -143,8 +120,7 @@ def _notes(
     places = []
     for number, region in enumerate(regions[:LISTED], first):
         points = vertices[[v for f in region for loop in faces[f] for v in loop]]
-        x, y, z = ((points.min(axis=0) + points.max(axis=0)) / 2).tolist()
-        places.append(f"F{number} about ({x:.4g}, {y:.4g}, {z:.4g})")
+        places.append(f"F{number} about {middle_text(points)}")
     more = f" and {len(regions) - LISTED} more" if len(regions) > LISTED else ""
     what = "region stays" if len(regions) == 1 else "regions stay"
     note = (

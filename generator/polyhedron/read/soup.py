@@ -157,6 +157,12 @@ def cluster_labels(
             label = jumped
 
 
+def middle_text(points: NDArray[np.float64]) -> str:
+    """Return the middle of the box of points (n, 3), mm, as messages say it."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return "({:.4g}, {:.4g}, {:.4g})".format(*middle.tolist())
+
+
 def split_at_tees(soup: Soup) -> Soup:
     """Return the soup with open edges divided at the open corners that lie on them."""
     target = soup.origin[soup.following]

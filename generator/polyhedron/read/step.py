@@ -22,7 +22,7 @@ from encoded_objects.base.errors import install_line
 from encoded_objects.base.foreign import run_limited
 from generator.errors import ShapeError
 from generator.polyhedron.read.merge import merge_triangles
-from generator.polyhedron.read.soup import soup_of_loops, weld
+from generator.polyhedron.read.soup import middle_text, soup_of_loops, weld
 from generator.polyhedron.winged import Face, Polyhedron, developable_from, polyhedron
 
 Loops = list[list[int]]
@@ -165,11 +165,7 @@ def _places(found: dict[str, Any]) -> dict[str, str]:
         own = name.partition(".")[0]
         if own in found["kinds"]:
             corners.setdefault(own, []).extend(v for loop in loops for v in loop)
-    places = {}
-    for name, numbers in corners.items():
-        low, high = points[numbers].min(axis=0), points[numbers].max(axis=0)
-        places[name] = "({:.4g}, {:.4g}, {:.4g})".format(*((low + high) / 2).tolist())
-    return places
+    return {name: middle_text(points[numbers]) for name, numbers in corners.items()}
 
 
 def _blank_notes(kinds: dict[str, str], places: dict[str, str]) -> list[str]:

@@ -225,12 +225,8 @@ def _bent_once(
     found: list[tuple[_Strip, _Fit]], solid: Polyhedron, normals: Floats
 ) -> list[tuple[_Strip, _Fit]]:
     """Leave out strips that go on smoothly over their rims, as those of spheres and fillets do."""
-    left = {
-        edge: number
-        for number, face in enumerate(solid.faces)
-        for loop in face.loops
-        for edge in zip(loop, (*loop[1:], loop[0]), strict=True)
-    }
+    left = {(edge.start, edge.end): edge.left for edge in solid.edges}
+    left |= {(edge.end, edge.start): edge.right for edge in solid.edges}
     strip_of = {facet: k for k, (strip, _) in enumerate(found) for facet in strip.facets}
     slant = [math.hypot(fit.height_mm, fit.radii_mm[0] - fit.radii_mm[1]) for _, fit in found]
     ahead: list[set[int]] = [set() for _ in found]  # strips as high, that one goes on into

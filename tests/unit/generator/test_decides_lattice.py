@@ -5,10 +5,11 @@ import pytest
 import shapely
 
 from generator.layout.footprint import region_of
-from generator.layout.lattice import choose_lattice, edge_rotations
+from generator.layout.lattice import LatticeRequest, edge_rotations
 
 HALF, PITCH = 2.7, 7.0
 WINDOW = (3, 2)  # rows and columns
+REQUEST = LatticeRequest(HALF, PITCH, WINDOW)
 
 
 def rectangle(width, height, x=0.0, y=0.0):
@@ -96,7 +97,7 @@ def play(loop, clearance, lattice):
 def test_the_lattice_shows_the_most_and_lies_in_the_middle_of_its_play(name):
     loop, clearance = FACES[name]
     regions = [region(loop, clearance)]
-    wide, along = (choose_lattice(regions, HALF, PITCH, WINDOW, search=s) for s in (True, False))
+    wide, along = (REQUEST.choose(regions, search=s) for s in (True, False))
     for found in (wide, along):
         cells = shown(loop, clearance, found.rotation_rad, found.x_mm, found.y_mm)
         assert {tuple(cell) for cell in found.cells[0].tolist()} == cells
@@ -140,7 +141,9 @@ HAND = {
 @pytest.mark.parametrize("case", HAND)
 def test_places_of_rectangles_worked_by_hand(case):
     loops, half, places, quarter, cells = HAND[case]
-    found = choose_lattice([region(loop) for loop in loops], half, PITCH, WINDOW, search=False)
+    found = LatticeRequest(half, PITCH, WINDOW).choose(
+        [region(loop) for loop in loops], search=False
+    )
     assert (found.places, found.quarter) == (places, quarter)
     assert [len(one) for one in found.cells] == cells
 
@@ -151,7 +154,7 @@ def test_of_equal_lattices_the_one_with_the_most_play_is_taken(first, second):
     right = 10 * PITCH + 3.5
     faces = [rectangle(room(3, play), room(3, 3.0)) for play in (first, second)]
     faces[1] = [(x + right, y) for x, y in faces[1]]
-    found = choose_lattice([region(loop) for loop in faces], HALF, PITCH, WINDOW, search=False)
+    found = REQUEST.choose([region(loop) for loop in faces], search=False)
     columns = [len(set(cells[:, 1].tolist())) for cells in found.cells]
     assert columns == ([3, 2] if first > second else [2, 3])
     assert found.margin_mm == pytest.approx(max(first, second) / 2, abs=1e-5)
@@ -174,7 +177,7 @@ def test_the_most_cells_that_pass_the_rank_test_are_the_place_in_their_turn(
 ):
     strip = rectangle(room(4, 2.0), room(1, 1.0 if number == 4 else 2.0))
     identifies = in_quarter(quarter, number)
-    found = choose_lattice([region(strip)], HALF, PITCH, WINDOW, identifies)
+    found = LatticeRequest(HALF, PITCH, WINDOW, identifies).choose([region(strip)])
     assert (found.places, found.quarter, len(found.cells[0])) == ((1,), quarter, number)
     if margin_mm:
         assert found.margin_mm == pytest.approx(margin_mm, abs=1e-5)
@@ -190,9 +193,8 @@ def test_places_of_strips_into_which_no_window_fits():
         ([four, two], lambda number: number == 4, (1, 0), 4),
         ([four, two], lambda number: number == 2, (0, 1), 4),
     ):
-        found = choose_lattice(
-            strips, HALF, PITCH, WINDOW, lambda rows, _, passes=passes: passes(len(rows))
-        )
+        rank = LatticeRequest(HALF, PITCH, WINDOW, lambda rows, _, f=passes: f(len(rows)))
+        found = rank.choose(strips)
         assert (found.places, len(found.cells[0])) == (places, cells)
 
 
@@ -201,7 +203,7 @@ def test_the_rank_test_is_not_asked_where_a_window_fits():
         raise AssertionError
 
     loop = rectangle(room(3, 1.0), room(3, 1.0))
-    found = choose_lattice([region(loop)], HALF, PITCH, WINDOW, refused)
+    found = LatticeRequest(HALF, PITCH, WINDOW, refused).choose([region(loop)])
     assert (found.places, found.quarter) == ((2,), 0)
 
 
@@ -235,8 +237,8 @@ TURNED = {
 @pytest.mark.parametrize("twelfth", TURNED)
 def test_between_the_edges_twelfths_of_a_quarter_turn_are_tried(twelfth):
     loop = TURNED[twelfth]
-    found = choose_lattice([region(loop)], HALF, PITCH, WINDOW)
+    found = REQUEST.choose([region(loop)])
     assert found.rotation_rad == pytest.approx(twelfth * np.pi / 24)
-    along = choose_lattice([region(loop)], HALF, PITCH, WINDOW, search=False)
+    along = REQUEST.choose([region(loop)], search=False)
     one, other = (worth([(loop, 1.0)], f.rotation_rad, f.x_mm, f.y_mm) for f in (found, along))
     assert one > other

@@ -63,23 +63,11 @@ CUBE = shapes.cube(60.0)
         (CUBE, {"occupied": (ROWS, COLUMNS), "kind": "faces"},
          r"needs 384 cells, 300 of 4095 are free[\s\S]*profile: auto"),
         (shapes.cube(180.0), {}, "not in blocks"),
-        (CUBE, {"kind": "nets"}, "unknown layout 'nets'"),
-        (CUBE, {"half": 4.0}, "8 mm do not fit a pitch of 7 mm"),
-        (CUBE, {"half": 0.0}, "0 mm do not fit"),
-        (CUBE, {"pitch": np.nan}, "pitch of nan mm"),
-        (CUBE, {"blank_faces": (7,)}, "no face 7"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_laid_out_is_refused(solid, options, message):
     with pytest.raises(LayoutError, match=message):
         laid_out(solid, **options)
-
-
-def test_clearances_must_match_the_edges():
-    good = clearances(CUBE)
-    for bad in (good[:5], [[np.ones(3)]] * 6, [[np.full(4, -1.0)]] * 6, [[np.full(4, np.inf)]] * 6):
-        with pytest.raises(LayoutError, match="clearance"):
-            lay_out(CUBE, ARRAY, 7.0, 2.7, bad, NONE)
 
 
 def code_at(*cells, rows=63, columns=65):

@@ -11,7 +11,7 @@ from manifold3d import Manifold, Mesh64
 from random_shapes import convex_hull, extruded, random_convex
 
 from generator.errors import SolidError
-from generator.export.check import PanelFile, verify_fit
+from generator.export.check import verify_fit
 from generator.export.meshes import stl_chunks
 from generator.layout.placement import Layout
 from generator.pipeline.files import parts_of
@@ -249,15 +249,15 @@ def test_written_panels_are_put_together(tmp_path):
     def files(parts):
         for part in parts:
             (tmp_path / part.name).write_bytes(b"".join(stl_chunks(triangles(part))))
-        return [PanelFile(part.name, tmp_path / part.name, part.T_object_part) for part in parts]
+        return parts, [tmp_path / part.name for part in parts]
 
     plain = plain_panels(convex_hull(UNEQUAL), 3.0, FDM, 0.14, "P")
-    report = verify_fit(files(plain.fitted), 0.14)
+    report = verify_fit(*files(plain.fitted), 0.14)
     assert report.overlap_mm3 == 0.0
     assert report.gap_mm == pytest.approx(0.14, abs=1e-4)
     assert report.pairs == 10
     with pytest.raises(SolidError, match=r"panels 'P-F\d' and 'P-F\d' overlap by \d"):
-        verify_fit(files(plain.mitred), 0.14)
+        verify_fit(*files(plain.mitred), 0.14)
     with pytest.raises(SolidError, match=r"apart where 0\.2 mm was meant"):
-        verify_fit(files(plain.fitted), 0.2)
-    assert verify_fit(files(plain.fitted[:1]), 0.14).gap_mm is None
+        verify_fit(*files(plain.fitted), 0.2)
+    assert verify_fit(*files(plain.fitted[:1]), 0.14).gap_mm is None
