@@ -232,7 +232,6 @@ def _path(loop: NDArray[np.float64]) -> str:
 
 
 def _rulers(view: _View, cell: float, left: int) -> str:
-    """Return the numbers of columns and rows along two sides."""
     rows, columns = view.period
     step = 5 if cell >= 9 else 10
     texts = []

@@ -177,8 +177,6 @@ def _faces(
 
 
 class _Buffer:
-    """The binary part and the records that describe it."""
-
     def __init__(self) -> None:
         self.blocks: list[bytes] = []
         self.size = 0

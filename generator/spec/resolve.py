@@ -399,7 +399,6 @@ def _array_profile(settings: NamedSettings, sensor: SensorType, named: Alphabet 
 def _array(
     settings: NamedSettings, profile: str, tree: Tree, problems: list[Problem]
 ) -> tuple[dict[str, Any], int]:
-    """Return the complete definition of the array, and its number of symbols."""
     if settings.encoding is None:
         return _profile_definition(profile)
     if settings.profile is not None:
@@ -456,7 +455,6 @@ def _shape(shape: Shape, tree: Tree) -> ShapeSpec:
 
 
 def _mount(settings: MountSettings, tree: Tree) -> Mount:
-    """Return the one mount that is given; raises `SpecError`."""
     given = [kind for kind in MOUNTS if getattr(settings, kind) is not None]
     if len(given) != 1:
         cause = f"a part is held in one way, not by {' and '.join(given) or 'none'}"
