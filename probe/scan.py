@@ -225,10 +225,7 @@ def guarded_approach(
     `feel` moves the sensor to a travel (mm from the start, towards the object) and returns the
     force (N) there. After "no contact" and "force limit" the sensor is back at the start.
 
-    Raises
-    ------
-    ContactError
-        Limits that contradict each other, or a force that is no number.
+    Raises ContactError: limits that contradict each other, or a force that is no number.
 
     Examples
     --------

@@ -39,10 +39,7 @@ def sources_in(folder: Path) -> tuple[Path, ...]:
 def load_library(folder: Path, signatures: Signatures, file: Path | None = None) -> ctypes.CDLL:
     """Return the compiled loops of a folder; `file` in place of its `kernels.so`.
 
-    Raises
-    ------
-    KernelsError
-        There is none, or it was made of other sources.
+    Raises KernelsError: there is none, or it was made of other sources.
     """
     file = file or folder / "kernels.so"
     library = ctypes.CDLL(str(file)) if file.is_file() else None

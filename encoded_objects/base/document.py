@@ -135,10 +135,7 @@ class DocumentKind:
 def read_text(path: Path, kind: DocumentKind) -> str:
     """Return the text of a file: UTF-8, at most 256 KiB.
 
-    Raises
-    ------
-    DocumentError
-        The file is missing (the fix names similar ones), too large, or not UTF-8.
+    Raises DocumentError: the file is missing (the fix names similar ones), too large, or not UTF-8.
     """
 
     def refusal(cause: str, fix: str) -> DocumentError:

@@ -35,10 +35,8 @@ def name_fault(name: str) -> tuple[str, str] | None:
 def refuse_taken(out: Path, suffix: str, *, replace: bool) -> None:
     """Refuse a file to write before work is done: its name must end in `suffix`.
 
-    Raises
-    ------
-    EncodedObjectsError
-        With the way out; also for a folder that is not there, and another ending.
+    Raises EncodedObjectsError: with the way out; also for a folder that is not there, and another
+    ending.
     """
     place = str(out)
     if out.suffix.lower() != suffix:

@@ -284,8 +284,13 @@ def choose_sensor_type(
 
 def fix_of_type(suits: Callable[[SensorType], bool]) -> str:
     """Return the way out of images of another type: the shipped ones that suit, or a file."""
+    alike = shipped_like(suits)
+    named = f"{alike}, or " if alike else ""
+    return f"give --sensor-type {named}a file; probe-sensor types shows how one is written"
+
+
+def shipped_like(suits: Callable[[SensorType], bool]) -> str:
+    """Return the names of the shipped types that suit, in words; empty of none."""
     from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 
-    alike = [name for name in shipped_names() if suits(sensor_type_named(name))]
-    named = f"{' or '.join(alike)}, or " if alike else ""
-    return f"give --sensor-type {named}a file; probe-sensor types shows how one is written"
+    return " or ".join(name for name in shipped_names() if suits(sensor_type_named(name)))

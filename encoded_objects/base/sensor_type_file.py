@@ -236,10 +236,7 @@ def shipped_names() -> tuple[str, ...]:
 def sensor_type_named(name: str) -> SensorType:
     """Return a shipped type by its name, or that of a YAML file.
 
-    Raises
-    ------
-    SensorTypeError
-        No such type or file, or one that cannot be used.
+    Raises SensorTypeError: no such type or file, or one that cannot be used.
 
     Examples
     --------

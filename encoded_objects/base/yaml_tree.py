@@ -89,10 +89,7 @@ def read_tree(path: Path, kind: DocumentKind) -> Tree:
 
     The tree says what is wrong but does not stop reading: keys given twice, anchors, tags.
 
-    Raises
-    ------
-    DocumentError
-        The file is missing, too large, too deep, not UTF-8, not YAML, or empty.
+    Raises DocumentError: the file is missing, too large, too deep, not UTF-8, not YAML, or empty.
     """
     return tree_of(read_text(path, kind), str(path), path.parent, kind)
 

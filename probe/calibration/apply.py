@@ -45,10 +45,8 @@ def calibrate_image(
     uncertainty of the law, and the share that hysteresis and creep leave open; readings not above
     three sigma of the noise are 0 N.
 
-    Raises
-    ------
-    CalibrationError, CircuitError
-        If the image has another shape than the calibration, or a count is beyond the board's range.
+    Raises CalibrationError, CircuitError: if the image has another shape than the calibration, or a
+    count is beyond the board's range.
 
     Examples
     --------

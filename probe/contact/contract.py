@@ -56,6 +56,11 @@ class Touch:
         x, y = points_mm[..., 0], points_mm[..., 1]
         return np.stack([self.x_mm + c * x - s * y, self.y_mm + s * x + c * y], axis=-1)
 
+    def on_sensor(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Take points (..., 2) of the surface frame to the sensor frame."""
+        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
+        return np.asarray((points_mm - (self.x_mm, self.y_mm)) @ np.array([[c, -s], [s, c]]))
+
 
 @dataclass(frozen=True, slots=True)
 class Contact:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType, usual_force_n
 from probe.contact.contract import STEEPEST_RAD, Contact, Touch, heights_under, no_contact
+from probe.contact.layer_patch import centres_mm
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import check_load, rest
 from probe.errors import ContactError
@@ -45,7 +46,8 @@ def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     if touch.force_n == 0:
         return no_contact(sensor, touch, "gel")
     step = sensor.pitch_mm / FINE
-    points = _grid(sensor, step)
+    fine = sensor.rows * FINE, sensor.columns * FINE
+    points = centres_mm(*fine, step).reshape(*fine, 2)
     heights = heights_under(surface, touch, points)
     law = Linear(_bed_n_mm3(sensor) * step**2)
     found = rest(points.reshape(-1, 2), heights.ravel(), law, touch)
@@ -97,14 +99,6 @@ def bridge(depth_mm: Array, way: float) -> tuple[Array, int]:
         if change <= tolerance:
             break
     return inside.copy(), number
-
-
-def _grid(sensor: SensorType, step: float) -> Array:
-    """Return the sample points (n, m, 2) of the surface."""
-    rows, columns = sensor.rows * FINE, sensor.columns * FINE
-    x = (np.arange(columns) - (columns - 1) / 2) * step
-    y = ((rows - 1) / 2 - np.arange(rows)) * step
-    return np.stack(np.meshgrid(x, y), axis=-1)
 
 
 def blur(values: Array, deviation: float) -> Array:

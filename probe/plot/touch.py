@@ -14,7 +14,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike, NDArray
 
@@ -52,13 +51,13 @@ def touch_picture(
     with page(path, 1440, 430) as figure:
         patch, pressed, read = figure.subplots(1, 3)
         figure.suptitle(title)
-        top = _patch(figure, patch, surface, sensor, touch)
+        top = draw_patch(patch, surface, sensor, touch)
         at_mm, above_mm = _heights_under(surface, sensor, touch)
         for axes, values, what, label in (
             (pressed, forces, f"force, {forces.sum():.3g} N in all", UNITS["N"]),
             (read, readings, "reading", UNITS["counts"]),
         ):
-            _image(figure, axes, values, sensor, label)
+            draw_image(axes, values, sensor, label)
             in_mm(axes, what)
             raised = top - FLAT_MM / 2
             if above_mm.min() < raised < above_mm.max():
@@ -66,9 +65,7 @@ def touch_picture(
                              linewidths=0.8, linestyles="solid")  # fmt: skip
 
 
-def _patch(
-    figure: Figure, axes: Axes, surface: HeightMap, sensor: SensorType, touch: Touch
-) -> float:
+def draw_patch(axes: Axes, surface: HeightMap, sensor: SensorType, touch: Touch) -> float:
     """Draw the surface about the sensor, and the sensor; returns the surface's top there."""
     reach = _BESIDE * sensor.reach_mm
     x = np.linspace(touch.x_mm - reach, touch.x_mm + reach, ACROSS)
@@ -83,7 +80,7 @@ def _patch(
     axes.set_facecolor(NOTHING)
     drawn = axes.imshow(shown, cmap="bone", extent=(x[0], x[-1], y[0], y[-1]), origin="lower",
                         norm=Normalize(low, top))  # fmt: skip
-    figure.colorbar(drawn, ax=axes, label="height (mm)", shrink=0.8)
+    axes.figure.colorbar(drawn, ax=axes, label="height (mm)", shrink=0.8)
     half_x, half_y = sensor.half_mm
     corners = np.array([(-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y)])
     outline = touch.on_surface(corners)
@@ -108,9 +105,10 @@ def _heights_under(
     return (x, y), lowest
 
 
-def _image(figure: Figure, axes: Axes, values: Array, sensor: SensorType, label: str) -> None:
+def draw_image(axes: Axes, values: Array, sensor: SensorType, label: str) -> None:
+    """Draw an image (rows, columns) in the sensor frame, with a dot at tactel (0, 0)."""
     half_x, half_y = sensor.half_mm
     heat = Normalize(0.0, max(float(values.max()), 1e-9))
     axes.imshow(values, cmap=HEAT, norm=heat, extent=(-half_x, half_x, -half_y, half_y))
     axes.plot(-half_x, half_y, "o", color=MARK, markersize=5, clip_on=False)
-    figure.colorbar(ScalarMappable(heat, HEAT), ax=axes, label=label, shrink=0.8)
+    axes.figure.colorbar(ScalarMappable(heat, HEAT), ax=axes, label=label, shrink=0.8)

@@ -59,11 +59,8 @@ def open_hdf5(
     `live`: also one that its writer left open, the values that were flushed are read; `damaged`: in
     whatever state, if the library can, parts may be missing.
 
-    Raises
-    ------
-    RecordingError
-        No such file, no HDF5 file, truncated, not closed, damaged; it leads to another file, or
-        claims more values than it can hold.
+    Raises RecordingError: no such file, no HDF5 file, truncated, not closed, damaged; it leads to
+    another file, or claims more values than it can hold.
     """
     import h5py
 

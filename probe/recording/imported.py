@@ -31,7 +31,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.foreign import DAMAGE, foreign_bytes, foreign_member, open_regular
-from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
+from encoded_objects.base.sensor_type import (
+    SensorType,
+    choose_sensor_type,
+    sensor_type_text,
+    shipped_like,
+)
 from probe.errors import RecordingError
 from probe.frame import WRIST
 from probe.recording.files import check_name, explain_errors
@@ -179,21 +184,13 @@ def _choose_array(
     here = ", ".join(f"{found.name} {found.shape}" for found in (images or arrays)) or "nothing"
     if not images:
         cause = f"no array of images (N, {kind.rows}, {kind.columns}) in it, but {here}"
-        fix = f"give the --sensor-type {_types_of(arrays)}, or reshape it first"
+        alike = shipped_like(lambda one: any(array.frames(one.shape) for array in arrays))
+        fix = f"give the --sensor-type {alike or 'whose images they are'}, or reshape it first"
     elif name is None:
         cause, fix = f"several arrays of images in it: {here}", "say which by --dataset NAME"
     else:
         cause, fix = f"no array of images '{name}' in it, but {here}", "take one of these"
     raise RecordingError(cause, fix=fix, place=path)
-
-
-def _types_of(arrays: list[FileArray]) -> str:
-    """Return the shipped types of which one of the arrays holds images, in words."""
-    from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
-
-    shapes = {name: sensor_type_named(name).shape for name in shipped_names()}
-    alike = [n for n, shape in shapes.items() if any(one.frames(shape) for one in arrays)]
-    return " or ".join(alike) or "whose images they are"
 
 
 def _images(

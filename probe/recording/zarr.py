@@ -103,10 +103,7 @@ class ZarrArray:
 def store_arrays(path: Path) -> Iterator[tuple[str, ZarrArray]]:
     """Yield the arrays of numbers of a store that may be images, with their names.
 
-    Raises
-    ------
-    RecordingError
-        It is of another format, damaged, or claims more than is read.
+    Raises RecordingError: it is of another format, damaged, or claims more than is read.
     """
     if (path / "zarr.json").exists():
         fix = "write it as Zarr format 2, which FTP-1 has"

@@ -23,12 +23,13 @@ from generator.database.read import find_object, list_objects, object_names, rea
 from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
 from generator.database.transaction import read_transaction
 from probe.errors import SurfaceError
+from probe.scan import surface_to_sensor
 from probe.simulate.scene import Scene
 from probe.simulate.written import part_mesh, round_part
 from probe.surface.body import symbol_triangles, triangulate
 from probe.surface.contract import HeightMap
 from probe.surface.face import FaceSurface, LatticeSurface, list_lookup, template
-from probe.surface.mesh import MeshSurface, mesh
+from probe.surface.mesh import MeshSurface, mesh, transform_points
 from probe.surface.polygon import polygon
 from probe.surface.symbols import Relief, SymbolReliefs, emboss
 
@@ -69,12 +70,6 @@ def scene_of_face(database: str, held: RegisteredObject, face: str = "") -> Scen
         fix="make it again with --format stl",
         place=database,
     )
-
-
-def registered_part_surface(path: Path, database: str, face: str) -> Scene:
-    """Return the surface of a registered part; see `target.part_surface`."""
-    held, part = _registered_part(database, path)
-    return scene_of_part(path, held, part, face)
 
 
 def scene_of_part(path: Path, held: RegisteredObject, part: RegisteredPart, face: str) -> Scene:
@@ -151,7 +146,7 @@ def face_of(held: RegisteredObject, name: str = "") -> RegisteredFace:
     )
 
 
-def _registered_part(database: str, path: Path) -> tuple[RegisteredObject, RegisteredPart]:
+def registered_part(database: str, path: Path) -> tuple[RegisteredObject, RegisteredPart]:
     """Return the part that a file holds: of this path, or else of this file name."""
     stated = part_file(normal_url(database), str(path))
     known = [(name, part) for name, part in registered_parts(database) if part.format == "stl"]
@@ -184,7 +179,7 @@ def _face_up(held: RegisteredObject, part: RegisteredPart, name: str) -> Registe
 
 
 def _surface(held: RegisteredObject, face: RegisteredFace) -> FaceSurface:
-    symbols = _symbols(held)
+    symbols = symbols_of(held)
     lattice = None
     cells = held.layout.faces[face.face_id]
     if face.placement is not None and len(cells.labels):
@@ -198,7 +193,7 @@ def _surface(held: RegisteredObject, face: RegisteredFace) -> FaceSurface:
     return FaceSurface(lattice, polygon(face.polygon_mm), _surrounding_mesh(held, face, symbols))
 
 
-def _symbols(held: RegisteredObject) -> SymbolReliefs:
+def symbols_of(held: RegisteredObject) -> SymbolReliefs:
     """Return the symbols of an object's alphabet in its relief."""
     style = held.style
     relief = Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
@@ -224,20 +219,21 @@ def _surrounding_mesh(
         if T[2, 2] > FLAT:
             # Corners come from the object, so that neighbours share them to the last bit.
             loops = held.polyhedron.faces[other.face_id].loops
-            corners = _transform_points(held.polyhedron.vertices, T_face_object)
+            corners = transform_points(held.polyhedron.vertices, T_face_object)
             numbers = np.concatenate([np.array(loop) for loop in loops])
             found.append(corners[numbers[triangulate(other.polygon_mm)]])
         if other.placement is None or T[2, 2] < -0.5:
             continue
         cells = held.layout.faces[other.face_id]
-        at = _transform_points(np.c_[cells.centres_mm, np.zeros(len(cells.labels))], T)
+        at = transform_points(np.c_[cells.centres_mm, np.zeros(len(cells.labels))], T)
         reach = math.hypot(symbols.foot_half_mm * math.sqrt(2), symbols.relief.height_mm)
         near = (at[:, 2] + reach > -DEEPEST_MM) & (
             (at[:, :2] > low - BEYOND_MM) & (at[:, :2] < high + BEYOND_MM)
         ).all(axis=1)
-        turn = _rotation_about_z(-other.placement.rotation_rad)
+        turn, turned = surface_to_sensor(0.0, 0.0, -other.placement.rotation_rad), np.eye(4)
+        turned[:3, :3] = T[:3, :3] @ turn[:3, :3]
         for label in np.unique(cells.labels[near]):
-            solid = _transform_points(symbol_triangles(symbols, int(label)), T[:3, :3] @ turn)
+            solid = transform_points(symbol_triangles(symbols, int(label)), turned)
             here = at[near & (cells.labels == label)]
             found.append((here[:, None, None] + solid).reshape(-1, 3, 3))
     if not found:
@@ -248,16 +244,3 @@ def _surrounding_mesh(
     ab, ac = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     seen = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] > 0
     return mesh(corners[seen], place=held.entry.name) if seen.any() else None
-
-
-def _transform_points(points: NDArray[Any], T: NDArray[Any]) -> Array:
-    """Return points (..., 3) turned by T (3, 3), or moved by T (4, 4); the same bits anywhere."""
-    x, y, z = np.moveaxis(points, -1, 0)
-    shift = T[:3, 3] if T.shape == (4, 4) else np.zeros(3)
-    rows = [T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + shift[i] for i in range(3)]
-    return np.stack(rows, axis=-1)
-
-
-def _rotation_about_z(angle_rad: float) -> Array:
-    c, s = math.cos(angle_rad), math.sin(angle_rad)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

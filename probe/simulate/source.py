@@ -71,12 +71,8 @@ def options_of(
 ) -> tuple[dict[str, float], SimulatedSensor]:
     """Read options from text: the numbers (x, y, theta only where given) and the sensor.
 
-    Raises
-    ------
-    SurfaceError
-        Naming what is unknown or no number, and what is allowed.
-    ContactError
-        When the accuracy is none of the overlay's levels.
+    Raises SurfaceError: naming what is unknown or no number, and what is allowed; ContactError:
+    when the accuracy is none of the overlay's levels.
     """
     numbers = dict(_DEFAULTS)
     for name, text in values.items():

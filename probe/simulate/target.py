@@ -74,9 +74,9 @@ def part_surface(file: str | os.PathLike[str], *, database: str = "", face: str 
     """
     path = Path(file)
     if database:
-        from probe.simulate.registered import registered_part_surface  # loads the database
+        from probe.simulate.registered import registered_part, scene_of_part  # loads the database
 
-        return registered_part_surface(path, database, face)
+        return scene_of_part(path, *registered_part(database, path), face)
     from probe.simulate.written import part_mesh
 
     surface = part_mesh(path)

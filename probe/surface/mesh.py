@@ -13,6 +13,7 @@ import ctypes
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -85,11 +86,7 @@ def mesh(
     """
     corners, outward, across = _read_triangles(triangles_mm, place)
     if T_surface_part is not None:
-        # Term by term: the same corner gives the same bits in all its triangles.
-        T = np.asarray(T_surface_part, dtype=np.float64)
-        x, y, z = np.moveaxis(corners, -1, 0)
-        rows = [T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3] for i in range(3)]
-        corners = np.stack(rows, axis=-1)
+        corners = transform_points(corners, np.asarray(T_surface_part, dtype=np.float64))
     a, b, c = (corners[:, i, :2] for i in range(3))
     solid = corners
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
@@ -108,6 +105,13 @@ def mesh(
     order = np.lexsort((corners[:, :, 1], corners[:, :, 0]), axis=1)
     rising = np.take_along_axis(corners, order[:, :, None], axis=1)
     return MeshSurface(rising, level[seen], solid)
+
+
+def transform_points(points: NDArray[Any], T: NDArray[Any]) -> Array:
+    """Return points (..., 3) moved by T (4, 4), term by term: the same bits in every triangle."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    rows = [T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3] for i in range(3)]
+    return np.stack(rows, axis=-1)
 
 
 FOLDER = Path(__file__).parent

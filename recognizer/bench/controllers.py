@@ -76,10 +76,7 @@ def cancel_calibration(session: Session) -> None:
 def use_calibration(session: Session, name: str) -> None:
     """Read newtons by a calibration of the folder; counts if the name is empty.
 
-    Raises
-    ------
-    CalibrationError
-        It is none, or another sensor's.
+    Raises CalibrationError: it is none, or another sensor's.
     """
     with session.changed():
         found = None
@@ -92,10 +89,7 @@ def use_calibration(session: Session, name: str) -> None:
 def flip_images(session: Session, changes: str) -> None:
     """Read images with changes undone, as `columns,values`; empty: as they come.
 
-    Raises
-    ------
-    WiringError
-        A change that is none, or that does not fit the sensor.
+    Raises WiringError: a change that is none, or that does not fit the sensor.
     """
     wiring = wiring_named(changes)
     wiring.check(session.sensor.shape)
@@ -175,10 +169,7 @@ def _learn(session: Session, reader: Reader, images: list[Any]) -> None:
 def use_learned(session: Session, name: str) -> None:
     """Read by what was learned, a file of the folder; by the sensor's type if it is empty.
 
-    Raises
-    ------
-    SensorStateError
-        The file is no state of this sensor.
+    Raises SensorStateError: the file is no state of this sensor.
     """
     state, learned = None, None
     if name:
@@ -205,10 +196,7 @@ class PrintController:
     def estimate(self, after: int, material: str) -> dict[str, Any]:
         """Estimate the print from all touches after the one of a number.
 
-        Raises
-        ------
-        AsBuiltError
-            The touches do not suffice.
+        Raises AsBuiltError: the touches do not suffice.
         """
         session = self._session
         known = _reader(session)
@@ -233,10 +221,7 @@ class PrintController:
     def store(self) -> dict[str, Any]:
         """Keep the estimate in the database; later poses are corrected by it.
 
-        Raises
-        ------
-        DatabaseError
-            The database cannot be written.
+        Raises DatabaseError: the database cannot be written.
         """
         with self._lock:
             if not self._found:

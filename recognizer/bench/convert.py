@@ -35,12 +35,8 @@ def convert_recording(
 
     The copy takes at most `room` bytes.
 
-    Raises
-    ------
-    RecordingError, BenchError
-        It is none, or too long to be played; it takes more memory, time or room than it may.
-    BusyError
-        `ending` says that the server ends.
+    Raises RecordingError, BenchError: it is none, or too long to be played; it takes more memory,
+    time or room than it may; BusyError: `ending` says that the server ends.
     """
     seconds = min(_MOST_S, _LEAST_S + _SECONDS_MB * sent.stat().st_size / 1e6)
     try:

@@ -48,10 +48,7 @@ _WAITING: list[Popen[bytes]] = []  #: a process that has loaded `LOADS`, for the
 def part_settings() -> dict[str, Any]:
     """Return what a page may ask for: the schema of specs.
 
-    Raises
-    ------
-    BenchError
-        `encode-object` fails; says why.
+    Raises BenchError: `encode-object` fails; says why.
     """
     return _ask("schema", longest_s=SHORT_S)
 
@@ -163,10 +160,7 @@ def face_promises(
 
     Faces of which nothing is said are left out.
 
-    Raises
-    ------
-    BenchError
-        `encode-object` fails; says why.
+    Raises BenchError: `encode-object` fails; says why.
     """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "sensor.yaml")
@@ -203,12 +197,8 @@ def _ask(
 ) -> dict[str, Any]:
     """Run the command in a folder; return what it prints as JSON.
 
-    Raises
-    ------
-    BenchError
-        It refuses what it is given, or takes more than it may.
-    BusyError
-        The server ends, or nobody waits any more.
+    Raises BenchError: it refuses what it is given, or takes more than it may; BusyError: the server
+    ends, or nobody waits any more.
     """
 
     def given_up() -> bool:

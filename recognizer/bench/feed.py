@@ -265,12 +265,8 @@ class ReplayFeed(Feed):
 def playable_blocks(recording: Recording, ending: Callable[[], bool]) -> Iterator[FrameBlock]:
     """Yield all blocks of a recording that is short enough to be played.
 
-    Raises
-    ------
-    BenchError
-        It is too long; nothing was read.
-    BusyError
-        `ending` says that the server ends.
+    Raises BenchError: it is too long; nothing was read; BusyError: `ending` says that the server
+    ends.
     """
     frames = len(recording)
     if frames > MOST_FRAMES or frames * prod(recording.shape) > MOST_VALUES:

@@ -130,10 +130,7 @@ class PageGuide:
     def calibration(self) -> Calibration:
         """Return the laws.
 
-        Raises
-        ------
-        BusyError, CalibrationError
-            Loads are missing, or do not determine the laws.
+        Raises BusyError, CalibrationError: loads are missing, or do not determine the laws.
         """
         if not self.guide.done:
             raise BusyError("loads are missing", fix="read every load first")
@@ -165,10 +162,7 @@ def page_guide(
 ) -> PageGuide:
     """Return the guide for loads that are read for some seconds each.
 
-    Raises
-    ------
-    BenchError
-        Loads or seconds that are none.
+    Raises BenchError: loads or seconds that are none.
     """
     low, high = LOAD_S
     if not low <= seconds <= high:

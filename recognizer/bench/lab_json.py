@@ -20,8 +20,8 @@ from generator.database import tables
 from generator.database.read import list_objects, read_object
 from generator.database.registered import RegisteredFace, RegisteredObject
 from generator.database.transaction import of_rows
+from probe.simulate.registered import symbols_of
 from probe.surface.body import symbol_triangles, triangulate
-from probe.surface.symbols import Relief, emboss
 from recognizer.touch.lab import EmbossedArray, Lab
 
 Array = NDArray[np.float64]
@@ -49,10 +49,7 @@ def objects_json(connection: Connection) -> list[dict[str, Any]]:
 def object_json(connection: Connection, name: str) -> dict[str, Any]:
     """Return an object as solid and symbols.
 
-    Raises
-    ------
-    DatabaseError
-        No object has this name.
+    Raises DatabaseError: no object has this name.
     """
     held = read_object(connection, name)
     return {
@@ -207,12 +204,9 @@ def _mesh_json(held: RegisteredObject, face: RegisteredFace) -> dict[str, Any]:
 
 def _glyphs(held: RegisteredObject) -> list[list[float]]:
     """Return the triangles of every label's symbol, corner after corner."""
-    style = held.style
-    relief = Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
-    glyphs = held.alphabet["glyphs"]
-    strokes = tuple(tuple((tuple(a), tuple(b)) for a, b in glyph["strokes"]) for glyph in glyphs)
-    symbols = emboss(strokes, held.alphabet["reach"] * style.pitch_mm, relief)
-    return [_rounded(symbol_triangles(symbols, label).ravel()) for label in range(len(strokes))]
+    symbols = symbols_of(held)
+    labels = range(len(symbols.rings))
+    return [_rounded(symbol_triangles(symbols, label).ravel()) for label in labels]
 
 
 def _drawings(

@@ -244,10 +244,7 @@ class RecognitionThread:
     def use_state(self, state: SensorState | None) -> None:
         """Read by what was learned of the sensor from now on; None: by its type alone.
 
-        Raises
-        ------
-        SensorStateError
-            It is a state of another sensor.
+        Raises SensorStateError: it is a state of another sensor.
         """
         if self.reader is not None:
             self.reader = replace(self.reader, state=state)

@@ -47,10 +47,7 @@ _TOKEN = re.compile(r"[A-Za-z0-9_-]{12,200}")
 def serve(options: BenchOptions) -> int:
     """Serve until interrupted; returns the exit code.
 
-    Raises
-    ------
-    BenchError, DatabaseError, ProbeError
-        An option cannot be met.
+    Raises BenchError, DatabaseError, ProbeError: an option cannot be met.
     """
     if options.token and not _TOKEN.fullmatch(options.token):
         raise BenchError(

@@ -96,10 +96,8 @@ class Session:
     def open(self, url: str, sensor: int | None = None) -> None:
         """Read another port.
 
-        Raises
-        ------
-        BenchError, PortError, RecordingError, SensorTypeError
-            The URL cannot be read, names no recording, or one of another sensor type.
+        Raises BenchError, PortError, RecordingError, SensorTypeError: the URL cannot be read, names
+        no recording, or one of another sensor type.
         """
         replay = self._read_recording(url) if url.startswith("file:") else None
         with self.changed():
@@ -192,10 +190,7 @@ class Session:
     def record(self, *, on: bool) -> None:
         """Start or end a recording.
 
-        Raises
-        ------
-        BusyError, RecordingError
-            There is nothing to record, or no place for it.
+        Raises BusyError, RecordingError: there is nothing to record, or no place for it.
         """
         with self.changed():
             if on:

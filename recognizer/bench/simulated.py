@@ -85,10 +85,8 @@ class PressSequence:
     def touch(self, scene: Scene, touch: Touch) -> None:
         """Come down on a surface, hold, and lift.
 
-        Raises
-        ------
-        ContactError, BenchError
-            The touch has no equilibrium, or a force that no operator would use.
+        Raises ContactError, BenchError: the touch has no equilibrium, or a force that no operator
+        would use.
         """
         if not 0 < touch.force_n <= LARGEST_N:
             raise BenchError(
@@ -144,10 +142,7 @@ class PressSequence:
 class TouchProbe:
     """The simulated probe, running, over the objects of a database; `url` is its serial line.
 
-    Raises
-    ------
-    BenchError
-        An option is unknown or no number.
+    Raises BenchError: an option is unknown or no number.
     """
 
     def __init__(self, url: str, database: str, sensor: SensorType) -> None:
@@ -166,10 +161,7 @@ class TouchProbe:
     ) -> None:  # fmt: skip
         """Touch a face at (x, y), face frame.
 
-        Raises
-        ------
-        SurfaceError, ContactError, BenchError
-            There is no such face, or no such touch.
+        Raises SurfaceError, ContactError, BenchError: there is no such face, or no such touch.
         """
         if not all(map(math.isfinite, (x_mm, y_mm, theta_deg, force_n))):
             raise BenchError("a touch at what is no number", fix="give mm, degrees and N")

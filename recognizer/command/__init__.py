@@ -13,7 +13,6 @@
     learning      the sensor, learned from the touches and kept
     answers       an answer as text and as JSON
     ros, publish  answers as ROS 2 messages: into a file, over the network
-    picture       a touch with its symbols, the window, the object
     as_built      recognize-object as-built
     check         recognize-object check
 

@@ -90,10 +90,7 @@ def learning_for(
 
     It is kept in the file `learn`, and begun by it if it is there; `state` is one to read by alone.
 
-    Raises
-    ------
-    SensorStateError
-        The file is no state of this sensor, or there is no folder for it.
+    Raises SensorStateError: the file is no state of this sensor, or there is no folder for it.
     """
     known = state or (learn if learn is not None and learn.exists() else None)
     if learn is not None and not learn.parent.is_dir():

@@ -23,10 +23,8 @@ def source_at(
 ) -> TouchSource:
     """Return the source of touches behind a port.
 
-    Raises
-    ------
-    PortError, RecordingError, CalibrationError
-        The URL is none, or its recording or the calibration cannot be read.
+    Raises PortError, RecordingError, CalibrationError: the URL is none, or its recording or the
+    calibration cannot be read.
     """
     address = address_of(url)
     if address.scheme == "file":
@@ -54,10 +52,8 @@ def listen(
 ) -> Iterator[Iterator[Frame]]:
     """Yield the frames of a port until it ends or `interrupted` is set; closes it afterwards.
 
-    Raises
-    ------
-    PortError, CalibrationError
-        The probe is not there, or went away for good; the calibration is another sensor's.
+    Raises PortError, CalibrationError: the probe is not there, or went away for good; the
+    calibration is another sensor's.
     """
     from probe.calibration import read_calibration
     from probe.client.client import Client, name_of

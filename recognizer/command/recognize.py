@@ -60,12 +60,8 @@ TRIED = 6  #: refused touches, none answered, after which the wiring is checked
 def recognize_touches(options: RecognizeOptions) -> int:
     """Read touches and print answers; returns the exit code.
 
-    Raises
-    ------
-    RecordingError, PortError, CalibrationError
-        The recording, port or calibration cannot be read.
-    DatabaseError, LabError
-        The database cannot be read, or holds no encoded object.
+    Raises RecordingError, PortError, CalibrationError: the recording, port or calibration cannot be
+    read; DatabaseError, LabError: the database cannot be read, or holds no encoded object.
     """
     if options.plot is not None:
         _refuse_pictures(options.plot, replace=options.replace)
@@ -346,7 +342,7 @@ def _draw_all(
 
 
 def _draw(reader: Reader, source: TouchSource, answer: Answer, path: Path) -> None:
-    from recognizer.command.picture import touch_picture
+    from recognizer.picture import touch_picture
 
     pose = None if answer.in_base is None else answer.in_base.T_robot_object
     with staged_file(path) as draft:

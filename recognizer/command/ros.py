@@ -43,10 +43,8 @@ ANSWER_TOPIC: Final = "/touch/answer"
 class McapSink(AnswerSink):
     """An MCAP file of images and answers; it appears when it is closed.
 
-    Raises
-    ------
-    EncodedObjectsError, MissingExtraError
-        A file is there already, or the extra `robot` is not installed.
+    Raises EncodedObjectsError, MissingExtraError: a file is there already, or the extra `robot` is
+    not installed.
     """
 
     def __init__(self, out: Path, origin: RecordingOrigin, *, replace: bool) -> None:

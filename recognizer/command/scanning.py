@@ -46,10 +46,7 @@ def belief_for(reader: Reader, method: str) -> Scan | ThesisScan:
 def refuse_single(touches: Iterable[TouchImage], place: str, needed: int) -> Iterator[TouchImage]:
     """Return touches, of which there must be two.
 
-    Raises
-    ------
-    ScanError
-        A recording of one touch.
+    Raises ScanError: a recording of one touch.
     """
     rest = iter(touches)
     first = list(islice(rest, 2))
@@ -70,10 +67,7 @@ def sensor_pose(
 
     Joint angles count, with their standard deviation; else the recorded pose, taken as exact.
 
-    Raises
-    ------
-    PoseError
-        Angles or readings of the wrist that no arm can have.
+    Raises PoseError: angles or readings of the wrist that no arm can have.
     """
     if joints_deg is None and touch.pose is None:
         return None
@@ -94,12 +88,7 @@ def pose_during(
 ) -> SensorPose | ArrayLike | None:
     """Return the pose of the sensor during a touch of a scan, numbered from 1.
 
-    Raises
-    ------
-    ScanError
-        Angles for fewer touches than there are.
-    PoseError
-        See `sensor_pose`.
+    Raises ScanError: angles for fewer touches than there are; PoseError: see `sensor_pose`.
     """
     if not joints_deg:
         return touch.pose
@@ -114,10 +103,7 @@ def pose_during(
 def read_joints(path: Path) -> Joints:
     """Return the angles (degrees) of a text file, a line of five for every touch.
 
-    Raises
-    ------
-    ScanError
-        It cannot be read, or a line holds something else.
+    Raises ScanError: it cannot be read, or a line holds something else.
     """
     content = foreign_bytes(path, ScanError, most=MOST_TEXT, fix="give a text file of joint angles")
     lines = content.decode("utf-8", "replace").splitlines()

@@ -76,10 +76,7 @@ BenchmarkReader = Callable[[ReaderWorld], Read]
 def reader_named(name: str) -> BenchmarkReader:
     """Return a reader by its name here, or as `module:function`.
 
-    Raises
-    ------
-    ValidationError
-        There is none of that name.
+    Raises ValidationError: there is none of that name.
     """
     if name in READERS:
         return READERS[name]

@@ -205,10 +205,7 @@ def _touchable(campaign: Campaign, named: bool) -> Campaign:
 def shares_of(text: str, allowed: tuple[str, ...], option: str) -> Shares:
     """Read `face=2,edge` from an option: names with their weights, 1 where none is given.
 
-    Raises
-    ------
-    ValidationError
-        For a name that is not allowed, or weights that are no shares.
+    Raises ValidationError: for a name that is not allowed, or weights that are no shares.
     """
     found: dict[str, float] = {}
     for item in filter(None, (part.strip() for part in text.split(","))):

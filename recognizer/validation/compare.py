@@ -27,10 +27,8 @@ SAME, BETTER, WORSE = "same within chance", "better", "worse"
 def read_finished(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return results and times of a folder's run.
 
-    Raises
-    ------
-    ValidationError
-        The folder holds no run that is done, or its results are of another version.
+    Raises ValidationError: the folder holds no run that is done, or its results are of another
+    version.
     """
     results, times = _read_json(folder, RESULTS), _read_json(folder, TIMES_FILE)
     if results.get("format") != FORMAT:

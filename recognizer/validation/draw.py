@@ -159,10 +159,7 @@ class DrawnTouch:
 def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
     """Return what is touched in a trial, and the reading.
 
-    Raises
-    ------
-    ValidationError
-        The set has no face of the plan's kind.
+    Raises ValidationError: the set has no face of the plan's kind.
     """
     rng = np.random.default_rng([plan.seed, number])
     ranges = plan.ranges(reader.sensor)
@@ -197,10 +194,7 @@ def draw_again(
 ) -> DrawnTouch:
     """Return what the sensor of a touch reads of the same surface at another place.
 
-    Raises
-    ------
-    ContactError
-        The plate does not come to rest there, or on another face.
+    Raises ContactError: the plate does not come to rest there, or on another face.
     """
     counts = _read(plan, before.contact.scene, touch, before.sensor, reader, rng)
     return DrawnTouch(before.contact, touch, counts, before.sensor)
@@ -323,9 +317,7 @@ def _exchanged(
     number = EXCHANGED[plan.kind]
     for _ in range(DRAWS):
         touch = _draw_on_face(plan, scene, most, rng, ranges)
-        c, s = math.cos(touch.theta_rad), math.sin(touch.theta_rad)
-        own = (face.centres_mm - (touch.x_mm, touch.y_mm)) @ np.array([[c, -s], [s, c]])
-        whole = np.flatnonzero((np.abs(own) < inside).all(axis=1))
+        whole = np.flatnonzero((np.abs(touch.on_sensor(face.centres_mm)) < inside).all(axis=1))
         if len(whole) >= number:
             break
     chosen = rng.permutation(whole)[:number]

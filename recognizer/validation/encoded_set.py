@@ -57,10 +57,7 @@ def make_parts(specs: list[Path], folder: Path, database: str, sensor_type: str 
     touches. `sensor_type` is the file of the type that will touch the parts; empty: as the specs
     say.
 
-    Raises
-    ------
-    SetError
-        What `encode-object` says, with its exit code.
+    Raises SetError: what `encode-object` says, with its exit code.
     """
     command = [sys.executable, "-c", "from generator.command import main; main()"]
     command += [*map(str, specs), "-o", str(folder), "--database", database]
@@ -98,10 +95,7 @@ def _says_lab_key(spec: Path) -> bool:
 def members_of(database: str) -> list[dict[str, Any]]:
     """Return the objects of a database as provenance names them: `array` is profile and size.
 
-    Raises
-    ------
-    SetError
-        The database cannot be read.
+    Raises SetError: the database cannot be read.
     """
     return [
         {
@@ -142,12 +136,8 @@ def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: in
 
     `seed` draws the objects of other labs.
 
-    Raises
-    ------
-    ValidationError
-        Two objects are to lie side by side and there is one.
-    SetError
-        They cannot be made.
+    Raises ValidationError: two objects are to lie side by side and there is one; SetError: they
+    cannot be made.
     """
     members = members_of(database)
     if {SIDE, DECOY} & set(kinds) and len(members) < 2:

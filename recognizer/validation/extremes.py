@@ -82,22 +82,33 @@ SCENES: tuple[ExtremeScene, ...] = (
 )  # fmt: skip
 
 
+def extremes(reader: Reader) -> list[dict[str, Any]]:
+    """Return the table of stiff and extreme cases: the outcome of each, and whether it passes."""
+    return [*press_scenes(), *_read_images(reader)]
+
+
 def press_scenes() -> Iterator[dict[str, Any]]:
-    """Press every scene with both overlays; yield its outcome, and whether it passes."""
+    """Press every scene with both overlays."""
     for kind in ("tab", "pad"):
         for scene in SCENES:
             overlay = replace(Overlay(kind=kind), **scene.overlay)
             outcome, detail, off = _press(scene, SensorType(overlay=overlay))
-            balanced = off <= BALANCE
-            yield {
-                "part": f"contact, {kind}",
-                "case": scene.name,
-                "expected": scene.expected,
-                "outcome": outcome,
-                "told": detail,
-                "out_of_balance": None if balanced else round_digits(off, 2),
-                "passes": outcome in scene.expected and balanced,
-            }
+            yield _line(f"contact, {kind}", scene.name, scene.expected, outcome, detail, off)
+
+
+def _line(
+    part: str, case: str, expected: str, outcome: str, told: str, off: float = 0.0
+) -> dict[str, Any]:
+    balanced = off <= BALANCE
+    return {
+        "part": part,
+        "case": case,
+        "expected": expected,
+        "outcome": outcome,
+        "told": told,
+        "out_of_balance": None if balanced else round_digits(off, 2),
+        "passes": outcome in expected and balanced,
+    }
 
 
 def _press(scene: ExtremeScene, sensor: SensorType) -> tuple[str, str, float]:
@@ -129,21 +140,10 @@ def _images(shape: tuple[int, int]) -> Iterator[tuple[str, NDArray[np.float64]]]
     yield "counts of 1e12", rng.uniform(0, 1e12, shape)
 
 
-def read_images(reader: Reader) -> Iterator[dict[str, Any]]:
-    """Show the reader strange images; yield the outcome of each, and whether it passes."""
+def _read_images(reader: Reader) -> Iterator[dict[str, Any]]:
+    """Show the reader strange images."""
     for name, image in _images((reader.sensor.rows, reader.sensor.columns)):
         answer = recognise(reader, reader.signal(image))
-        yield {
-            "part": "reader",
-            "case": name,
-            "expected": NO_ANSWER,
-            "outcome": FINITE if answer else NO_ANSWER,
-            "told": f"{answer.object}/{answer.face}" if answer else answer.reason,
-            "out_of_balance": None,
-            "passes": not answer,
-        }
-
-
-def extremes(reader: Reader) -> list[dict[str, Any]]:
-    """Return the table of stiff and extreme cases."""
-    return [*press_scenes(), *read_images(reader)]
+        outcome = FINITE if answer else NO_ANSWER
+        told = f"{answer.object}/{answer.face}" if answer else answer.reason
+        yield _line("reader", name, NO_ANSWER, outcome, told)

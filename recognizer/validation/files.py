@@ -100,10 +100,7 @@ def read_series(folder: Path, series: Series, what: str = SHARDS) -> pa.Table:
 
     Columns of `ADDED` that an earlier version did not write hold nothing.
 
-    Raises
-    ------
-    ValidationError
-        The files lack another column.
+    Raises ValidationError: the files lack another column.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

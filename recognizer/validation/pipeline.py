@@ -248,10 +248,7 @@ def validate(
 def report_again(folder: Path) -> ValidationResult:
     """Write results and report of a run again.
 
-    Raises
-    ------
-    ValidationError
-        The run is not there, or not done.
+    Raises ValidationError: the run is not there, or not done.
     """
     require_report("validate-set report")
     work, start = read_record(folder), time.monotonic()

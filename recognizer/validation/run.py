@@ -53,10 +53,7 @@ FORMAT = 2  #: of the record; another one is refused
 def read_record(folder: Path) -> Work:
     """Return the work of a folder's run.
 
-    Raises
-    ------
-    ValidationError
-        The folder holds no run, or one of another version.
+    Raises ValidationError: the folder holds no run, or one of another version.
     """
     path = folder / RECORD
     try:
@@ -171,12 +168,8 @@ def prepare_run(
 
     Without specs the set is what the database holds; an empty `database` is one in the folder.
 
-    Raises
-    ------
-    ValidationError
-        The folder holds another run, or one that is not to be resumed.
-    SetError
-        The set cannot be made or read.
+    Raises ValidationError: the folder holds another run, or one that is not to be resumed;
+    SetError: the set cannot be made or read.
     """
     before = read_record(folder) if (folder / RECORD).exists() else None
     if before is not None and not resume:

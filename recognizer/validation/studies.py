@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decoder import Decodings, Likelihood, decode_exact, decode_good_tuple
+from encoded_objects.base.sensor_type import SensorType
 from generator.array import FoldedArray
 from generator.database.open import open_database
 from generator.database.read import object_names, read_object
@@ -29,7 +30,7 @@ from probe.contact.tips import Tips, tip_points
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
 from recognizer.validation.campaign import Campaign, series_of, settings_of
-from recognizer.validation.draw import draw_touch
+from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.files import LIMITS, TIMES, columns_of, read_series
 from recognizer.validation.limits import alphabets_of, line_of_limits
 from recognizer.validation.results import line_of
@@ -56,14 +57,6 @@ class Study:
         """Add a line and its time."""
         self.counted.append(line)
         self.spent.append(ms)
-
-    def add_avoided(
-        self, what: str, needed: int, of: int, unit: str,
-        ms: float | None = None, whole_ms: float | None = None,
-    ) -> None:  # fmt: skip
-        """Add a line: how much one touch looks at, out of how much, and the CPU time of both."""
-        self.counted.append({"what": what, "needed": needed, "of": of, "unit": unit})
-        self.spent += [None if t is None else float(f"{t:.3g}") for t in (ms, whole_ms)]
 
 
 def contact_study() -> Study:
@@ -159,6 +152,10 @@ def _decoders(encoding: EmbossedArray) -> Iterator[tuple[str, Callable[[Ints], D
     yield "likelihood, registered cells", Likelihood(array, prior=prior).decode
 
 
+#: Work that is avoided: what, how much is needed, of how much, its unit, CPU time of both, ms.
+Avoided = tuple[str, int, int, str, float | None, float | None]
+
+
 def work_avoided(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
     """Return the work that is avoided for a touch of a registered face.
 
@@ -166,82 +163,69 @@ def work_avoided(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
     reader as it is, and the last spends most.
     """
     study = Study()
-    _add_objects(study, reader)
-    _add_heights(study, plan, reader)
-    _add_levels(study, reader)
-    _add_triangles(study, plan, reader)
-    for encoding in reader.lab.arrays:
-        rows, columns = encoding.array.rows, encoding.array.columns
-        study.add_avoided(
-            "Places that an answer may name: only those that were made, of all "
-            f"{rows} x {columns} of the array", len(encoding.keys), rows * columns, "places",
-        )  # fmt: skip
-    if readers.counted:
-        tried, most = (readers.counted[k]["settings"]["candidates"] for k in (0, -1))
-        study.add_avoided(
-            "Ways to read the touch that are tried out: the likeliest ones; more only where these "
-            "give no answer", tried, most, "ways", readers.spent[0], readers.spent[-1],
-        )  # fmt: skip
+    for what, needed, of, unit, *spent in _avoided(reader, plan, readers):
+        study.counted.append({"what": what, "needed": needed, "of": of, "unit": unit})
+        study.spent += [None if ms is None else float(f"{ms:.3g}") for ms in spent]
     return study
 
 
-def _add_objects(study: Study, reader: Reader) -> None:
+def _avoided(reader: Reader, plan: TouchPlan, readers: Study) -> Iterator[Avoided]:
+    found, sensor = draw_touch(plan, 0, reader), reader.sensor
+    yield _objects(reader)
+    yield _heights(found, sensor)
+    yield _levels(sensor)
+    triangles = engine_named(plan.engine).triangles
+    if triangles is not None:  # it takes meshes of parts
+        surface = found.contact.scene.under(found.touch).surface
+        counted = triangles(surface, sensor, found.touch)
+        if counted is not None:
+            what = f"Triangles of the part that engine {plan.engine} gets"
+            yield f"{what}: only those under the sensor", *counted, "triangles", None, None
+    for encoding in reader.lab.arrays:
+        rows, columns = encoding.array.rows, encoding.array.columns
+        what = f"only those that were made, of all {rows} x {columns} of the array"
+        what, needed = f"Places that an answer may name: {what}", len(encoding.keys)
+        yield what, needed, rows * columns, "places", None, None
+    if readers.counted:
+        tried, most = (readers.counted[k]["settings"]["candidates"] for k in (0, -1))
+        what = "the likeliest ones; more only where these give no answer"
+        what, spent = f"Ways to read the touch that are tried out: {what}", readers.spent
+        yield what, tried, most, "ways", spent[0], spent[-1]
+
+
+def _objects(reader: Reader) -> Avoided:
     with read_transaction(open_database(reader.lab.url, writable=False)) as connection:
         names = object_names(connection)
         spent = [_cpu_ms(partial(read_object, connection, name), 1) for name in names[:OBJECTS]]
     one = float(np.median(spent))
     what = "Objects loaded from the database: only the one that is touched"
-    study.add_avoided(what, 1, len(names), "objects", one, one * len(names))
+    return what, 1, len(names), "objects", one, one * len(names)
 
 
-def _add_heights(study: Study, plan: TouchPlan, reader: Reader) -> None:
-    found = draw_touch(plan, 0, reader)
+def _heights(found: DrawnTouch, sensor: SensorType) -> Avoided:
     scene = found.contact.scene
-    under = found.touch.on_surface(tip_points(reader.sensor, Tips())[0].reshape(-1, 2))
+    under = found.touch.on_surface(tip_points(sensor, Tips())[0].reshape(-1, 2))
     low, high = scene.region.box_mm
-    sensor_area = 4 * reader.sensor.half_mm[0] * reader.sensor.half_mm[1]
-    step = float(np.sqrt(sensor_area / len(under)))
+    step = float(np.sqrt(4 * sensor.half_mm[0] * sensor.half_mm[1] / len(under)))
     x, y = (np.arange(a, b, step) for a, b in zip(low, high, strict=True))
     whole = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     heights = scene.surface.heights_mm
     heights(under)
-    study.add_avoided(
-        "Places where the height of the surface is computed: only under the sensor's tips",
-        len(under),
-        len(whole),
-        "places",
-        _cpu_ms(lambda: heights(under)),
-        _cpu_ms(lambda: heights(whole)),
-    )
+    spent = [_cpu_ms(partial(heights, points)) for points in (under, whole)]
+    what = "Places where the height of the surface is computed: only under the sensor's tips"
+    return what, len(under), len(whole), "places", spent[0], spent[1]
 
 
-def _add_levels(study: Study, reader: Reader) -> None:
-    kind = reader.sensor.overlay.kind
-    chosen = level_for(reader.sensor)
+def _levels(sensor: SensorType) -> Avoided:
+    kind, chosen = sensor.overlay.kind, level_for(sensor)
     lines = {line.level: line for line in table()[kind]}
     finest = [level for level in LEVELS[kind] if level in lines][-1]
-    study.add_avoided(
-        f"Fineness of the simulated contact: {chosen}, the cheapest that is exact enough; "
-        f"the finest is {finest}",
-        LEVELS[kind].index(chosen) + 1,
-        len(lines),
-        "levels",
-        lines[chosen].ms,
-        lines[finest].ms,
-    )
-
-
-def _add_triangles(study: Study, plan: TouchPlan, reader: Reader) -> None:
-    """Add the triangles that the engine gets, if it takes meshes of parts."""
-    triangles = engine_named(plan.engine).triangles
-    if triangles is None:
-        return
-    found = draw_touch(plan, 0, reader)
-    surface = found.contact.scene.under(found.touch).surface
-    counted = triangles(surface, reader.sensor, found.touch)
-    if counted is not None:
-        what = f"Triangles of the part that engine {plan.engine} gets: only those under the sensor"
-        study.add_avoided(what, *counted, "triangles")
+    what = f"Fineness of the simulated contact: {chosen}, the cheapest that is exact enough; "
+    needed = LEVELS[kind].index(chosen) + 1
+    return (
+        f"{what}the finest is {finest}", needed, len(lines), "levels",
+        lines[chosen].ms, lines[finest].ms,
+    )  # fmt: skip
 
 
 def engine_lines() -> list[dict[str, Any]]:

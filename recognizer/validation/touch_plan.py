@@ -97,10 +97,7 @@ class TouchPlan:
 
         Second is how far its inmost point lies from its edges, mm, nearly.
 
-        Raises
-        ------
-        SetError
-            As `written_surface`.
+        Raises SetError: as `written_surface`.
         """
         prints = "" if lab else self.prints
         return _face_of_run(lab or self.database, object_name, face, self.files, prints)
@@ -161,13 +158,9 @@ def _face_of_run(
 def written_surface(database: str, object_name: str, face: str) -> Scene:
     """Return a registered face as it was written.
 
-    Raises
-    ------
-    SetError
-        The object has no STL part that bears the face, the file is not there, or its bytes
-        are not those that were registered.
-    DatabaseError
-        The database cannot be read, or does not hold the object.
+    Raises SetError: the object has no STL part that bears the face, the file is not there, or its
+    bytes are not those that were registered; DatabaseError: the database cannot be read, or does
+    not hold the object.
     """
     held = _object_of_run(database, object_name)
     part = stl_part(held, face)

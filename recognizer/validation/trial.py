@@ -201,8 +201,7 @@ def judge(
         edge = float(scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0])
         held = find_face(reader.lab, scene.object_name, scene.face)
         if held is not None:
-            c, s = np.cos(touch.theta_rad), np.sin(touch.theta_rad)
-            own = (held[0].centres_mm - (touch.x_mm, touch.y_mm)) @ np.array([[c, -s], [s, c]])
+            own = touch.on_sensor(held[0].centres_mm)
             symbols = int((np.abs(own) < reader.sensor.half_mm).all(axis=1).sum())
             enough = plan.kind != "worn" and symbols >= ENOUGH * held[1]
     return Trial(

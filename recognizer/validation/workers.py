@@ -60,10 +60,7 @@ Workers = Callable[[Work, Iterable[Batch]], Iterator[BatchResult]]
 def touch(work: Work, batch: Batch) -> BatchResult:
     """Return the rows of a batch's touches.
 
-    Raises
-    ------
-    WorkersError
-        The code or the set is not that of the run.
+    Raises WorkersError: the code or the set is not that of the run.
     """
     series = next(s for s in series_of(work.campaign) if s.name == batch.series)
     reader = reader_with(prepare_reader(work), series.reader)
@@ -151,10 +148,7 @@ def run_pool(
 ) -> Iterator[Result]:
     """Yield what calls of a function return, as they are done by several processes at a time.
 
-    Raises
-    ------
-    BrokenProcessPool
-        A process was lost; also what a call raises.
+    Raises BrokenProcessPool: a process was lost; also what a call raises.
     """
     # Started fresh rather than forked: no open database and no thread is taken over.
     pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_worker)
@@ -189,12 +183,8 @@ def _end_with(sentinel: int) -> None:
 def on_cluster(address: str, work: Work, batches: Iterable[Batch]) -> Iterator[BatchResult]:
     """Do batches on the workers of a dask scheduler at `address`, `tcp://host:8786`.
 
-    Raises
-    ------
-    WorkersError
-        There is no scheduler or no worker, or they see other code or another set.
-    MissingExtraError
-        dask is not installed.
+    Raises WorkersError: there is no scheduler or no worker, or they see other code or another set;
+    MissingExtraError: dask is not installed.
     """
     client = _connect(address)
     futures: list[Any] = []

@@ -21,8 +21,8 @@ from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
 from probe.wrist import Wrist, counts_of, distances_at
 from recognizer.command import run
-from recognizer.command.picture import winning_lattice
 from recognizer.command.scanning import ScanError, pose_during, read_joints
+from recognizer.picture import winning_lattice
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise

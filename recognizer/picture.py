@@ -93,7 +93,7 @@ def touch_picture(
         figure.suptitle(_title(found, T_robot_object))
         touched, window = (figure.add_subplot(1, 3, k) for k in (1, 2))
         solid = figure.add_subplot(1, 3, 3, projection="3d")
-        _draw_touch(touched, reader.sensor, signal, won)
+        draw_touch(touched, reader.sensor, signal, won)
         if not found or won is None:
             _say_why(window, found)
             solid.set_axis_off()
@@ -141,7 +141,7 @@ def _title(found: Recognition, T_robot_object: Array | None) -> str:
     return text
 
 
-def _draw_touch(axes: Axes, sensor: SensorType, signal: Signal, won: WinningLattice | None) -> None:
+def draw_touch(axes: Axes, sensor: SensorType, signal: Signal, won: WinningLattice | None) -> None:
     """Draw readings, lattice, and outlines of the symbols; untrusted tactels are crossed."""
     half_x, half_y = sensor.half_mm
     box = (-half_x, half_x, -half_y, half_y)
