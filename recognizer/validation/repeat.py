@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
+from recognizer.touch.lab import find_face
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
@@ -25,7 +26,6 @@ from recognizer.validation.run import read_record
 from recognizer.validation.trial import (
     MOST,
     NEXT,
-    find_face,
     judge,
     judge_all,
     touch_until_answered,
@@ -109,7 +109,8 @@ def _draw_answer(
             axis.plot(*np.array([start, end]).T, color="#555c66", lw=1)
         held = find_face(reader.lab, scene.object_name, scene.face)
         if held is not None:
-            axis.plot(*held[0].centres_mm.T, ".", color="#aab0b8", ms=3)
+            face = reader.lab.arrays[held[0]].face(held[1])
+            axis.plot(*face.centres_mm.T, ".", color="#aab0b8", ms=3)
         axis.plot(*_outline(reader, touch), color=TRUTH, label="truth")
     if answer:
         own = scene is not None and (answer.object, answer.face) == (scene.object_name, scene.face)

@@ -27,7 +27,7 @@ from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.scan import surface_to_sensor
 from recognizer.scan.session import Scan
-from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab
+from recognizer.touch.lab import find_face
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import NextTouch, Recognition
@@ -180,6 +180,7 @@ def judge(
 ) -> Trial:
     """Compare an answer with the truth; `seconds` is the CPU time of reading."""
     scene, touch = found.truth_of(answer.object, answer.face)
+    held = find_face(reader.lab, scene.object_name, scene.face) if scene else None
     error, degrees, chi2, verdict = math.nan, math.nan, math.nan, REJECTED
     if answer:
         verdict = WRONG
@@ -190,20 +191,20 @@ def judge(
         ):  # fmt: skip
             away = _away(T, touch)
             if math.hypot(away[0], away[1]) >= NEAR_MM:
-                held = find_face(reader.lab, *touched)
-                if held is not None and held[0].round:
-                    away = _away(T, _across_seam(held[0].round, T, touch))
+                bent = reader.lab.arrays[held[0]].face(held[1]).round if held else None
+                if bent is not None:
+                    away = _away(T, _across_seam(bent, T, touch))
             error, degrees = math.hypot(away[0], away[1]), math.degrees(away[2])
             chi2 = float(away @ np.linalg.solve(answer.covariance, away))
             verdict = RIGHT if error < NEAR_MM and abs(degrees) < NEAR_DEG else WRONG
     edge, symbols, enough = math.nan, 0, False
     if scene is not None:
         edge = float(scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0])
-        held = find_face(reader.lab, scene.object_name, scene.face)
         if held is not None:
-            own = touch.on_sensor(held[0].centres_mm)
+            encoding = reader.lab.arrays[held[0]]
+            own = touch.on_sensor(encoding.face(held[1]).centres_mm)
             symbols = int((np.abs(own) < reader.sensor.half_mm).all(axis=1).sum())
-            enough = plan.kind != "worn" and symbols >= ENOUGH * held[1]
+            enough = plan.kind != "worn" and symbols >= ENOUGH * math.prod(encoding.array.window)
     return Trial(
         number=number,
         kind=plan.counted_as or plan.kind,
@@ -249,20 +250,3 @@ def _across_seam(face: RoundFace, T_face_probe: Array, touch: Touch) -> Touch:
     x, y = (T @ (touch.x_mm, touch.y_mm, 0.0, 1.0))[:2].tolist()
     c, s = (T[:2, :2] @ (math.cos(touch.theta_rad), math.sin(touch.theta_rad))).tolist()
     return replace(touch, x_mm=x, y_mm=y, theta_rad=math.atan2(s, c))
-
-
-def find_face(lab: Lab, object_name: str, face: str) -> tuple[EncodedFace, int] | None:
-    """Return a face of the lab, and the cells of its array's window; None if it is foreign."""
-    for encoding in lab.arrays:
-        number = number_of_face(encoding, object_name, face)
-        if number is not None:
-            window = encoding.array.window
-            return encoding.face(number), window[0] * window[1]
-    return None
-
-
-def number_of_face(encoding: EmbossedArray, object_name: str, face: str) -> int | None:
-    """Return the number of a face on an array; None if another one bears it."""
-    ids = [number for number, name in encoding.names.items() if name == object_name]
-    numbers: list[int] = np.flatnonzero(np.isin(encoding.faces[:, 0], ids)).tolist()
-    return next((number for number in numbers if encoding.face(number).face == face), None)
