@@ -105,14 +105,7 @@ OF_ANSWER = ("verdict", "reason", "answer", "error_mm", "error_deg", "chi2", "ma
 def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
     """Return the outcome of one touch, or of those that followed it: first place, last answer."""
     reader = plan.knowing(reader)
-    if plan.policy == NEXT:
-        return judge_all(
-            plan, number, list(touch_until_answered(plan, number, reader, MOST)), reader
-        )
-    found = draw_touch(plan, number, reader)
-    start = time.process_time()
-    answer = recognise(reader, reader.signal(found.counts), number)
-    return judge(plan, number, found, answer, reader, time.process_time() - start)
+    return judge_all(plan, number, touches_of(plan, number, reader), reader)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,6 +115,16 @@ class PolicyTouch:
     found: DrawnTouch
     answer: Recognition
     seconds: float  #: CPU, of reading
+
+
+def touches_of(plan: TouchPlan, number: int, reader: Reader) -> list[PolicyTouch]:
+    """Return the touches of a trial, read: one, or those that follow each other."""
+    if plan.policy == NEXT:
+        return list(touch_until_answered(plan, number, reader, MOST))
+    found = draw_touch(plan, number, reader)
+    start = time.process_time()
+    answer = recognise(reader, reader.signal(found.counts), number)
+    return [PolicyTouch(found, answer, time.process_time() - start)]
 
 
 def touch_until_answered(
@@ -147,6 +150,8 @@ def judge_all(plan: TouchPlan, number: int, made: list[PolicyTouch], reader: Rea
     """Return the outcome of touches that followed each other: first place, last answer."""
     spent = sum(one.seconds for one in made)
     first = judge(plan, number, made[0].found, made[0].answer, reader, spent)
+    if len(made) == 1:
+        return first
     last = judge(plan, number, made[-1].found, made[-1].answer, reader)
     answered = {name: getattr(last, name) for name in OF_ANSWER}
     return replace(first, touches=len(made), **answered)
