@@ -148,7 +148,6 @@ def _turns(text: str) -> list[int]:
 def _answer_values(
     array: FoldedArray | ProductArray, window: Labels, found: Decoded, method: str, top: int
 ) -> dict[str, Any]:
-    """Return what `--json` prints."""
     import numpy as np
 
     from decoder.view import strength

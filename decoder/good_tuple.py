@@ -89,6 +89,5 @@ def _tuples(
 
 
 def _moved_back(places: NDArray[np.uint64], steps: int, cycle: int) -> NDArray[np.uint64]:
-    """Return places - steps on a cycle."""
     short = places < steps
     return np.where(short, places + np.uint64(cycle - steps % cycle), places - np.uint64(steps))

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from decoder.element import elements_of
 from decoder.errors import MethodError, WindowError
 from decoder.exact import conversion
+from decoder.milestones import Table
 from decoder.ordered import Ordered
 from decoder.transform import LARGEST_TRANSFORM, Transform
 from decoder.window import Scores, unrelated_score
@@ -134,22 +135,13 @@ class Places:
             axis=0,
         )
         self.rows, self.columns = unique[:, 0], unique[:, 1]
+        self.size = self.work = len(unique)  #: candidates, and numbers held for each window
         a, b = np.indices(shape).reshape(2, -1).astype(np.uint64)
         labels = array.symbols(
             _shift_places(self.rows, a, array.rows), _shift_places(self.columns, b, array.columns)
         )
         every = labels[..., None] == np.arange(array.order)
         self._codebook = every.reshape(len(unique), -1).T.astype(np.float32)
-
-    @property
-    def size(self) -> int:
-        """Number of candidates."""
-        return self.rows.size
-
-    @property
-    def work(self) -> int:
-        """Numbers held for each window."""
-        return self.rows.size
 
     def rank(self, scores: Scores, number: int) -> Ranked:
         """Return the best places of scores (N, k, q)."""
@@ -262,7 +254,9 @@ class AllPlaces:
         scores = np.take(scores, self._array.permutation, axis=2)  # of terms, no more of symbols
         if isinstance(method, Transform):
             places, values, rest = best_of(method.values(scores), number)
-            t = method.index_of_key[places].astype(np.uint64)
+            table = conversion(self._array.sequence, "table")
+            assert isinstance(table, Table)
+            t = table.index[places].astype(np.uint64)
         else:
             keys, values, rest = method.rank_keys(scores, number)
             elements = elements_of(self._array.sequence.ring)

@@ -11,13 +11,11 @@ so that all of it is real.
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from decoder.element import Shifts, elements_of
 from decoder.window import Scores
 from generator.array.sequence import Sequence
 
@@ -70,7 +68,6 @@ class Transform:
     """Scores of all places of a sequence for symbols seen at given offsets."""
 
     def __init__(self, sequence: Sequence, offsets: list[int]) -> None:
-        self.sequence = sequence
         self.spectrum = Spectrum(sequence, offsets)
         prime, degree = sequence.ring.prime, sequence.ring.degree
         half = degree // 2
@@ -82,16 +79,6 @@ class Transform:
         if prime > 2:
             high_table = np.concatenate([high_table.real, -high_table.imag], axis=1)
         self._high = np.ascontiguousarray(high_table)
-
-    @cached_property
-    def index_of_key(self) -> NDArray[np.int32]:
-        """(q^n,) index of each field element by its key; entry 0 has no meaning."""
-        elements = elements_of(self.sequence.ring)
-        forward = Shifts(elements, self.sequence.ring.powers_of_x[1])
-        keys = elements.keys(forward.run(elements.one[0], self.sequence.period))
-        index = np.zeros(self.sequence.period + 1, dtype=np.int32)
-        index[keys.astype(np.intp)] = np.arange(self.sequence.period)
-        return index
 
     def values(self, scores: Scores) -> NDArray[np.float32]:
         """Return (N, q^n) log-likelihoods by key; key 0, no place, has -inf."""

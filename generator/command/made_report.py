@@ -67,7 +67,6 @@ def _alike(objects: Sequence[MadeObject], dry_run: bool) -> list[list[MadeObject
 
 
 def _group_text(alike: Sequence[MadeObject], dry_run: bool) -> str:
-    """Return a few lines on objects whose text is equal but for their name."""
     first, last = alike[0].name, alike[-1].name
     text = _object_text(alike[0], dry_run)
     if len(alike) == 1:
@@ -289,12 +288,10 @@ def _plates(files: Sequence[Path]) -> list[Path]:
 
 
 def _is_project(file: Path) -> bool:
-    """Whether a file is a project for Bambu Studio."""
     return re.search(r"-bambu(-\d+)?\.3mf$", file.name) is not None
 
 
 def _opened_by(plate: Path) -> str:
-    """Return what opens a plate or a project."""
     if _is_project(plate):
         return "in Bambu Studio or OrcaSlicer"
     return f"in PrusaSlicer {plate.stem}-prusaslicer.3mf"

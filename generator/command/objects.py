@@ -185,7 +185,6 @@ def import_(
 
 
 def _confirm(engine: Engine, names: list[str], *, as_json: bool) -> None:
-    """Ask before cells are freed; leave when the answer is no."""
     from generator.command import object_report
     from generator.database.read import object_entry
     from generator.database.transaction import read_transaction

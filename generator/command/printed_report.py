@@ -18,8 +18,6 @@ _OFF = 0.1  # share of the height from which a wrong height is reported
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """All symbols of one kind on one face."""
-
     face: str
     symbol: str
     checks: tuple[SymbolCheck, ...]

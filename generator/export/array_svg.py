@@ -15,11 +15,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from xml.sax.saxutils import escape
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.pages import page_environment
 from generator.alphabet.outline import Tiers
 from generator.layout.placement import FaceLayout
 
@@ -27,7 +29,7 @@ _FULL = 100  # cells a side up to which the whole array is drawn
 _AROUND = 3  # cells around the faces in a cropped picture
 _NAMED = 1.5  # cells: a narrower strip of a face bears no name
 _CELL_PX, _WIDE_PX = 14, 1600  # a wider picture gets smaller cells
-_FONT = 'font-family="Helvetica, Arial, sans-serif"'
+_OTHERS = 'fill="#F8FAFC" stroke="#CBD5E1"'
 
 #: Colours of the faces, one after another; dark enough for text on white.
 _FACE_COLOURS = (
@@ -72,29 +74,35 @@ def array_svg(
     view = _view(rows, columns, [box for _, box in placed])
     cell = min(_CELL_PX, max(4.0, _WIDE_PX / view.columns))
     left = max(60, 24 + 7 * len(str(rows)))
-    width, height = left + view.columns * cell + 30, view.rows * cell + 130
-    frame = f'<rect width="{view.columns}" height="{view.rows}"'
-    body = [
-        _definitions(view, outlines, pitch_mm),
-        f'{frame} fill="url(#grid)"/>',
-        '<g clip-path="url(#view)">',
-        *(
+    step = 5 if cell >= 9 else 10
+    down = np.array([1.0, -1.0])
+    template = page_environment(Path(__file__).parent).get_template("array.svg.j2")
+    return template.render(
+        title=title,
+        width=f"{left + view.columns * cell + 30:g}",
+        height=f"{view.rows * cell + 130:g}",
+        left=left,
+        below=70 + view.rows * cell + 30,
+        cell=cell,
+        view=view,
+        columns=[
+            (left + (k - view.left + 0.5) * cell, k % columns)
+            for k in range(view.left + -view.left % step, view.left + view.columns, step)
+        ],
+        rows=[
+            (74 + (k - view.top + 0.5) * cell, k % rows)
+            for k in range(view.top + -view.top % step, view.top + view.rows, step)
+        ],
+        glyphs=[
+            "".join(_path(ring / pitch_mm * down) for ring in tiers.rings[-1]) for tiers in outlines
+        ],
+        faces=[
             _face(view, face, shape, _FACE_COLOURS[i % len(_FACE_COLOURS)])
             for i, (face, (shape, _)) in enumerate(zip(faces, placed, strict=True))
-        ),
-        "</g>",
-        f'{frame} fill="none" stroke="#475569" stroke-width="0.08"/>',
-    ]
-    scale = f"translate({left},70) scale({cell:g})"
-    head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" {_FONT} width="{width:g}" '
-        f'height="{height:g}" viewBox="0 0 {width:g} {height:g}">\n'
-        '<rect width="100%" height="100%" fill="#FFFFFF"/>\n'
-        f'<text x="{left}" y="30" font-size="19" font-weight="bold" fill="#0F172A">'
-        f"{escape(title)}</text>"
+        ],
+        legend=_legend(left, faces),
+        size=_size_text(view),
     )
-    rulers, legend = _rulers(view, cell, left), _legend(view, cell, left, faces)
-    return "\n".join([head, rulers, f'<g transform="{scale}">', *body, "</g>", legend, "</svg>\n"])
 
 
 Box = tuple[int, int, int, int]  # left, top, right, bottom
@@ -141,24 +149,10 @@ def _shortest_arc(period: int, intervals: list[tuple[int, int]]) -> tuple[int, i
     return best
 
 
-def _definitions(view: _View, outlines: Sequence[Tiers], pitch_mm: float) -> str:
-    glyphs = []
-    for label, tiers in enumerate(outlines):
-        path = "".join(_path(ring / pitch_mm * np.array([1.0, -1.0])) for ring in tiers.rings[-1])
-        glyphs.append(f'<path id="s{label}" fill-rule="evenodd" d="{path}"/>')
-    return (
-        "<defs>\n"
-        f'<clipPath id="view"><rect width="{view.columns}" height="{view.rows}"/></clipPath>\n'
-        '<pattern id="grid" width="1" height="1" patternUnits="userSpaceOnUse">'
-        '<rect width="1" height="1" fill="#F8FAFC"/>'
-        '<path d="M0 0H1M0 0V1" stroke="#DCE3EB" stroke-width="0.06"/></pattern>\n'
-        + "\n".join(glyphs)
-        + "\n</defs>"
-    )
-
-
-def _face(view: _View, face: FaceOnArray, shape: list[NDArray[np.float64]], colour: str) -> str:
-    """Return outline, name and symbols of a face, at every place of the view it reaches."""
+def _face(
+    view: _View, face: FaceOnArray, shape: list[NDArray[np.float64]], colour: str
+) -> dict[str, Any]:
+    """Return outlines, names and symbols of a face, at every place of the view it reaches."""
     placement, (rows, columns) = face.layout.placement, view.period
     low, high = shape[0].min(axis=0), shape[0].max(axis=0)
     places = [
@@ -166,41 +160,28 @@ def _face(view: _View, face: FaceOnArray, shape: list[NDArray[np.float64]], colo
         for x in _copies(placement.column - view.left, low[0], high[0], view.columns, columns)
         for y in _copies(placement.row - view.top, low[1], high[1], view.rows, rows)
     ]
-    paint = (
-        f'fill="{colour}" fill-opacity="0.10" fill-rule="evenodd" '
-        f'stroke="{colour}" stroke-width="0.16" stroke-linejoin="round"'
-    )
-    outlines = [
-        f'<path d="{"".join(_path(loop + place) for loop in shape)}" {paint}/>' for place in places
-    ]
     column = _offsets(face.layout.columns, view.left, columns)
     row = _offsets(face.layout.rows, view.top, rows)
     seen = (column < view.columns) & (row < view.rows)
-    cells = zip(
-        row[seen].tolist(), column[seen].tolist(), face.layout.labels[seen].tolist(), strict=True
-    )
-    symbols = "".join(f'<use href="#s{label}" x="{c}.5" y="{r}.5"/>' for r, c, label in cells)
-    names = [_name(face.name, colour, shape[0] + place, view) for place in places]
-    return "\n".join([*outlines, f'<g fill="{colour}">{symbols}</g>', *names])
+    return {
+        "name": face.name,
+        "colour": colour,
+        "outlines": ["".join(_path(loop + place) for loop in shape) for place in places],
+        "cells": np.stack([row, column, face.layout.labels], axis=1)[seen].tolist(),
+        "names": [_name(face.name, shape[0] + place, view) for place in places],
+    }
 
 
-def _name(name: str, colour: str, loop: NDArray[np.float64], view: _View) -> str:
-    """Return the name in the middle of a face, or of the part of it that is in the view."""
+def _name(name: str, loop: NDArray[np.float64], view: _View) -> dict[str, float]:
+    """Return where a name stands: in the middle of a face, or of what of it is in the view."""
     edge = np.array([view.columns, view.rows])
     low, high = loop.min(axis=0).clip(0, edge), loop.max(axis=0).clip(0, edge)
     if min(high - low) < _NAMED:
-        return ""
+        return {}
     whole = bool((loop >= 0).all() and (loop <= edge).all())
     x, y = (_centroid(loop) if whole else (low + high) / 2).tolist()
     size = min(1.05, 0.3 * float(min(high - low)))
-    half = 0.33 * size * len(name) + 0.4 * size
-    return (
-        f'<rect x="{x - half:.2f}" y="{y - 0.75 * size:.2f}" width="{2 * half:.2f}" '
-        f'height="{1.5 * size:.2f}" rx="{0.7 * size:.2f}" fill="#FFFFFF" fill-opacity="0.92" '
-        f'stroke="{colour}" stroke-width="0.08"/>'
-        f'<text x="{x:.2f}" y="{y + 0.36 * size:.2f}" font-size="{size:.2f}" font-weight="bold" '
-        f'text-anchor="middle" fill="{colour}">{escape(name)}</text>'
-    )
+    return {"x": x, "y": y, "size": size, "half": 0.33 * size * len(name) + 0.4 * size}
 
 
 def _offsets(values: NDArray[np.int64], start: int, period: int) -> NDArray[np.int64]:
@@ -231,38 +212,19 @@ def _path(loop: NDArray[np.float64]) -> str:
     return f"M{points}z"
 
 
-def _rulers(view: _View, cell: float, left: int) -> str:
-    """Return the numbers of columns and rows along two sides."""
-    rows, columns = view.period
-    step = 5 if cell >= 9 else 10
-    texts = []
-    for column in range(view.left + -view.left % step, view.left + view.columns, step):
-        x = left + (column - view.left + 0.5) * cell
-        texts.append(f'<text x="{x:g}" y="63" text-anchor="middle">{column % columns}</text>')
-    for row in range(view.top + -view.top % step, view.top + view.rows, step):
-        y = 74 + (row - view.top + 0.5) * cell
-        texts.append(f'<text x="{left - 6}" y="{y:g}" text-anchor="end">{row % rows}</text>')
-    return f'<g font-size="11" fill="#64748B">{"".join(texts)}</g>'
-
-
-def _legend(view: _View, cell: float, left: int, faces: Sequence[FaceOnArray]) -> str:
-    """Return the line under the picture that says what is what."""
-    rows, columns = view.period
-    y = 70 + view.rows * cell + 30
+def _legend(left: int, faces: Sequence[FaceOnArray]) -> list[tuple[float, str, str]]:
+    """Return what is what under the picture: place, text, and style of its square."""
     used = sum(len(face.layout.labels) for face in faces)
-    cropped = (view.columns, view.rows) != (columns, rows)
-    items = {
-        f"{len(faces)} faces, {used} symbols": 'fill="#0B6FB8" fill-opacity="0.2" stroke="#0B6FB8"',
-        "cells for other objects": 'fill="#F8FAFC" stroke="#CBD5E1"',
-    }
-    texts = []
-    x = float(left)
-    for text, style in items.items():
-        texts.append(f'<rect x="{x:g}" y="{y - 11:g}" width="14" height="14" {style}/>')
-        texts.append(f'<text x="{x + 20:g}" y="{y:g}">{text}</text>')
-        x += 48 + 7.2 * len(text)
+    cells = f"{len(faces)} faces, {used} symbols"
+    return [
+        (left, cells, 'fill="#0B6FB8" fill-opacity="0.2" stroke="#0B6FB8"'),
+        (left + 48 + 7.2 * len(cells), "cells for other objects", _OTHERS),
+    ]
+
+
+def _size_text(view: _View) -> str:
+    rows, columns = view.period
     size = f"array of {rows} rows x {columns} columns, closed to a torus"
-    if cropped:
+    if (view.columns, view.rows) != (columns, rows):
         size += f"; rows from {view.top % rows}, columns from {view.left % columns} are shown"
-    texts.append(f'<text x="{left}" y="{y + 22:g}" fill="#64748B">{size}</text>')
-    return f'<g font-size="13" fill="#0F172A">{"".join(texts)}</g>'
+    return size

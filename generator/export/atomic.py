@@ -60,7 +60,8 @@ class Staging:
 
     def __enter__(self) -> Staging:
         with _named_errors(self.folder, "make the folder"):
-            self._made = _missing_folders(self.folder)
+            ways = (self.folder, *self.folder.parents)
+            self._made = [path for path in ways if not path.exists()]  # the innermost first
             self.folder.mkdir(parents=True, exist_ok=True)
         try:
             with _named_errors(self.folder, "write into the folder"):
@@ -144,11 +145,6 @@ class Staging:
                 folder.rmdir()
             except OSError:
                 return
-
-
-def _missing_folders(folder: Path) -> list[Path]:
-    """Return the folders on the way that do not exist, the innermost first."""
-    return [path for path in (folder, *folder.parents) if not path.exists()]
 
 
 def _locked_folder(folder: Path) -> tuple[Path, int]:

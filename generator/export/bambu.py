@@ -88,8 +88,6 @@ def plate_origins_mm(count: int, bed_mm: Size) -> list[Size]:
 
 @dataclass(slots=True)
 class _Texts:
-    """What a project holds so far."""
-
     title: str
     files: dict[str, Sequence[DeflatedText]] = field(default_factory=dict)  #: of meshes, by path
     objects: list[str] = field(default_factory=list)

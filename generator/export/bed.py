@@ -96,40 +96,19 @@ def _arrange(
             elif part not in small:
                 oversize.append(_oversize_plate(part, sizes[part], bed_mm, blocked_mm))
         for number, plate in enumerate(open_plates):
-            together = _add_parts(plate, small, grown, room)
-            if together is not None:
+            together = _Skyline(list(plate.steps), list(plate.places))
+            if all(_place_part(together, part, grown[part], room) for part in small):
                 open_plates[number] = together
                 break
         else:
-            open_plates += _fill_plates(small, grown, room, floor)
+            own_plates: list[_Skyline] = []
+            for part in small:
+                if not any(_place_part(plate, part, grown[part], room) for plate in own_plates):
+                    own_plates.append(_Skyline(list(floor), []))
+                    _place_part(own_plates[-1], part, grown[part], room)
+            open_plates += own_plates
     plates = [_centre(plate, sizes, bed_mm, blocked_mm, rim_mm) for plate in open_plates]
     return (*plates, *oversize)
-
-
-def _add_parts(
-    plate: _Skyline, parts: Sequence[int], grown: Sequence[Size], room: Size
-) -> _Skyline | None:
-    """Return the plate with all parts on it, or None where it cannot hold them."""
-    more = _Skyline(list(plate.steps), list(plate.places))
-    fit = all(_place_part(more, part, grown[part], room) for part in parts)
-    return more if fit else None
-
-
-def _fill_plates(
-    parts: Sequence[int], grown: Sequence[Size], room: Size, floor: list[tuple[float, float]]
-) -> list[_Skyline]:
-    """Return new plates with parts that each fit a plate alone; `floor` are its first steps."""
-    plates: list[_Skyline] = []
-    for part in parts:
-        if not any(_place_part(plate, part, grown[part], room) for plate in plates):
-            plates.append(_Skyline(list(floor), []))
-            _place_part(plates[-1], part, grown[part], room)
-    return plates
-
-
-def _fits(size: Size, room: Size) -> bool:
-    slack = 1e-9 * max(room)
-    return size[0] <= room[0] + slack and size[1] <= room[1] + slack
 
 
 def _oversize_plate(part: int, size: Size, bed_mm: Size, blocked_mm: Size) -> Plate:
@@ -148,33 +127,28 @@ def _oversize_plate(part: int, size: Size, bed_mm: Size, blocked_mm: Size) -> Pl
 
 def _place_part(plate: _Skyline, part: int, size: Size, room: Size) -> bool:
     """Add a part to the plate where it lies lowest; False when it finds no place."""
-    best: tuple[float, float, bool] | None = None
+    slack = 1e-9 * max(room)
+    ways: list[tuple[float, float, bool]] = []
     for turned in (False, True):
         width, depth = size[::-1] if turned else size
-        for i, (x, _) in enumerate(plate.steps):
-            if not _fits((x + width, 0.0), room):
+        for i, (x, height) in enumerate(plate.steps):
+            end = x + width
+            if end > room[0] + slack:
                 break
-            y = _height(plate.steps, i, x + width)
-            if _fits((0.0, y + depth), room) and (best is None or (y + depth, x) < best[:2]):
-                best = (y + depth, x, turned)
-    if best is None:
+            over = (h for x, h in plate.steps[i + 1 :] if x < end - 1e-9 * abs(end))
+            top = max([height, *over]) + depth
+            if top <= room[1] + slack:
+                ways.append((top, x, turned))
+    if not ways:
         return False
-    top, x, turned = best
+    top, x, turned = min(ways)
     width, depth = size[::-1] if turned else size
     plate.places.append(BedPlace(part, x, top - depth, turned))
     _raise(plate.steps, x, x + width, top)
     return True
 
 
-def _height(steps: list[tuple[float, float]], first: int, end: float) -> float:
-    """Return the greatest height from step `first` up to x = `end`."""
-    tops = [steps[first][1]]
-    tops += [height for x, height in steps[first + 1 :] if x < end - 1e-9 * abs(end)]
-    return max(tops)
-
-
 def _raise(steps: list[tuple[float, float]], start: float, end: float, height: float) -> None:
-    """Set the contour between two x to `height`."""
     after = [h for x, h in steps if x <= end][-1]
     kept = [(x, h) for x, h in steps if x < start or x > end]
     steps[:] = sorted([*kept, (start, height), (end, after)])

@@ -332,7 +332,6 @@ def _half_spaces(triangle: Triangle) -> Iterator[HalfSpace]:
 
 
 def _plane(normal: Vector, point: Vector) -> Iterator[HalfSpace]:
-    """Yield the two half spaces whose intersection is a plane."""
     x, y, z = normal
     yield _half_space_from(normal, point)
     yield _half_space_from((-x, -y, -z), point)

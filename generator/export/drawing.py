@@ -240,7 +240,6 @@ def _symbols(embossing: Embossing, name: str, colour: str, *, own: bool = False)
 
 
 def _lying(loops: Sequence[Points], place: BedPlace) -> list[Points]:
-    """Return the outline of a part where it lies on the plate."""
     turned = [np.stack([-p[:, 1], p[:, 0]], axis=1) if place.turned else p for p in loops]
     corner = turned[0].min(axis=0)
     return [p - corner + np.array([place.x_mm, place.y_mm]) for p in turned]

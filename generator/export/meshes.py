@@ -177,8 +177,6 @@ def _faces(
 
 
 class _Buffer:
-    """The binary part and the records that describe it."""
-
     def __init__(self) -> None:
         self.blocks: list[bytes] = []
         self.size = 0
@@ -189,24 +187,19 @@ class _Buffer:
         """Append (n, 3) points; return their accessor."""
         values = points.astype("<f4")
         bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
-        return self._append(values.tobytes(), _VERTICES, _FLOAT, len(values), "VEC3", bounds)
+        kind = {"componentType": _FLOAT, "count": len(values), "type": "VEC3"}
+        return self._append(values.tobytes(), _VERTICES, kind | bounds)
 
     def indices(self, triangles: NDArray[np.int64]) -> int:
         """Append (m, 3) vertex numbers; return their accessor."""
         values = triangles.astype("<u4")
-        return self._append(values.tobytes(), _INDICES, _UNSIGNED, values.size, "SCALAR", {})
+        kind = {"componentType": _UNSIGNED, "count": values.size, "type": "SCALAR"}
+        return self._append(values.tobytes(), _INDICES, kind)
 
-    def _append(
-        self, block: bytes, target: int, component: int, count: int, kind: str, more: dict[str, Any]
-    ) -> int:
-        self.accessors.append(
-            {"bufferView": len(self.views), "componentType": component, "count": count}
-            | {"type": kind}
-            | more
-        )
-        self.views.append(
-            {"buffer": 0, "byteOffset": self.size, "byteLength": len(block), "target": target}
-        )
+    def _append(self, block: bytes, target: int, kind: dict[str, Any]) -> int:
+        self.accessors.append({"bufferView": len(self.views)} | kind)
+        view = {"buffer": 0, "byteOffset": self.size, "byteLength": len(block)}
+        self.views.append(view | {"target": target})
         self.blocks.append(block)
         self.size += len(block)
         return len(self.accessors) - 1

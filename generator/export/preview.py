@@ -108,8 +108,8 @@ def preview_png(
     moved = _scene(parts, meshes, turned, APART) if apart else closed
     eye = _best_eye(closed.normals)
     views = (_view_of(closed, eye), _view_of(moved, -eye))
-    room = (width // 2 - 2 * MARGIN, bottom - top - MARGIN)
-    scale = min(_scale_to_fit(view, room) for view in views)
+    room = np.array([width // 2 - 2 * MARGIN, bottom - top - MARGIN])
+    scale = min(float(min(room / (view.high - view.low)[:2])) for view in views)
     memory = np.empty(((bottom - top) * samples, width // 2 * samples), np.int64)
     fonts = [ImageFont.load_default(size) for size in FONT_SIZES]
     labels = []
@@ -219,11 +219,6 @@ def _best_eye(normals: Points) -> Points:
     least = [float(np.abs(normals @ (eye / np.linalg.norm(eye))).min()) for eye in _EYES]
     good = [eye for eye, cosine in zip(_EYES, least, strict=True) if cosine >= OPEN]
     return good[0] if good else _EYES[int(np.argmax(least))]
-
-
-def _scale_to_fit(view: View, room: tuple[int, int]) -> float:
-    width, height = (view.high - view.low)[:2].tolist()
-    return float(min(room[0] / width, room[1] / height))
 
 
 def _draw_view(

@@ -197,8 +197,6 @@ def print_file(
 
 @dataclass(frozen=True, slots=True)
 class _BedPart:
-    """What one part puts on the bed."""
-
     name: str
     #: vertices (N, 3) mm, all in use, and triangles (M, 3): of the body, and of symbols if any
     meshes: tuple[tuple[NDArray[np.float64], NDArray[np.int64]], ...]

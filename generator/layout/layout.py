@@ -188,7 +188,6 @@ def _layout(
     positions: tuple[TorusPosition | None, ...],
     warnings: tuple[str, ...],
 ) -> Layout:
-    """Return the finished layout of a plan whose pieces have their positions."""
     none = np.empty(0, dtype=np.int64)
     count = len(task.polyhedron.faces)
     faces = [

@@ -46,18 +46,10 @@ def count_places(
         return 0
     mask = np.zeros((np.ptp(rows) + 1, np.ptp(columns) + 1), dtype=bool)
     mask[rows - rows.min(), columns - columns.min()] = True
-    fitting = count_windows(mask, window)
+    fitting = int(windows_in(mask[:, None, :, None], *window).sum())
     if fitting or identifies is None:
         return fitting
     return int(identifies(rows - rows.min(), columns - columns.min()))
-
-
-def count_windows(mask: NDArray[np.bool_], window: tuple[int, int]) -> int:
-    """Return at how many positions a window of rows x columns fits into a mask."""
-    rows, columns = window
-    if mask.shape[0] < rows or mask.shape[1] < columns:
-        return 0
-    return int(windows_in(mask[:, None, :, None], rows, columns).sum())
 
 
 def windows_in(free: NDArray[np.bool_], rows: int, columns: int) -> NDArray[np.bool_]:

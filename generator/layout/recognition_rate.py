@@ -257,11 +257,22 @@ def _to_three_places(share: float) -> float:
 def _rate(
     views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorType
 ) -> RecognitionRate:
-    once, within = answered_shares(views, table, pitch_mm, sensor)
-    free = ~views.blocked
+    """Return the rate from the probability of an answer at each pose.
+
+    `table`, measured with the usual sensor, is looked up at the pitch divided by the sensor's
+    coarseness. What is answered later is known of the usual sensor alone.
+    """
+    free, share = ~views.blocked, answered_share(sensor)
+    once = table.at(pitch_mm / sensor.coarseness, views.seen, views.loaded)
+    once = (once if share is None else once * share.at(views.loaded)) * free
+    once *= ROUND.at(views.loaded) if views.round else 1.0
+    within = None
+    if sensor.name == USUAL_SENSOR.name:
+        later = once + (1 - once) * table.later(views.seen, views.around) * free
+        within = _to_three_places(float(later.mean()))
     return RecognitionRate(
-        _to_three_places(once),
-        None if within is None else _to_three_places(within),
+        _to_three_places(float(once.mean())),
+        within,
         one_row=bool(free.any() and (views.lines[free] <= 1).mean() >= ONE_ROW),
         blocked=round(float(views.blocked.mean()), 3),
         meets=views.meets,
@@ -274,21 +285,6 @@ def _face_key(loops: Loops, face: FaceLayout) -> bytes:
     turn = np.array([math.cos(place.rotation_rad), math.sin(place.rotation_rad)])
     numbers = [np.concatenate(list(loops)).ravel(), face.centres_mm.ravel(), turn]
     return (np.round(np.concatenate(numbers), 6) + 0.0).tobytes()
-
-
-def answered_shares(
-    views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorType = USUAL_SENSOR
-) -> tuple[float, float | None]:
-    """Return the shares of touches that will be answered at once, and within three.
-
-    The second is known of the usual sensor alone: None of others.
-    """
-    once = answered_at_once(table, pitch_mm, views.seen, views.loaded, sensor) * ~views.blocked
-    once *= ROUND.at(views.loaded) if views.round else 1.0
-    if sensor.name != USUAL_SENSOR.name:
-        return float(once.mean()), None
-    within = once + (1 - once) * table.later(views.seen, views.around) * ~views.blocked
-    return float(once.mean()), float(within.mean())
 
 
 def answered_share(sensor: SensorType) -> AnsweredShare | None:
@@ -316,22 +312,6 @@ def like_measured(sensor: SensorType) -> str:
         return math.hypot(math.log(tactels / ours), math.log(symbols / seen))
 
     return min(names, key=unlike)
-
-
-def answered_at_once(
-    table: AnswerTable,
-    pitch_mm: float,
-    seen: NDArray[np.int64],
-    loaded: Points,
-    sensor: SensorType = USUAL_SENSOR,
-) -> Points:
-    """Return the probability that a touch is answered at once at each pose, (P,).
-
-    `table`, measured with the usual sensor, is looked up at the pitch divided by the sensor's
-    coarseness; `seen` (P,) symbols seen whole, `loaded` (P,) the loaded share.
-    """
-    usual, share = table.at(pitch_mm / sensor.coarseness, seen, loaded), answered_share(sensor)
-    return usual if share is None else usual * share.at(loaded)
 
 
 @lru_cache(maxsize=1)

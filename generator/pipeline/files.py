@@ -125,7 +125,6 @@ def _draw(
     plan: ObjectPlan, made: MadeObject, parts: Sequence[Part], meshes: Sequence[Mesh],
     plates: Sequence[SheetPlate], staging: Staging,
 ) -> None:  # fmt: skip
-    """Write the picture, the build sheet and the faces on the array."""
     name, layout = plan.spec.name, made.layout
     size = outer_size_mm(plan.polyhedron, parts).tolist()
     shares: dict[str, tuple[float, float | None]] = {}

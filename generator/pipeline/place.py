@@ -132,16 +132,9 @@ def place_in_turn(
         taken = occupancy_of(connection, plan) if taken is None else taken
         placed = place_object(connection, plan, replace, taken)
         if not placed.reused:
-            taken = occupancy_with(taken, placed.layout)
+            cells = zip(*((face.rows, face.columns) for face in placed.layout.faces), strict=True)
+            taken = taken.with_cells(*map(np.concatenate, cells))
         yield placed
-
-
-def occupancy_with(taken: Occupancy, layout: Layout) -> Occupancy:
-    """Return the taken cells together with those of a layout."""
-    return taken.with_cells(
-        np.concatenate([face.rows for face in layout.faces]),
-        np.concatenate([face.columns for face in layout.faces]),
-    )
 
 
 def lay_out_object(plan: ObjectPlan, others: Occupancy | Cells) -> Layout:

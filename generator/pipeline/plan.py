@@ -9,7 +9,7 @@ printed stays blank.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -122,9 +122,8 @@ def plan_objects(
         if key not in known:
             known[key] = plan_object(spec, solid)
         plan = known[key]
-        own = replace(spec, parts=plan.spec.parts, down=plan.spec.down, blank=plan.spec.blank)
-        own = replace(own, mount=plan.spec.mount)
-        plans.append(replace(plan, spec=own))
+        chosen = {name: getattr(plan.spec, name) for name in ("parts", "down", "blank", "mount")}
+        plans.append(replace(plan, spec=replace(spec, **chosen)))
     return tuple(plans)
 
 
@@ -152,11 +151,7 @@ def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan
     with error_location(source, "shape"):
         faces = _round_faces(polyhedron, shapes, spec, reach)
     spec, faces, stance = _blank_faces(polyhedron, spec, faces)
-    plain = [
-        k
-        for k in range(len(polyhedron.faces))
-        if k not in faces.blank and k not in faces.developments
-    ]
+    plain = sorted(set(range(len(polyhedron.faces))) - faces.blank - faces.developments.keys())
     covered = covered_parts(polyhedron, plain, reach)
     kept_free = {**covered, **_cut_corners(polyhedron, spec, covered)}
     outlines_of = {k: (*face_polygon(polyhedron, k), *loops) for k, loops in kept_free.items()}
@@ -172,14 +167,7 @@ def plan_object(spec: ObjectSpec, solid: Polyhedron | None = None) -> ObjectPlan
         outlines_of,
         faces.blank,
         stance,
-        (
-            *faces.notes,
-            *_covered_note(polyhedron, covered, reach),
-            *_sharp_note(polyhedron, spec),
-            *_pitch_note(spec),
-            *_layer_note(spec),
-            *_sensor_note(spec),
-        ),
+        (*faces.notes, *_notes(polyhedron, spec, covered, reach)),
     )
 
 
@@ -339,57 +327,50 @@ def _chosen_stance(polyhedron: Polyhedron, spec: ObjectSpec) -> Stance | None:
     return best_stance(polyhedron, _flat(polyhedron), steepest)
 
 
-def _sharp_note(polyhedron: Polyhedron, spec: ObjectSpec) -> tuple[str, ...]:
-    """Say where panels end far before an edge, since their mitres would be too thin to print."""
-    if spec.parts != "panels":
-        return ()
-    open_mm = {}
+def _notes(
+    polyhedron: Polyhedron, spec: ObjectSpec, covered: Collection[int], reach: float
+) -> Iterator[str]:
+    """Yield what the person who asked should know of an object as it is planned."""
+    printer, height = spec.printer, spec.style.height_mm
+    if covered:
+        names = ", ".join(polyhedron.faces[face].name for face in covered)
+        yield f"no symbols where another face is nearer than {reach:.2g} mm in front of: {names}"
+    wall = spec.wall_mm if spec.parts == "panels" else 0.0
+    if wall and (sharp := _sharp_edges(polyhedron, spec)):
+        where = ", ".join(f"{names} ({mm:.0f} mm)" for names, mm in sharp.items())
+        yield (
+            "panels end that far before the edge where faces meet sharply, which stays open: "
+            f"{where}; print it in one piece (print: {{parts: whole}})"
+        )
+    if spec.coarser:
+        pitch, usual = spec.style.pitch_mm, spec.sensor.symbol_pitch_mm
+        yield f"pitch {pitch:g} mm is taken; at {usual:g} mm: {spec.coarser}"
+    if printer.nozzle_mm:
+        low, high = (printer.printed_mm(z) if z else 0.0 for z in (wall, wall + height))
+        if not wall:
+            high = round(height / printer.layer_mm) * printer.layer_mm
+        if abs(low - wall) >= LAYER_MM or abs(high - low - height) >= LAYER_MM:
+            walls = f"walls of {wall:g} mm print {low:g} mm, " if abs(low - wall) > LAYER_MM else ""
+            better = f"wall {low:g} mm and height" if walls else "height"
+            whole = max(1, round(height / printer.layer_mm)) * printer.layer_mm
+            yield (
+                f"{walls}symbols of {height:g} mm print {high - low:.3g} mm high at layers of "
+                f"{printer.layer_mm:g} mm: {better} {whole:g} mm are whole layers"
+            )
+    if (like := like_measured(spec.sensor)) != spec.sensor.name:
+        yield f"promises for {spec.sensor.name} are those of {like}: not measured"
+
+
+def _sharp_edges(polyhedron: Polyhedron, spec: ObjectSpec) -> dict[str, float]:
+    """Return where panels end far before an edge, their mitres being too thin to print, mm."""
+    found = {}
     for number, edge in enumerate(polyhedron.edges):
         angle = dihedral(polyhedron, number)
         inset = top_inset_mm(angle, spec.wall_mm, spec.printer, spec.gap_mm)
         if angle < math.pi and inset > SHARP_MM:
             names = (polyhedron.faces[k].name for k in sorted((edge.left, edge.right)))
-            open_mm[" and ".join(names)] = inset
-    if not open_mm:
-        return ()
-    where = ", ".join(f"{names} ({mm:.0f} mm)" for names, mm in open_mm.items())
-    note = "panels end that far before the edge where faces meet sharply, which stays open: "
-    return (f"{note}{where}; print it in one piece (print: {{parts: whole}})",)
-
-
-def _pitch_note(spec: ObjectSpec) -> tuple[str, ...]:
-    """Return the note that symbols are coarser than usual, which a touch shows fewer of."""
-    if not spec.coarser:
-        return ()
-    pitch, usual = spec.style.pitch_mm, spec.sensor.symbol_pitch_mm
-    return (f"pitch {pitch:g} mm is taken; at {usual:g} mm: {spec.coarser}",)
-
-
-def _sensor_note(spec: ObjectSpec) -> tuple[str, ...]:
-    """Return the note that another type's answers stand for those of a type of one's own."""
-    name, like = spec.sensor.name, like_measured(spec.sensor)
-    return () if like == name else (f"promises for {name} are those of {like}: not measured",)
-
-
-def _layer_note(spec: ObjectSpec) -> tuple[str, ...]:
-    """Return the note that wall or symbols are no whole layers, and print otherwise."""
-    printer, height = spec.printer, spec.style.height_mm
-    if not printer.nozzle_mm:
-        return ()
-    wall = spec.wall_mm if spec.parts == "panels" else 0.0
-    low, high = (printer.printed_mm(z) if z else 0.0 for z in (wall, wall + height))
-    if not wall:
-        high = round(height / printer.layer_mm) * printer.layer_mm
-    if abs(low - wall) < LAYER_MM and abs(high - low - height) < LAYER_MM:
-        return ()
-    walls = f"walls of {wall:g} mm print {low:g} mm, " if abs(low - wall) > LAYER_MM else ""
-    better = f"wall {low:g} mm and height" if walls else "height"
-    whole = max(1, round(height / printer.layer_mm)) * printer.layer_mm
-    note = (
-        f"{walls}symbols of {height:g} mm print {high - low:.3g} mm high at layers of "
-        f"{printer.layer_mm:g} mm: {better} {whole:g} mm are whole layers"
-    )
-    return (note,)
+            found[" and ".join(names)] = inset
+    return found
 
 
 def _polyhedron(shape: ShapeSpec) -> Polyhedron:
@@ -419,15 +400,6 @@ def _cut_corners(
         return {}  # the error is raised with its place when the parts are built
     cut = cut_corners(polyhedron, plain, spec.printer)
     return {face: (*covered.get(face, ()), *loops) for face, loops in cut.items()}
-
-
-def _covered_note(
-    polyhedron: Polyhedron, covered: Mapping[int, tuple[Loop, ...]], reach: float
-) -> tuple[str, ...]:
-    if not covered:
-        return ()
-    names = ", ".join(polyhedron.faces[face].name for face in covered)
-    return (f"no symbols where another face is nearer than {reach:.2g} mm in front of: {names}",)
 
 
 def _clearances(

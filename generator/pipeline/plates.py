@@ -180,7 +180,6 @@ def _plate_files(
     plate: Plate,
     settings: SlicerSettings | None,
 ) -> PrintFile:
-    """Build the parts of one plate and return its 3MF files."""
     parts: list[Part] = []
     for plan, layout, names in objects:
         by_name = {part.name: part for part in parts_of(plan, layout)[0]}

@@ -164,7 +164,10 @@ def _facts(
     buy = [material_text(volume_mm3, resin=not printer.nozzle_mm)]
     if is_panel(parts[0]):
         buy.append("superglue or two-component epoxy")
-        rows.append(("marks", _marks_text(plan, code, parts)))
+        marks = "backs say the object and the face"
+        if any(_mark(part).startswith(code) for part in parts):
+            marks = f"backs say {code}, which stands for {spec.name} on small parts, and the face"
+        rows.append(("marks", marks))
     rows.append(("to buy", "; ".join(buy)))
     if cost:
         rows.append(("printing", f"{cost} ({source}, 15 % infill)"))
@@ -172,16 +175,8 @@ def _facts(
 
 
 def _body_mm2(parts: Sequence[Part]) -> float:
-    """Return the surface of parts without their symbols."""
     facets = ([part.vertices[list(p)] for p in one.loops] for part in parts for one in part.facets)
     return float(sum(np.linalg.norm(face_vector(loops)) for loops in facets))
-
-
-def _marks_text(plan: ObjectPlan, code: str, parts: Sequence[Part]) -> str:
-    """Return what the backs of panels say."""
-    if any(_mark(part).startswith(code) for part in parts):
-        return f"backs say {code}, which stands for {plan.spec.name} on small parts, and the face"
-    return "backs say the object and the face"
 
 
 def _mark(part: Part) -> str:

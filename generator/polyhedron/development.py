@@ -94,7 +94,6 @@ def _bends(normals: Points, closed: bool) -> Points:
 
 
 def _rotation_between(of: Points, to: Points) -> Points:
-    """Return the rotation (2, 2) that takes one direction to another."""
     cosine, sine = float(of @ to), float(of[0] * to[1] - of[1] * to[0])
     length = float(np.hypot(cosine, sine))
     return np.array([[cosine, -sine], [sine, cosine]]) / length

@@ -22,6 +22,8 @@ MOST_EQUATIONS = 30000  #: beyond this the coordinates are left as given: bounds
 FLATTEN_STEPS = 6  #: at most
 
 Points = NDArray[np.float64]
+Numbers = NDArray[np.intp]
+Loops = list[list[int]]  # the outer loop of each face
 Entries = list[tuple[NDArray[np.intp], Points]]  # columns and values, one for each row
 
 _DAMPING = 1e-13  # of the mean diagonal: dependent equations stay solvable
@@ -41,16 +43,17 @@ def flatten_faces(
         return vertices.copy(), 0.0  # a triangle is planar
     pairs = [(f, v) for f, loops in enumerate(faces) for loop in loops for v in loop]
     face_of, vertex_of = np.array(pairs, dtype=np.intp).T
+    first = [list(loops[0]) for loops in faces]
     moved = vertices
-    best = np.abs(_residual(vertices, faces, face_of, vertex_of)[0]).max()
+    best = np.abs(_residual(vertices, first, face_of, vertex_of)[0]).max()
     large = len(face_of) > DENSE_EQUATIONS
     enough = (PLANAR_ENOUGH if large else PLANAR_EXACTLY) * size
     if best <= enough or len(face_of) > MOST_EQUATIONS:
         return vertices.copy(), 0.0
     for _ in range(FLATTEN_STEPS):
-        trial = _step(moved, faces, face_of, vertex_of, size)
+        trial = _step(moved, first, face_of, vertex_of, size)
         with np.errstate(invalid="ignore"):  # a face that shrank to a point has no plane
-            worst = np.abs(_residual(trial, faces, face_of, vertex_of)[0]).max()
+            worst = np.abs(_residual(trial, first, face_of, vertex_of)[0]).max()
         if not worst < 0.5 * best:
             break
         moved, best = trial, worst
@@ -63,13 +66,10 @@ def flatten_faces(
 
 
 def _residual(
-    vertices: Points,
-    faces: Sequence[Sequence[Sequence[int]]],
-    face_of: NDArray[np.intp],
-    vertex_of: NDArray[np.intp],
+    vertices: Points, first: Loops, face_of: Numbers, vertex_of: Numbers
 ) -> tuple[Points, Points, Points]:
     """Heights (N,) of vertices over their planes; the planes' axes (F, 3, 3), centres (F, 3)."""
-    rings = [vertices[list(loops[0])] for loops in faces]
+    rings = [vertices[loop] for loop in first]
     axes = np.array([plane_axes(area_vector(ring), ring[1] - ring[0]) for ring in rings])
     count = np.bincount(face_of)[:, None]
     centres = np.zeros_like(axes[:, 0])
@@ -80,14 +80,10 @@ def _residual(
 
 
 def _step(
-    vertices: Points,
-    faces: Sequence[Sequence[Sequence[int]]],
-    face_of: NDArray[np.intp],
-    vertex_of: NDArray[np.intp],
-    size: float,
+    vertices: Points, first: Loops, face_of: Numbers, vertex_of: Numbers, size: float
 ) -> Points:
     """One correction: unknowns are the vertices and, per face, two tilts (by size) and a shift."""
-    height, axes, centres = _residual(vertices, faces, face_of, vertex_of)
+    height, axes, centres = _residual(vertices, first, face_of, vertex_of)
     count = len(vertices)
     row = np.arange(len(face_of))
     offset = vertices[vertex_of] - centres[face_of]
@@ -97,7 +93,7 @@ def _step(
         entries.append((3 * (count + face_of) + k, tilt / size))
     entries.append((3 * (count + face_of) + 2, np.full(len(row), -1.0)))
     solve = _least if len(row) <= DENSE_EQUATIONS else _least_sparse
-    change = solve(entries, (len(row), 3 * count + 3 * len(faces)), height)
+    change = solve(entries, (len(row), 3 * count + 3 * len(first)), height)
     return vertices - change[: 3 * count].reshape(-1, 3)
 
 

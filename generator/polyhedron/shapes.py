@@ -177,18 +177,27 @@ SHAPES: dict[str, Callable[..., Polyhedron]] = {
 
 def _prism(kind: str, base: NDArray[np.float64], height: float) -> Polyhedron:
     n = len(base)
-    bottom = np.column_stack([base, np.zeros(n)])
-    top = np.column_stack([base, np.full(n, float(height))])
-    sides = [(i, (i + 1) % n, (i + 1) % n + n, i + n) for i in range(n)]
+    vertices, sides = _between(base, base, height)
     faces = [(1, 0, *range(n - 1, 1, -1)), *sides, tuple(range(n, 2 * n))]
-    return polyhedron(kind, np.concatenate([bottom, top]), faces)
+    return polyhedron(kind, vertices, faces)
 
 
 def _pyramid(kind: str, base: NDArray[np.float64], height: float) -> Polyhedron:
-    n = len(base)
-    vertices = np.column_stack([base, np.zeros(n)])
-    faces = [(1, 0, *range(n - 1, 1, -1)), *((i, (i + 1) % n, n) for i in range(n))]
-    return polyhedron(kind, np.concatenate([vertices, [(0.0, 0.0, float(height))]]), faces)
+    vertices, sides = _between(base, np.zeros((1, 2)), height)
+    return polyhedron(kind, vertices, [(1, 0, *range(len(base) - 1, 1, -1)), *sides])
+
+
+def _between(
+    base: NDArray[np.float64], top: NDArray[np.float64], height: float
+) -> tuple[NDArray[np.float64], list[tuple[int, ...]]]:
+    """Return vertices and sides between a ring (n, 2) on z = 0 and one above it, or one point."""
+    n, ahead = len(base), [*range(1, len(base)), 0]
+    rings = [
+        np.column_stack([ring, np.full(len(ring), z)]) for ring, z in ((base, 0.0), (top, height))
+    ]
+    if len(top) == 1:
+        return np.concatenate(rings), [(k, j, n) for k, j in enumerate(ahead)]
+    return np.concatenate(rings), [(k, j, n + j, n + k) for k, j in enumerate(ahead)]
 
 
 def _rectangle(x: float, y: float) -> NDArray[np.float64]:
@@ -254,7 +263,7 @@ def cylinder(diameter: float, height: float) -> Polyhedron:
     count = _count(radius)
     out = radius * (math.pi / count) / math.sin(math.pi / count)
     error = max(out - radius, radius - out * math.cos(math.pi / count))
-    return _solid_of_rings("cylinder", count, (out, 0.0), (out, height), (radius, 0.0, error))
+    return _round_solid("cylinder", count, (out, out), height, (radius, 0.0, error))
 
 
 def cone(diameter: float, height: float, top_diameter: float = 0.0) -> Polyhedron:
@@ -273,12 +282,10 @@ def cone(diameter: float, height: float, top_diameter: float = 0.0) -> Polyhedro
     # Facets around the apex open by 2 pi sine / N each, so their lines lie at this angle.
     leaning = math.asin(math.sin(math.pi * sine / count) / math.sin(math.pi / count))
     apex = radius / math.tan(math.asin(sine))  # height of the tip
-    rings = [((apex - z) * math.tan(leaning), z) for z in (0.0, height)]
-    if top == 0.0:
-        rings[1] = (0.0, height)
-    middle = rings[0][0] * math.cos(math.pi / count)
-    error = max(rings[0][0] - radius, radius - middle)
-    return _solid_of_rings("cone", count, rings[0], rings[1], (radius, math.asin(sine), error))
+    low, high = ((apex - z) * math.tan(leaning) for z in (0.0, height))
+    error = max(low - radius, radius - low * math.cos(math.pi / count))
+    radii = low, high if top else 0.0
+    return _round_solid("cone", count, radii, height, (radius, math.asin(sine), error))
 
 
 def _count(radius: float) -> int:
@@ -287,30 +294,27 @@ def _count(radius: float) -> int:
     return min(max(4 * math.ceil(wanted / 4.0), FACETS[0]), FACETS[1])
 
 
-def _solid_of_rings(
+def _round_solid(
     kind: str,
     count: int,
-    low: tuple[float, float],
-    high: tuple[float, float],
+    radii: tuple[float, float],
+    height: float,
     surface: tuple[float, float, float],
 ) -> Polyhedron:
-    """Return the solid between two rings (radius, z); a ring of radius 0 is one point."""
-    radius, half_angle, error = surface
+    """Return the solid between two rings below and above; a ring of radius 0 is one point.
+
+    `surface`: radius, half angle and chord error of the round face.
+    """
     angles = -math.pi / 2.0 - math.pi / count + 2.0 * math.pi / count * np.arange(count)
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
-    base = np.column_stack([low[0] * circle, np.full(count, low[1])])
-    ahead = [*range(1, count), 0]
-    if high[0] == 0.0:
-        top = np.array([[0.0, 0.0, high[1]]])
-        sides: list[tuple[int, ...]] = [(k, ahead[k], count) for k in range(count)]
-    else:
-        top = np.column_stack([high[0] * circle, np.full(count, high[1])])
-        sides = [(k, ahead[k], count + ahead[k], count + k) for k in range(count)]
+    low, high = radii
+    vertices, sides = _between(low * circle, high * circle if high else np.zeros((1, 2)), height)
     faces = [Face("F1", (tuple(range(count))[::-1],))]
     faces += [Face(f"F2.{k + 1}" if k else "F2", (loop,)) for k, loop in enumerate(sides)]
-    if high[0] > 0.0:
+    if high:
         faces.append(Face("F3", (tuple(range(count, 2 * count)),)))
-    solid = polyhedron(kind, np.concatenate([base, top]), faces)
+    solid = polyhedron(kind, vertices, faces)
+    radius, half_angle, error = surface
     facets = tuple(range(1, count + 1))
     side = Developable(kind, facets, radius, half_angle, True, False, error)
     return replace(solid, surfaces=(side,))

@@ -78,17 +78,17 @@ def beads_of(path: Toolpath, *, starved_mm: float = 0.0) -> Beads:
     stroke = path.strokes()[moves]
     length = path.length_mm[moves]
     along = np.cumsum(length) - length  # from the beginning of the first stroke
-    area = _sections(stroke, along, length, path.volume_mm3[moves])
+    first = np.flatnonzero(np.diff(stroke, prepend=-1))
+    last = np.append(first[1:], len(stroke)) - 1
+    of = np.repeat(np.arange(len(first)), last - first + 1)
+    begins, ends = along[first], along[last] + length[last]
+    area = _sections(begins[of], ends[of], along, length, path.volume_mm3[moves])
     width, height = section_size(area, path.height_mm[moves])
     top = (start[:, 2] + end[:, 2]) / 2 - (path.height_mm[moves] - height)
 
-    first = np.flatnonzero(np.diff(stroke, prepend=-1))
-    last = np.append(first[1:], len(stroke)) - 1
-    begins, ends = along[first], along[last] + length[last]
     from_ = begins + cap_mm(width[first], height[first]) + starved_mm
     until = ends - cap_mm(width[last], height[last])
     short = from_ >= until
-    of = np.repeat(np.arange(len(first)), last - first + 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         t0 = ((from_[of] - along) / length).clip(0, 1)
         t1 = ((until[of] - along) / length).clip(0, 1)
@@ -136,14 +136,13 @@ def cap_mm(width_mm: Floats, height_mm: Floats) -> Floats:
     return length
 
 
-def _sections(stroke: Index, along: Floats, length: Floats, volume: Floats) -> Floats:
-    """Return each move's section area, short moves averaged with their stroke's neighbours."""
-    if not len(stroke):
+def _sections(low: Floats, high: Floats, along: Floats, length: Floats, volume: Floats) -> Floats:
+    """Return each move's section area, short moves averaged with their stroke's neighbours.
+
+    Where its stroke begins and ends, where it begins itself, its length, mm; its volume, mm3.
+    """
+    if not len(along):
         return np.zeros(0)
-    first = np.flatnonzero(np.diff(stroke, prepend=-1))
-    last = np.append(first[1:], len(stroke)) - 1
-    of = np.repeat(np.arange(len(first)), last - first + 1)
-    low, high = along[first][of], (along[last] + length[last])[of]
     middle = along + length / 2
     half = np.maximum(length, AVERAGED_MM) / 2
     a, b = np.maximum(middle - half, low), np.minimum(middle + half, high)

@@ -336,7 +336,6 @@ class Machine:
 
 
 def _split_words(code: str) -> list[str]:
-    """Return the words of a line without spaces."""
     text = "".join(f" {c}" if c.isalpha() else c for c in code.upper().replace(" ", ""))
     return text.split()
 

@@ -234,7 +234,6 @@ def _in_grid(beads: Beads, T_part_grid: Floats, *, upright: bool) -> Beads:
 def _region(
     printed: Deposit, T_part_grid: Floats, T_surface_grid: Floats, outline: Floats | None
 ) -> tuple[Floats, Floats]:
-    """Return the lowest and highest x, y of the grid."""
     if outline is not None:
         points = (outline - T_surface_grid[:2, 3]) @ T_surface_grid[:2, :2]
     else:

@@ -41,7 +41,12 @@ def error_location(source: Tree, path: str) -> Iterator[None]:
         if error.exit_code != INPUT_ERROR or isinstance(error, SpecError):
             raise
         cause = f"{error.place}: {error.cause}" if error.place else error.cause
-        raise SpecError([Problem(cause, error.fix, mark_of(source, path))]) from error
+        raise spec_error(source, path, cause, error.fix) from error
+
+
+def spec_error(tree: Tree, path: str, cause: str, fix: str) -> SpecError:
+    """Return the error of one problem, at the setting of `path` (`mark_of`)."""
+    return SpecError([Problem(cause, fix, mark_of(tree, path))])
 
 
 def mark_of(tree: Tree, path: str) -> SourceMark:

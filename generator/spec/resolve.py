@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -33,7 +33,7 @@ from generator.polyhedron.mount import Mount, least_thickness_mm
 from generator.polyhedron.shapes import FRAME_STEP_MM, TAG_MM
 from generator.printers import Printer, printer_named, printer_of_nozzle
 from generator.spec.explain import explain_errors
-from generator.spec.problem import SPEC, SpecError, mark_of
+from generator.spec.problem import SPEC, SpecError, mark_of, spec_error
 from generator.spec.resolved import AUTO, EXPLICIT, GAP_MM, ObjectSpec, ShapeSpec
 from generator.spec.settings import (
     AlphabetSettings,
@@ -44,9 +44,6 @@ from generator.spec.settings import (
     PrinterSettings,
 )
 from generator.spec.shape import EXAMPLES, KINDS, Shape
-
-Refuse = Callable[[str, str, str], None]
-"""Takes path, cause and fix of a problem."""
 
 HEIGHT_MM = 1.0  # of symbols: a multiple of common layer heights
 DRAFTS_RAD = (0.174532925199, 0.130899693900, 0.087266462600, 0.043633231300)
@@ -101,46 +98,43 @@ def resolve(
         With every setting that does not go with the others.
     """
     problems: list[Problem] = []
-
-    def refuse(path: str, cause: str, fix: str) -> None:
-        problems.append(Problem(cause, fix, mark_of(tree, path)))
-
-    shape = solid
+    shape, mount, named, style = solid, None, None, None
+    encoding: dict[str, Any] = {}
+    order: int | None = None  # of an array that cannot be made
     if isinstance(settings, ObjectSettings):
-        shape = _shape(settings.shape, tree, refuse)
-    mount = _mount(settings.mount, refuse)
+        with _collected(problems):
+            shape = _shape(settings.shape, tree)
+    if settings.mount is not None:
+        with _collected(problems):
+            mount = _mount(settings.mount, tree)
     sensor = _sensor(settings, tree, problems)
-    named = None
     if settings.symbols.alphabet is not None:
         with _collected(problems):
             named = _described_alphabet(settings.symbols.alphabet, tree)
     profile = _array_profile(settings, sensor, named)
-    encoding, order = _array(settings, profile, refuse)
+    with _collected(problems):
+        encoding, order = _array(settings, profile, tree, problems)
     defaults = _defaults(settings, profile, order, sensor)
     printer = printer_named(defaults.printer)
     if settings.print.printer is not None:
         with _collected(problems):
             printer = _described_printer(settings.print.printer, tree)
     alphabet = named or ALPHABETS[defaults.alphabet]
+
+    def refuse(path: str, cause: str, fix: str) -> None:
+        problems.append(Problem(cause, fix, mark_of(tree, path)))
+
     if 0 < printer.nozzle_mm < printer.layer_mm:
         refuse(
             "print.printer.layer, print.printer",
             f"layers of {printer.layer_mm:g} mm do not leave a nozzle of {printer.nozzle_mm:g} mm",
             f"set layer to {0.75 * printer.nozzle_mm:g} mm or less",
         )
-    style = _style(settings, defaults, alphabet, printer)
     coarser = ""
-    if order is not None and alphabet.order < order:
-        _refuse_order(alphabet, order, refuse)
-    elif order is not None:
-        found = _printable(alphabet, style, printer, settings.symbols.draft is None)
-        if isinstance(found, AlphabetError) and settings.symbols.pitch is None:
-            coarser = found.cause
-            found = _coarser(settings, defaults, alphabet, printer) or found
-        if isinstance(found, AlphabetError):
-            _refuse_style(found, refuse)
-        else:
-            style = found
+    if order is not None:
+        with _collected(problems):
+            _check_order(alphabet, order, tree)
+            style, coarser = _printable_style(settings, defaults, alphabet, printer, tree)
     thinnest = WALL_STROKES * printer.stroke_min_mm
     whole_mm = thinnest + 0.4999 * printer.layer_mm  # the next whole layer
     wall = settings.print.wall or printer.printed_mm(max(WALL_MM, whole_mm))
@@ -157,14 +151,14 @@ def resolve(
             f"a gap of {gap:g} mm is wider than the wall of {wall:g} mm",
             f"set gap to {GAP_MM:g} mm, or more for much glue",
         )
-    if shape is not None and shape.kind == "tag" and "thickness" not in shape.parameters:
+    if problems or shape is None or style is None:
+        raise SpecError(problems)
+    if shape.kind == "tag" and "thickness" not in shape.parameters:
         least = least_thickness_mm(mount)
         if least and shape.parameters.get("frame"):  # which is lower than what carries symbols
             least += FRAME_STEP_MM
         thickness = printer.printed_mm(max(TAG_MM, least + printer.layer_mm / 2))
         shape = replace(shape, parameters={**shape.parameters, "thickness": thickness})
-    if problems or shape is None:
-        raise SpecError(problems)
     usual_formats = (*FORMATS, "bambu") if printer.model else FORMATS
     spec = ObjectSpec(
         name=settings.name,
@@ -255,9 +249,7 @@ def _described_alphabet(given: AlphabetSettings, tree: Tree) -> Alphabet:
         return known
     if settings.glyphs is None:
         fix = f"add glyphs: [[[[-1, 1], [-1, -1], [1, -1]]], ...], or take {', '.join(ALPHABETS)}"
-        raise SpecError(
-            [Problem(f"no glyphs are given for alphabet {name}", fix, mark_of(tree, block))]
-        )
+        raise spec_error(tree, block, f"no glyphs are given for alphabet {name}", fix)
     glyphs = [
         {"name": str(number), "strokes": [pair for line in lines for pair in pairwise(line)]}
         for number, lines in enumerate(settings.glyphs)
@@ -269,14 +261,14 @@ def _described_alphabet(given: AlphabetSettings, tree: Tree) -> Alphabet:
         key = "reach" if error.cause.startswith("reach") else "glyphs"
         symbols = re.findall(r"symbol '(\d+)'", error.cause)
         path = ".".join(filter(None, (block, key, *symbols[-1:])))
-        raise SpecError([Problem(error.cause, error.fix, mark_of(tree, path))]) from None
+        raise spec_error(tree, path, error.cause, error.fix) from None
     if known is None:
         return own
     numbered = tuple(replace(glyph, name=str(k)) for k, glyph in enumerate(known.glyphs))
     if own != replace(known, glyphs=numbered):
         cause = f"alphabet {name} ships with other glyphs, reach or stroke ratio"
-        mark = mark_of(tree, f"{block}.name" if block else "name")
-        raise SpecError([Problem(cause, "give it a name of its own", mark)])
+        path = f"{block}.name" if block else "name"
+        raise spec_error(tree, path, cause, "give it a name of its own")
     return known
 
 
@@ -296,7 +288,7 @@ def _from_file(settings: _Block, tree: Tree) -> tuple[_Block, Tree]:
         raise SpecError(explain_errors(error, own, type(settings))) from None
     if block.file is not None:  # it may name itself
         cause = f"this file names another one, '{block.file}'"
-        raise SpecError([Problem(cause, "write the settings here", mark_of(own, "file"))])
+        raise spec_error(own, "file", cause, "write the settings here")
     return block, own
 
 
@@ -334,59 +326,52 @@ def _whole_layers_mm(height_mm: float, printer: Printer) -> float:
     return round(layers * printer.layer_mm, 6)
 
 
-def _coarser(
-    settings: NamedSettings, defaults: SymbolDefaults, alphabet: Alphabet, printer: Printer
-) -> SymbolStyle | None:
-    """Return the finest style that prints at one of the coarser pitches of the defaults."""
-    for pitch in defaults.coarser_mm:
-        style = _style(settings, replace(defaults, pitch_mm=pitch), alphabet, printer)
-        found = _printable(alphabet, style, printer, settings.symbols.draft is None)
-        if isinstance(found, SymbolStyle):
-            return found
-    return None
+def _printable_style(
+    settings: NamedSettings,
+    defaults: SymbolDefaults,
+    alphabet: Alphabet,
+    printer: Printer,
+    tree: Tree,
+) -> tuple[SymbolStyle, str]:
+    """Return how symbols are embossed, and why not at the usual pitch where they do not print so.
 
-
-def _style(
-    settings: NamedSettings, defaults: SymbolDefaults, alphabet: Alphabet, printer: Printer
-) -> SymbolStyle:
-    """Return how symbols are embossed; the stroke follows the pitch and the alphabet."""
-    symbols = settings.symbols
-    pitch = symbols.pitch or defaults.pitch_mm
-    return SymbolStyle(
-        pitch_mm=pitch,
-        height_mm=symbols.height or _whole_layers_mm(HEIGHT_MM, printer),
-        stroke_mm=symbols.stroke or round(alphabet.stroke_ratio * pitch, 2),
-        draft_rad=DRAFTS_RAD[0] if symbols.draft is None else symbols.draft,
-        chamfer_mm=symbols.chamfer or 0.0,
-    )
-
-
-def _printable(
-    alphabet: Alphabet, style: SymbolStyle, printer: Printer, steeper: bool
-) -> SymbolStyle | AlphabetError:
-    """Return the style, with less draft where `steeper` allows it and strokes need the room.
-
-    The error is that of the steepest sides, where no style prints.
+    The stroke follows the pitch and the alphabet. Where settings say neither, sides are steeper
+    where strokes need the room, and then the pitch is the next one that prints. Raises `SpecError`
+    where no style prints: that of the steepest sides, at the setting that the message starts with,
+    or at another written one.
     """
-    trials = [replace(style, draft_rad=draft) for draft in DRAFTS_RAD] if steeper else [style]
-    found = next((trial for trial in trials if is_printable(alphabet, trial, printer)), trials[-1])
-    try:
-        check_printable(alphabet, found, printer)
-    except AlphabetError as error:
-        return error
-    return found
-
-
-def _refuse_style(error: AlphabetError, refuse: Refuse) -> None:
-    """Refuse a style at the setting that the message starts with, or at another written one."""
+    symbols = settings.symbols
+    drafts = DRAFTS_RAD if symbols.draft is None else (symbols.draft,)
+    usual = symbols.pitch or defaults.pitch_mm
+    fault: AlphabetError | None = None
+    for pitch in (usual,) if symbols.pitch else (usual, *defaults.coarser_mm):
+        for draft in drafts:
+            style = SymbolStyle(
+                pitch_mm=pitch,
+                height_mm=symbols.height or _whole_layers_mm(HEIGHT_MM, printer),
+                stroke_mm=symbols.stroke or round(alphabet.stroke_ratio * pitch, 2),
+                draft_rad=draft,
+                chamfer_mm=symbols.chamfer or 0.0,
+            )
+            if is_printable(alphabet, style, printer):
+                return style, fault.cause if fault else ""
+        try:
+            if fault is None:
+                check_printable(alphabet, style, printer)
+        except AlphabetError as error:
+            fault = error
+    assert fault is not None
     names = ("stroke", "pitch", "height", "draft", "chamfer")
-    first = [name for name in names if re.match(rf"(a )?{name}\b", error.cause)]
+    first = [name for name in names if re.match(rf"(a )?{name}\b", fault.cause)]
     written = [f"symbols.{name}" for name in (*first, *names)]
     rest = ["symbols.alphabet", "print.printer", "symbols", "profile", "encoding", "shape"]
-    refuse(", ".join(written + rest), error.cause, error.fix)
+    raise spec_error(tree, ", ".join(written + rest), fault.cause, fault.fix)
 
 
-def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
+def _check_order(alphabet: Alphabet, order: int, tree: Tree) -> None:
+    """Refuse an alphabet of fewer symbols than the array has."""
+    if alphabet.order >= order:
+        return
     enough = [name for name, other in ALPHABETS.items() if other.order >= order]
     most = max(other.order for other in ALPHABETS.values())
     fix = f"set alphabet to {' or '.join(enough)}"
@@ -395,7 +380,7 @@ def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
     elif alphabet.name not in ALPHABETS:
         fix = f"add {order - alphabet.order} glyphs, or {fix}"
     cause = f"the array has {order} symbols, but the alphabet {alphabet.name} has {alphabet.order}"
-    refuse("symbols.alphabet, encoding, profile", cause, fix)
+    raise spec_error(tree, "symbols.alphabet, encoding, profile", cause, fix)
 
 
 def _array_profile(settings: NamedSettings, sensor: SensorType, named: Alphabet | None) -> str:
@@ -412,17 +397,13 @@ def _array_profile(settings: NamedSettings, sensor: SensorType, named: Alphabet 
 
 
 def _array(
-    settings: NamedSettings, profile: str, refuse: Refuse
-) -> tuple[dict[str, Any], int | None]:
-    """Return the complete definition of the array, and its number of symbols."""
+    settings: NamedSettings, profile: str, tree: Tree, problems: list[Problem]
+) -> tuple[dict[str, Any], int]:
     if settings.encoding is None:
         return _profile_definition(profile)
     if settings.profile is not None:
-        refuse(
-            "encoding",
-            f"the array is given twice: profile {settings.profile} and encoding",
-            "leave one of them out",
-        )
+        cause = f"the array is given twice: profile {settings.profile} and encoding"
+        problems.append(Problem(cause, "leave one of them out", mark_of(tree, "encoding")))
     try:
         array = array_from(settings.encoding.model_dump(exclude_none=True))
     except ArrayError as error:
@@ -430,8 +411,7 @@ def _array(
         if error.cause.startswith("'"):
             mentioned = ["polynomial", *mentioned]
         paths = [f"encoding.{key}" for key in mentioned]
-        refuse(", ".join([*paths, "encoding"]), error.cause, error.fix)
-        return {}, None
+        raise spec_error(tree, ", ".join([*paths, "encoding"]), error.cause, error.fix) from None
     return array.definition(), array.order
 
 
@@ -441,84 +421,73 @@ def _profile_definition(name: str) -> tuple[dict[str, Any], int]:
     return array.definition(), array.order
 
 
-def _shape(shape: Shape, tree: Tree, refuse: Refuse) -> ShapeSpec | None:
-    """Return the one shape that is given; None after a refusal."""
+def _shape(shape: Shape, tree: Tree) -> ShapeSpec:
+    """Return the one shape that is given; raises `SpecError`."""
     given = [kind for kind in KINDS if getattr(shape, kind) is not None]
     if not given:
-        refuse("shape", "the shape has no size", f"write shape: {EXAMPLES['cube']}")
-        return None
+        raise spec_error(tree, "shape", "the shape has no size", f"write shape: {EXAMPLES['cube']}")
     if len(given) > 1:
         written = [key for key in tree.value["shape"] if key in given]
-        refuse(
-            f"shape.{written[1]}",
-            f"an object has one shape, not {' and '.join(written)}",
-            "leave one out; several objects stand in a list under objects:",
-        )
-        return None
+        cause = f"an object has one shape, not {' and '.join(written)}"
+        fix = "leave one out; several objects stand in a list under objects:"
+        raise spec_error(tree, f"shape.{written[1]}", cause, fix)
     kind = given[0]
     value = getattr(shape, kind)
     if shape.scale is not None and kind != "file":
-        refuse("shape.scale", f"a {kind} has a size, no scale", "leave it out, and write the size")
-        return None
+        fix = "leave it out, and write the size"
+        raise spec_error(tree, "shape.scale", f"a {kind} has a size, no scale", fix)
     if kind == "box":
         return ShapeSpec(kind, {"size": list(value)})
     if kind == "polyhedron":
-        _check_faces(value.faces, len(value.vertices), refuse)
+        _check_faces(value.faces, len(value.vertices), tree)
         faces = [[list(loop) for loop in face] for face in value.faces]
         return ShapeSpec(kind, {"vertices": [list(v) for v in value.vertices], "faces": faces})
     if kind == "file":
-        return _model_file(value, shape.scale or 1.0, tree.folder, refuse)
+        return _model_file(value, shape.scale or 1.0, tree)
     if isinstance(value, float):
         return ShapeSpec(kind, {"side": value})
     sizes = value.model_dump(exclude_none=True)
     if kind in ("prism", "pyramid") and ("side" in sizes) == ("radius" in sizes):
         given_sizes = "both side and radius" if "side" in sizes else "neither side nor radius"
-        refuse(f"shape.{kind}", f"'{kind}' has {given_sizes}", f"write shape: {EXAMPLES[kind]}")
-        return None
+        cause, fix = f"'{kind}' has {given_sizes}", f"write shape: {EXAMPLES[kind]}"
+        raise spec_error(tree, f"shape.{kind}", cause, fix)
     return ShapeSpec(kind, sizes)
 
 
-def _mount(settings: MountSettings | None, refuse: Refuse) -> Mount | None:
-    """Return the one mount that is given, if any."""
-    if settings is None:
-        return None
+def _mount(settings: MountSettings, tree: Tree) -> Mount:
     given = [kind for kind in MOUNTS if getattr(settings, kind) is not None]
     if len(given) != 1:
         cause = f"a part is held in one way, not by {' and '.join(given) or 'none'}"
-        refuse("mount", cause, "write mount: {screws: M3}, or leave it out")
-        return None
+        raise spec_error(tree, "mount", cause, "write mount: {screws: M3}, or leave it out")
     return Mount(given[0], getattr(settings, given[0]), settings.face or "")
 
 
-def _check_faces(faces: list[tuple[tuple[int, ...], ...]], vertices: int, refuse: Refuse) -> None:
+def _check_faces(faces: list[tuple[tuple[int, ...], ...]], vertices: int, tree: Tree) -> None:
+    problems = []
     for number, loops in enumerate(faces):
         wrong = [vertex for loop in loops for vertex in loop if not 0 <= vertex < vertices]
         if wrong:
-            refuse(
-                f"shape.polyhedron.faces.{number}",
-                f"face {number} names vertex {wrong[0]}, but there are {vertices}",
-                f"use vertices 0 to {vertices - 1}",
-            )
+            cause = f"face {number} names vertex {wrong[0]}, but there are {vertices}"
+            mark = mark_of(tree, f"shape.polyhedron.faces.{number}")
+            problems.append(Problem(cause, f"use vertices 0 to {vertices - 1}", mark))
+    if problems:
+        raise SpecError(problems)
 
 
-def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeSpec | None:
-    """Return a shape that is read from a model file; refuse one that is not there."""
+def _model_file(name: str, scale: float, tree: Tree) -> ShapeSpec:
+    """Return a shape that is read from a model file; raises `SpecError` if it is not there."""
     from generator.polyhedron.read import MESHES, STEP
 
-    path = folder / name
+    path = tree.folder / name
     if path.suffix.lower() not in (*STEP, *MESHES):
-        refuse(
-            "shape.file",
-            f"'{name}' is no model that is read here",
-            f"give a file that ends in {', '.join((*STEP, *MESHES))}",
-        )
-        return None
+        fix = f"give a file that ends in {', '.join((*STEP, *MESHES))}"
+        raise spec_error(tree, "shape.file", f"'{name}' is no model that is read here", fix)
     try:
         with open_regular(path) as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        refuse("shape.file", f"cannot read '{path}': {error.strerror}", _similar_model(path))
-        return None
+        cause = f"cannot read '{path}': {error.strerror}"
+        raise spec_error(tree, "shape.file", cause, _similar_model(path)) from None
     scaled = {} if scale == 1.0 else {"scale": scale}  # as if it had been left out
     return ShapeSpec("file", {"sha256": digest, **scaled}, path)
 

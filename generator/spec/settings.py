@@ -271,6 +271,17 @@ def bed_sides(value: Any) -> Any:
     return parts
 
 
+def _integer(least: int, most: int | None = None) -> dict[str, Any]:
+    """Return the JSON schema of a whole number."""
+    return {"type": "integer", "minimum": least} | ({} if most is None else {"maximum": most})
+
+
+def _list_of(items: dict[str, Any], least: int, most: int | None = None) -> dict[str, Any]:
+    """Return the JSON schema of a list."""
+    schema = {"type": "array", "items": items, "minItems": least}
+    return schema | ({} if most is None else {"maxItems": most})
+
+
 Version = Annotated[Literal[1], BeforeValidator(version)]
 Copies = Annotated[int, Field(ge=1, le=COPIES_MAX), whole_number(1, COPIES_MAX, "copies")]
 FormatList = Annotated[
@@ -279,6 +290,17 @@ FormatList = Annotated[
     BeforeValidator(name_list, json_schema_input_type=list[Format] | str),
 ]
 FaceName = Annotated[str, BeforeValidator(face_name)]
+FaceList = Annotated[
+    list[FaceName], BeforeValidator(name_list, json_schema_input_type=list[FaceName] | str)
+]
+BedSides = Annotated[
+    tuple[Length, Length], BeforeValidator(bed_sides, json_schema_input_type=list[Any] | str)
+]
+MagnetSizes = Annotated[
+    tuple[Length, Length],
+    BeforeValidator(diameter_and_height, json_schema_input_type=list[Any] | str),
+]
+HoleSize = Annotated[float, BeforeValidator(hole_mm, json_schema_input_type=float | str)]
 SensorTypeName = Annotated[str, BeforeValidator(sensor_type_name)]
 DatabaseUrl = Annotated[
     str,
@@ -296,14 +318,7 @@ Side = Annotated[int, Field(ge=1, le=64), whole_number(1, 64, "a side of the win
 Polynomial = Annotated[
     str | tuple[int, ...],
     BeforeValidator(polynomial),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": ["integer", "string"]},
-                {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 2},
-            ]
-        }
-    ),
+    WithJsonSchema({"anyOf": [{"type": ["integer", "string"]}, _list_of(_integer(0), 2)]}),
 ]
 Window = Annotated[
     tuple[Side, Side], BeforeValidator(window, json_schema_input_type=tuple[Side, Side] | str)
@@ -311,18 +326,7 @@ Window = Annotated[
 BrokenLine = Annotated[
     list[tuple[int, int]],
     BeforeValidator(broken_line),
-    WithJsonSchema(
-        {
-            "type": "array",
-            "minItems": 2,
-            "items": {
-                "type": "array",
-                "items": {"type": "integer", "minimum": -1, "maximum": 1},
-                "minItems": 2,
-                "maxItems": 2,
-            },
-        }
-    ),
+    WithJsonSchema(_list_of(_list_of(_integer(-1, 1), 2, 2), 2)),
 ]
 Share = Annotated[
     float, WithJsonSchema({"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1})
@@ -379,13 +383,7 @@ class PrinterSettings(Block):
     """A YAML file with such a block."""
     name: ObjectName | None = None
     """What it is called in lists and messages."""
-    bed: (
-        Annotated[
-            tuple[Length, Length],
-            BeforeValidator(bed_sides, json_schema_input_type=list[Any] | str),
-        ]
-        | None
-    ) = None
+    bed: BedSides | None = None
     """Usable width and depth of the bed: 250 x 210 mm."""
     nozzle: Length | None = None
     """Diameter of the nozzle; brings its limits with it."""
@@ -455,22 +453,19 @@ class MountSettings(Block):
     """Flange of a robot: ISO 9409-1-50-4-M6, or 50-4-M6. Holes with sunk heads, and a pin."""
     screws: Annotated[str, BeforeValidator(thread_name)] | None = None
     """A through hole in each corner for such a screw, M3, its head sunk."""
-    magnets: (
-        Annotated[
-            tuple[Length, Length],
-            BeforeValidator(diameter_and_height, json_schema_input_type=list[Any] | str),
-        ]
-        | None
-    ) = None
+    magnets: MagnetSizes | None = None
     """A pocket in each corner for a round magnet: 8 x 2 mm, diameter and height."""
     rod: Length | None = None
     """A socket in the middle for a rod of this diameter, two diameters deep where there is room."""
-    hole: Annotated[float, BeforeValidator(hole_mm, json_schema_input_type=float | str)] | None = (
-        None
-    )
+    hole: HoleSize | None = None
     """A hole through the middle: its diameter, or the thread of a bolt that passes, M8."""
     face: FaceName | None = None
     """Face that is mounted, F1; it stays blank. The face that is down if left out."""
+
+
+MountChoice = Annotated[
+    MountSettings, BeforeValidator(mount_block, json_schema_input_type=MountSettings | str)
+]
 
 
 class Print(Block):
@@ -491,13 +486,7 @@ class Print(Block):
     down: Annotated[str, BeforeValidator(down_name)] | None = None
     """Face that one body stands on, F4; it stays blank. Chosen if left out: the model's own way
     up, or a large face under which little hangs over. none: no face is blank for the bed."""
-    blank: (
-        Annotated[
-            list[FaceName],
-            BeforeValidator(name_list, json_schema_input_type=list[FaceName] | str),
-        ]
-        | None
-    ) = None
+    blank: FaceList | None = None
     """Faces without symbols: [F4, F7]."""
 
 
@@ -543,12 +532,7 @@ class Defaults(Block):
     """net: one lattice runs through the unfolded object; faces: each face alone; auto: what
     shows more places."""
     symbols: Symbols = Symbols()
-    mount: (
-        Annotated[
-            MountSettings, BeforeValidator(mount_block, json_schema_input_type=MountSettings | str)
-        ]
-        | None
-    ) = None
+    mount: MountChoice | None = None
     """Holes by which it is held: {flange: ISO 9409-1-50-4-M6}, {screws: M3}, {magnets: 8 x 2 mm},
     {rod: 12 mm}, {hole: M8}; none if left out."""
     print: Print = Print()

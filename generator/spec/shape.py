@@ -159,6 +159,9 @@ class Tag(Block):
     out."""
 
 
+TagChoice = Annotated[Tag, BeforeValidator(tag_block, json_schema_input_type=Tag | TagSides)]
+
+
 class VerticesAndFaces(Block):
     """Any polyhedron with planar faces."""
 
@@ -187,9 +190,7 @@ class Shape(Block):
     pyramid: Pyramid | None = None
     cylinder: Cylinder | None = None
     cone: Cone | None = None
-    tag: (
-        Annotated[Tag, BeforeValidator(tag_block, json_schema_input_type=Tag | TagSides)] | None
-    ) = None
+    tag: TagChoice | None = None
     """Sides of a flat plate with symbols on one side: [40, 40] or 40 x 40 mm."""
     polyhedron: VerticesAndFaces | None = None
     file: PathText | None = None

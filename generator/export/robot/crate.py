@@ -73,8 +73,6 @@ def crate_chunks(root: Prim) -> Iterator[bytes]:
 
 
 class _Crate:
-    """The values so far, and the tables."""
-
     def __init__(self) -> None:
         self.values: list[bytes] = []
         self.size = _HEADER.size

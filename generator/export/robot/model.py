@@ -121,7 +121,6 @@ def _visuals(name: str, parts: Sequence[Part]) -> Iterator[ModelMesh]:
 def _in_object_frame(
     meshes: Iterable[tuple[Part, Mesh]],
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Return meshes of parts as one, mm."""
     return join_meshes(
         (transform(part.T_object_part, mesh.vertices), mesh.triangles) for part, mesh in meshes
     )

@@ -113,7 +113,6 @@ class StepBody:
                 self.rims[start, end] = self.rims[end, start] = (face, rim)
 
     def _used(self) -> list[int]:
-        """Return the vertices that edges end in."""
         used = {end for face in self.part.analytic for rim in (face.low, face.high)
                 for end in (rim.vertices[0], rim.vertices[-1])}  # fmt: skip
         for facet in self.planar:

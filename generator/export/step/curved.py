@@ -51,8 +51,6 @@ def round_entities(face: AnalyticFace) -> int:
 
 
 class _RoundFace:
-    """Writes one face."""
-
     def __init__(self, face: AnalyticFace, body: StepBody, entities: Entities, style: str) -> None:
         self.face, self.body, self.style = face, body, style
         self.file = entities
@@ -106,8 +104,6 @@ class _RoundFace:
 
 
 class _RoundSymbol:
-    """Writes one symbol on a round face."""
-
     def __init__(self, on: _RoundFace, symbol: BentSymbol) -> None:
         self.on, self.symbol = on, symbol
         self.file, self.add = on.file, on.file.add

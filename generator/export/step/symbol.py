@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,18 +97,6 @@ class _SymbolTopology:
     symbol: SymbolTemplate
     referred: tuple[_Referred, ...]  #: what its reference fields mean, in the order of first use
     quads: NDArray[np.int64]  #: (q, 4) points of each side, counter-clockwise from outside
-
-
-@lru_cache(maxsize=128)  # some .1 MB each; figures and symbols of many outlines share theirs
-def _topology(
-    sizes: tuple[tuple[int, ...], ...],
-    width: int,
-    decimal_width: int,
-    name_widths: tuple[int, ...],
-    coloured: bool,
-) -> _SymbolTopology:
-    """Return the entities of an outline with as many points in each ring of each tier."""
-    return _SymbolBuilder(sizes, width, decimal_width, name_widths, coloured).built()
 
 
 @lru_cache(maxsize=256)
@@ -243,3 +232,9 @@ class _SymbolBuilder:
         self.faces.append(self.add(*terms))
         if self.style and kind != "inside":
             self.coloured.append(self.add(f"STYLED_ITEM('',({self.style}),", self.faces[-1], ")"))
+
+
+@lru_cache(maxsize=128)  # some .1 MB each; figures and symbols of many outlines share theirs
+def _topology(*outline: Any) -> _SymbolTopology:
+    """Return the entities of an outline, given as `_SymbolBuilder` takes it."""
+    return _SymbolBuilder(*outline).built()

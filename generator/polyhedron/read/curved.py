@@ -34,8 +34,6 @@ _REMAKE = "check the model in a CAD program, make that face anew, and export it 
 
 @dataclass(slots=True)
 class _Found:
-    """The solid's facets so far."""
-
     points: list[Any] = field(default_factory=list)  #: (3,) mm
     faces: list[list[list[int]]] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
@@ -156,7 +154,6 @@ def _step(faces: list[Any], kinds: list[str], coarser: float) -> tuple[float, fl
 
 
 def _ids(wire: list[tuple[Any, list[int]]]) -> list[int]:
-    """Return the points around a wire, each once."""
     return [number for _, numbers in wire for number in numbers[:-1]]
 
 
@@ -348,7 +345,6 @@ def _two_chains(sides: list[Side]) -> tuple[list[int], list[int]] | None:
 
 
 def _join_chains(chains: list[list[int]]) -> list[int]:
-    """Return chains that follow each other as one."""
     return [*(number for chain in chains for number in chain[:-1]), chains[-1][-1]]
 
 

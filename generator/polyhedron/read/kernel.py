@@ -72,7 +72,6 @@ def describe_shape(shape: Any) -> dict[str, Any]:
 
 
 def _content_of(shape: Any, solids: int) -> str:
-    """Return what a shape holds in place of one solid."""
     from OCP.TopAbs import TopAbs_FACE
 
     if solids:
