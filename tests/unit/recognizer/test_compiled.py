@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from c_library import compile_kernels
 from hypothesis import given as drawn
+from hypothesis import settings
 from hypothesis import strategies as st
 
 from encoded_objects.base.compiled import KernelsError, load_library, sources_in
@@ -164,6 +165,7 @@ HELD = st.lists(
 )  # fmt: skip
 
 
+@settings(deadline=None)
 @drawn(held=HELD, seed=st.integers(0, 999))
 def test_places_score_alike_in_a_table_and_by_search(held, seed):
     draw = np.random.default_rng(seed)
@@ -189,6 +191,7 @@ def test_places_score_alike_in_a_table_and_by_search(held, seed):
     assert counts[0] == counts[1] <= len(held)
 
 
+@settings(deadline=None)
 @drawn(names=st.lists(st.integers(0, 2**62) | st.integers(0, 40) | st.integers(2**22, 2**22 + 9)))
 def test_names_are_counted_alike(names):
     given_ = np.array(names, np.int64)
