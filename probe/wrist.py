@@ -35,7 +35,6 @@ from numpy.typing import ArrayLike, NDArray
 from probe.contact.contract import WristStiffness
 from probe.errors import PoseError
 
-FREEDOMS: Final = ("z", "theta_x", "theta_y")
 _MANY: Final = 6.0  # standard deviations that do not happen
 _LEAST_SIN_GAMMA: Final = 0.02  # below, 0.01 mm of error is more than half a degree
 
@@ -75,11 +74,6 @@ class Wrist:
         side = self.ab_mm / 2 * np.array([math.cos(self.gamma_rad), math.sin(self.gamma_rad)])
         across = np.array([self.ad_mm / 2, 0.0])
         return np.array([side - across, -side - across, across - side, across + side])
-
-    def ranges(self) -> tuple[tuple[float, float], ...]:
-        """Return the end stops of z (mm), theta_x and theta_y (rad)."""
-        tilt = (-self.tilt_rad, self.tilt_rad)
-        return (self.travel_mm, tilt, tilt)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,9 +157,9 @@ def wrist_pose(wrist: Wrist, distances: ArrayLike) -> WristPose:
             f"the four distances {np.round(d, 3).tolist()} mm lie {abs(twist):.3g} mm off a plane",
             fix="check the transducers: two opposite ones must have the sum of the other two",
         )
-    for name, value, (low, high), error in zip(
-        FREEDOMS, (z, theta_x, theta_y), wrist.ranges(), sd, strict=True
-    ):
+    tilts = (-wrist.tilt_rad, wrist.tilt_rad)
+    freedoms = (("z", z, wrist.travel_mm), ("theta_x", theta_x, tilts), ("theta_y", theta_y, tilts))
+    for (name, value, (low, high)), error in zip(freedoms, sd, strict=True):
         if not low - _MANY * error <= value <= high + _MANY * error:
             raise PoseError(
                 f"{name} is {value:.4g}, the end stops are at {low:.4g} and {high:.4g}",

@@ -1,7 +1,8 @@
 """Inner loops compiled from C, which a package keeps next to the Python that calls them.
 
 `hatch_build.py` makes one `kernels.so` of all C files in a folder when the project is installed.
-Each loop has a form in numpy, its reference, in `tests/reference`; tests hold both together.
+Tests hold them to plain forms, and the answers of thousands of touches (`tests/corpora`) to what
+they were.
 """
 
 from __future__ import annotations

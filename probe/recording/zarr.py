@@ -58,27 +58,21 @@ class ZarrArray:
         """Return what slices of step 1 hold."""
         time, *rest = slices
         start, stop, _ = time.indices(self.shape[0])
-        inner = self.shape[1:] if self.channel is None else (1, *self.shape[1:])
-        made = np.full((max(0, stop - start), *inner), self.fill, self.dtype)
-        first = 0 if self.channel is None else self.channel
-        size, per = self.chunks[0], self.chunks[1:]
-        ends = [math.ceil(n / c) for n, c in zip(inner, per, strict=True)]
-        columns: list[range] = [range(n) for n in ends]
+        spans = [(start, max(start, stop)), *((0, n) for n in self.shape[1:])]
         if self.channel is not None:
-            columns[0] = range(first // per[0], first // per[0] + 1)
-        for row in range(start // size, math.ceil(stop / size)):
-            for at in itertools.product(*columns):
-                chunk = self._chunk((row, *at))
-                if chunk is None:
-                    continue
-                low = max(start, row * size)
-                high = min(stop, (row + 1) * size)
-                part = chunk[low - row * size : high - row * size]
-                places = [slice(k * c, (k + 1) * c) for k, c in zip(at, per, strict=True)]
-                if self.channel is not None:
-                    part, places[0] = part[:, first % per[0]][:, None], slice(0, 1)
-                target = made[(slice(low - start, high - start), *places)]
-                target[...] = part[tuple(slice(0, n) for n in target.shape)]
+            spans.insert(1, (self.channel, self.channel + 1))
+        made = np.full([high - low for low, high in spans], self.fill, self.dtype)
+        sides = zip(spans, self.chunks, strict=True)
+        for at in itertools.product(*(range(a // c, math.ceil(b / c)) for (a, b), c in sides)):
+            chunk = self._chunk(at)
+            if chunk is None:
+                continue
+            here, there = [], []  # of the chunk, of what is made
+            for k, c, (low, high) in zip(at, self.chunks, spans, strict=True):
+                first, last = max(low, k * c), min(high, (k + 1) * c)
+                here.append(slice(first - k * c, last - k * c))
+                there.append(slice(first - low, last - low))
+            made[tuple(there)] = chunk[tuple(here)]
         whole = made if self.channel is None else made[:, 0]
         return np.asarray(whole[(slice(None), *rest)])
 

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from generator.database.registered import RegisteredPart
+from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
 from generator.printed.prints import (
     PrintJob,
     PrintPlan,
@@ -71,21 +70,11 @@ class PartToPrint:
         print_part(self.job, options.plan(), folder)
 
 
-def parts_to_print(
-    database: str, object_name: str, files: Mapping[str, tuple[RegisteredPart, Path]]
-) -> Iterator[PartToPrint]:
-    """Yield the parts that bear faces of an object.
-
-    `files` holds, for each face with symbols, the part that bears it and its STL file.
-    """
-    held = registered_object(database, object_name)
-    parts: dict[str, list[str]] = {}
-    for face, (part, _) in files.items():
-        parts.setdefault(part.name, []).append(face)
-    for faces in parts.values():
-        part, file = files[faces[0]]
-        job, unseen = print_job(held, part, file, [face_of(held, face) for face in faces])
-        yield PartToPrint(object_name, job, unseen)
+def part_to_print(
+    held: RegisteredObject, part: RegisteredPart, file: Path, faces: list[RegisteredFace]
+) -> PartToPrint:
+    """Return a part of an object, its STL file, and those of its faces that bear symbols."""
+    return PartToPrint(held.entry.name, *print_job(held, part, file, faces))
 
 
 def listing_of(parts: list[PartToPrint], options: PrintOptions, folder: Path, base: Path) -> str:

@@ -80,20 +80,14 @@ class TouchOptions:
             low, high = TouchRanges().force_n
             ranges = TouchRanges(force_n=(share * low, share * high))
             drawn = next(random_touches(scene.region, rng, ranges))
-        values = tuple(
-            other if named is None else named
-            for named, other in (
-                (self.x_mm, drawn.x_mm),
-                (self.y_mm, drawn.y_mm),
-                (self.theta_deg, math.degrees(drawn.theta_rad)),
-                (self.force_n, drawn.force_n),
-                (self.tilt_x_deg, math.degrees(drawn.tilt_x_rad)),
-                (self.tilt_y_deg, math.degrees(drawn.tilt_y_rad)),
-            )
-        )
+        turns = map(math.degrees, (drawn.theta_rad, drawn.tilt_x_rad, drawn.tilt_y_rad))
+        others = (drawn.x_mm, drawn.y_mm, drawn.force_n, *turns)
+        named = (self.x_mm, self.y_mm, self.force_n,
+                 self.theta_deg, self.tilt_x_deg, self.tilt_y_deg)  # fmt: skip
+        values = tuple(b if a is None else a for a, b in zip(named, others, strict=True))
         if not all(map(math.isfinite, values)):
             raise SurfaceError("a touch at what is no finite number", fix="give mm, degrees and N")
-        x, y, theta, force, tilt_x, tilt_y = values
+        x, y, force, theta, tilt_x, tilt_y = values
         return Touch(x, y, math.radians(theta), force, math.radians(tilt_x), math.radians(tilt_y),
                      drawn.wrist)  # fmt: skip
 

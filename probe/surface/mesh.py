@@ -1,7 +1,7 @@
 """The highest triangle of a mesh over each point, exactly.
 
 Triangles (mm) + frame -> `MeshSurface`. Triangles are sorted into square bins once; a point asks
-its bin's triangles alone, in C (heights.c; its form in numpy is in tests/reference). The side of an
+its bin's triangles alone, in C (heights.c; its form in numpy is in its tests). The side of an
 edge is computed from the edge's lower corner for both triangles that share it, so a point on an
 edge lies in at least one of them. Walls that stand upright cover no area and are left out, as are
 the undersides of a closed mesh.

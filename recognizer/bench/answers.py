@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab
+from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab, find_face
 from recognizer.touch.recognition import Recognition
 
 Array = NDArray[np.float64]
@@ -43,10 +43,11 @@ def answer_json(recognition: Recognition, lab: Lab, sensor: SensorType) -> dict[
         answer["advice"] = f"{rest or short}; {recognition.way_out}"
     answer["noise"] = None if recognition.noise is None else round(recognition.noise, 3)
     pose = recognition.T_face_probe
-    found = _face(lab, recognition)
+    found = find_face(lab, recognition.object or "", recognition.face or "")
     if pose is None or found is None or recognition.covariance is None:
         return answer | {"place": None, "symbols": [], "window": None}
-    number, encoding, face = found
+    encoding = lab.arrays[found[0]]
+    face = encoding.face(found[1])
     (x, y), theta = pose[:2, 3].tolist(), math.atan2(pose[1, 0], pose[0, 0])
     spread = np.sqrt(np.diag(recognition.covariance))
     return answer | {
@@ -57,16 +58,8 @@ def answer_json(recognition: Recognition, lab: Lab, sensor: SensorType) -> dict[
         },
         "symbols": _symbols_in_view(encoding, face, sensor, pose),
         "turn": round(-face.rotation_rad - theta, 5),
-        "window": {"encoding": number, "corners": _corners(encoding, face, sensor, pose)},
+        "window": {"encoding": found[0], "corners": _corners(encoding, face, sensor, pose)},
     }  # fmt: skip
-
-
-def _face(lab: Lab, recognition: Recognition) -> tuple[int, EmbossedArray, EncodedFace] | None:
-    for number, encoding in enumerate(lab.arrays):
-        for face in encoding.known.values():
-            if (face.object, face.face) == (recognition.object, recognition.face):
-                return number, encoding, face
-    return None
 
 
 def _symbols_in_view(

@@ -76,19 +76,14 @@ def _require_face(lab: Lab, object_name: str, face: str) -> None:
     from encoded_objects.base.output import some_of
     from recognizer.errors import LabError
 
-    known = {each.names[one] for each in lab.arrays for one in each.faces[:, 0].tolist()}
-    if object_name not in known:
+    faces = [each.face(number).face for each in lab.arrays for number in each.faces_of(object_name)]
+    if not faces:
+        known = {each.names[one] for each in lab.arrays for one in each.faces[:, 0].tolist()}
         raise LabError(
             f"no object with symbols is called '{object_name}'",
             fix=f"objects: {some_of(sorted(known), SHOWN)}",
             place=lab.url,
         )
-    faces = [
-        each.face(number).face
-        for each in lab.arrays
-        for number, (object_id, _) in enumerate(each.faces.tolist())
-        if each.names[object_id] == object_name
-    ]
     if face not in faces:
         raise LabError(
             f"no face with symbols of {object_name} is called '{face}'",

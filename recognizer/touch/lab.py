@@ -161,6 +161,17 @@ class EmbossedArray:
             self.known.update(zip(numbers.tolist(), found, strict=True))
         return self.known[number]
 
+    def faces_of(self, object_name: str) -> list[int]:
+        """Return the numbers of an object's faces; none if other arrays bear them."""
+        numbers: list[int] = np.flatnonzero(
+            self.faces[:, 0] == self._ids.get(object_name, -1)
+        ).tolist()
+        return numbers
+
+    @cached_property
+    def _ids(self) -> dict[str, int]:
+        return {name: object_id for object_id, name in self.names.items()}
+
 
 def cell_keys(columns: int, rows: Ints, columns_at: Ints) -> NDArray[np.uint64]:
     """Return row * columns + column of cells on the torus, exact up to 2^64 cells."""
@@ -194,6 +205,15 @@ class Lab:
             count_of(symbols, "symbol"),
         )
         return f"{without_password(self.url)}: {', '.join(held)}"
+
+
+def find_face(lab: Lab, object_name: str, face: str) -> tuple[int, int] | None:
+    """Return which array of a lab bears a face, and its number there; None if none does."""
+    for which, each in enumerate(lab.arrays):
+        for number in each.faces_of(object_name):
+            if each.face(number).face == face:
+                return which, number
+    return None
 
 
 def open_lab(database: str | Path) -> Lab:

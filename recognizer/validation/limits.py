@@ -33,8 +33,7 @@ from probe.simulate.world.levels import TYPICAL, Level
 from probe.simulate.world.sensor import COUNTS_PER_N, FULL
 from recognizer.touch.chance import expected_by_border, expected_matches, place_bits
 from recognizer.touch.hypothesis import Hypothesis, labels_at
-from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.prepare import Prepared
+from recognizer.touch.lab import EmbossedArray, find_face
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at
 from recognizer.touch.signal import Signal
@@ -51,7 +50,7 @@ from recognizer.touch.verify import TouchImages, verify_hypotheses
 from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.statistics import rms, round_digits, share_of
 from recognizer.validation.touch_plan import TouchPlan
-from recognizer.validation.trial import RIGHT, WRONG, Row, judge, number_of_face
+from recognizer.validation.trial import RIGHT, WRONG, Row, judge
 
 Array = NDArray[np.float64]
 
@@ -136,11 +135,12 @@ def bound_of_touch(
     reader: Reader, signal: Signal, found: DrawnTouch, errors: ReadingErrors
 ) -> Array | None:
     """Return the Cramer-Rao bound (3, 3) of a touch; None where nothing presses."""
-    held = _true_face(reader, found)
+    scene, touch = found.contact.scene, found.touch
+    held = find_face(reader.lab, scene.object_name, scene.face)
     if held is None:
         return None
-    prepared, number = held
-    embossed, touch = prepared.embossed, found.touch
+    prepared, number = reader.prepared[held[0]], held[1]
+    embossed = prepared.embossed
     place, pose = true_lattice(embossed, number, touch)
     image, face = reader.image(signal, prepared), embossed.face(number)
     gains = [one for one in (first_gain(image), tilted_gain(image), deep_gain(image))
@@ -158,15 +158,6 @@ def bound_of_touch(
     best = int(np.argmax(lattices.value))
     true = np.append(pose, lattices.pose[best, 3:])
     return least_covariance(image, true, lattices.gain[best], labels_at(embossed, [place]), errors)
-
-
-def _true_face(reader: Reader, found: DrawnTouch) -> tuple[Prepared, int] | None:
-    scene = found.contact.scene
-    for prepared in reader.prepared:
-        number = number_of_face(prepared.embossed, scene.object_name, scene.face)
-        if number is not None:
-            return prepared, number
-    return None
 
 
 def limit_of(plan: TouchPlan, number: int, reader: Reader) -> Row:

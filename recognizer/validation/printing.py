@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from generator.database.open import normal_url, part_path
+from generator.database.registered import RegisteredFace, RegisteredPart
 from probe.simulate.printed import (
     PROFILE,
     PartToPrint,
     PrintOptions,
     listing_of,
-    parts_to_print,
+    part_to_print,
     read_listing,
 )
 from probe.simulate.registered import registered_object, registered_objects
@@ -84,14 +85,15 @@ def find_parts(database: str) -> list[PartToPrint]:
     parts: list[PartToPrint] = []
     for name in registered_objects(database):
         held = registered_object(database, name)
-        files = {}
+        bearers: dict[str, tuple[RegisteredPart, list[RegisteredFace]]] = {}
         for face in held.faces:
             if face.placement is not None:
                 part = stl_part(held, face.name)
-                files[face.name] = (part, part_path(url, part.file))
-        for part, path in {part.file: (part, path) for part, path in files.values()}.values():
+                bearers.setdefault(part.name, (part, []))[1].append(face)
+        for part, faces in bearers.values():
+            path = part_path(url, part.file)
             check_file(path, part)
-        parts += parts_to_print(database, name, files)
+            parts.append(part_to_print(held, part, path, faces))
     if not any(part.job.faces for part in parts):
         raise ValidationError(
             "no face of this set is simulated as printed: all lean, look down or are round",

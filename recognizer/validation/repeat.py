@@ -14,22 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
+from recognizer.touch.lab import find_face
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
 from recognizer.validation.campaign import series_of
-from recognizer.validation.draw import DrawnTouch, draw_touch
+from recognizer.validation.draw import DrawnTouch
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.pictures import WORDS, figure_on
 from recognizer.validation.run import read_record
-from recognizer.validation.trial import (
-    MOST,
-    NEXT,
-    find_face,
-    judge,
-    judge_all,
-    touch_until_answered,
-)
+from recognizer.validation.trial import judge_all, touches_of
 from recognizer.validation.workers import reader_now
 
 if TYPE_CHECKING:
@@ -65,17 +58,11 @@ def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]
         )
     plan = work.plan(series, number)
     reader = plan.knowing(reader_now(work))
-    if plan.policy == NEXT:
-        made = list(touch_until_answered(plan, number, reader, MOST))
-        found, answer = made[-1].found, made[-1].answer
-        row = judge_all(plan, number, made, reader).row()
-    else:
-        found = draw_touch(plan, number, reader)
-        answer = recognise(reader, reader.signal(found.counts), number)
-        row = judge(plan, number, found, answer, reader).row()
+    made = touches_of(plan, number, reader)
+    found, answer = made[-1].found, made[-1].answer
     row = {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in row.items()
+        for name, value in judge_all(plan, number, made, reader).row().items()
     }
     if plot is not None:
         with figure_on(plot, 2, 2, (10.5, 10.0)) as axes:
@@ -109,7 +96,8 @@ def _draw_answer(
             axis.plot(*np.array([start, end]).T, color="#555c66", lw=1)
         held = find_face(reader.lab, scene.object_name, scene.face)
         if held is not None:
-            axis.plot(*held[0].centres_mm.T, ".", color="#aab0b8", ms=3)
+            face = reader.lab.arrays[held[0]].face(held[1])
+            axis.plot(*face.centres_mm.T, ".", color="#aab0b8", ms=3)
         axis.plot(*_outline(reader, touch), color=TRUTH, label="truth")
     if answer:
         own = scene is not None and (answer.object, answer.face) == (scene.object_name, scene.face)

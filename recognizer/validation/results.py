@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from typing import Any
 
 import numpy as np
@@ -364,9 +364,8 @@ def _worst_touches(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
     unanswered = unanswered[np.argsort(-rows["symbols"][unanswered], kind="stable")]
     right = np.flatnonzero(verdict == RIGHT)
     far = right[np.argsort(-error[right], kind="stable")]
-    chosen = wrong.tolist()[:WORST]
-    for pair in range(WORST):
-        chosen += [*unanswered[pair : pair + 1].tolist(), *far[pair : pair + 1].tolist()]
+    pairs = zip_longest(unanswered[:WORST].tolist(), far[:WORST].tolist())
+    chosen = [*wrong.tolist()[:WORST], *(i for pair in pairs for i in pair if i is not None)]
     keep = ("number", "kind", "surface", "level", "object", "face", "symbols", "verdict",
             "reason", "answer", "force_n", "tilt_deg", "edge_mm", "error_mm", "error_deg",
             "margin")  # fmt: skip

@@ -27,7 +27,7 @@ from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.scan import surface_to_sensor
 from recognizer.scan.session import Scan
-from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab
+from recognizer.touch.lab import find_face
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import NextTouch, Recognition
@@ -105,14 +105,7 @@ OF_ANSWER = ("verdict", "reason", "answer", "error_mm", "error_deg", "chi2", "ma
 def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
     """Return the outcome of one touch, or of those that followed it: first place, last answer."""
     reader = plan.knowing(reader)
-    if plan.policy == NEXT:
-        return judge_all(
-            plan, number, list(touch_until_answered(plan, number, reader, MOST)), reader
-        )
-    found = draw_touch(plan, number, reader)
-    start = time.process_time()
-    answer = recognise(reader, reader.signal(found.counts), number)
-    return judge(plan, number, found, answer, reader, time.process_time() - start)
+    return judge_all(plan, number, touches_of(plan, number, reader), reader)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,6 +115,16 @@ class PolicyTouch:
     found: DrawnTouch
     answer: Recognition
     seconds: float  #: CPU, of reading
+
+
+def touches_of(plan: TouchPlan, number: int, reader: Reader) -> list[PolicyTouch]:
+    """Return the touches of a trial, read: one, or those that follow each other."""
+    if plan.policy == NEXT:
+        return list(touch_until_answered(plan, number, reader, MOST))
+    found = draw_touch(plan, number, reader)
+    start = time.process_time()
+    answer = recognise(reader, reader.signal(found.counts), number)
+    return [PolicyTouch(found, answer, time.process_time() - start)]
 
 
 def touch_until_answered(
@@ -147,6 +150,8 @@ def judge_all(plan: TouchPlan, number: int, made: list[PolicyTouch], reader: Rea
     """Return the outcome of touches that followed each other: first place, last answer."""
     spent = sum(one.seconds for one in made)
     first = judge(plan, number, made[0].found, made[0].answer, reader, spent)
+    if len(made) == 1:
+        return first
     last = judge(plan, number, made[-1].found, made[-1].answer, reader)
     answered = {name: getattr(last, name) for name in OF_ANSWER}
     return replace(first, touches=len(made), **answered)
@@ -180,6 +185,7 @@ def judge(
 ) -> Trial:
     """Compare an answer with the truth; `seconds` is the CPU time of reading."""
     scene, touch = found.truth_of(answer.object, answer.face)
+    held = find_face(reader.lab, scene.object_name, scene.face) if scene else None
     error, degrees, chi2, verdict = math.nan, math.nan, math.nan, REJECTED
     if answer:
         verdict = WRONG
@@ -190,20 +196,20 @@ def judge(
         ):  # fmt: skip
             away = _away(T, touch)
             if math.hypot(away[0], away[1]) >= NEAR_MM:
-                held = find_face(reader.lab, *touched)
-                if held is not None and held[0].round:
-                    away = _away(T, _across_seam(held[0].round, T, touch))
+                bent = reader.lab.arrays[held[0]].face(held[1]).round if held else None
+                if bent is not None:
+                    away = _away(T, _across_seam(bent, T, touch))
             error, degrees = math.hypot(away[0], away[1]), math.degrees(away[2])
             chi2 = float(away @ np.linalg.solve(answer.covariance, away))
             verdict = RIGHT if error < NEAR_MM and abs(degrees) < NEAR_DEG else WRONG
     edge, symbols, enough = math.nan, 0, False
     if scene is not None:
         edge = float(scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0])
-        held = find_face(reader.lab, scene.object_name, scene.face)
         if held is not None:
-            own = touch.on_sensor(held[0].centres_mm)
+            encoding = reader.lab.arrays[held[0]]
+            own = touch.on_sensor(encoding.face(held[1]).centres_mm)
             symbols = int((np.abs(own) < reader.sensor.half_mm).all(axis=1).sum())
-            enough = plan.kind != "worn" and symbols >= ENOUGH * held[1]
+            enough = plan.kind != "worn" and symbols >= ENOUGH * math.prod(encoding.array.window)
     return Trial(
         number=number,
         kind=plan.counted_as or plan.kind,
@@ -249,20 +255,3 @@ def _across_seam(face: RoundFace, T_face_probe: Array, touch: Touch) -> Touch:
     x, y = (T @ (touch.x_mm, touch.y_mm, 0.0, 1.0))[:2].tolist()
     c, s = (T[:2, :2] @ (math.cos(touch.theta_rad), math.sin(touch.theta_rad))).tolist()
     return replace(touch, x_mm=x, y_mm=y, theta_rad=math.atan2(s, c))
-
-
-def find_face(lab: Lab, object_name: str, face: str) -> tuple[EncodedFace, int] | None:
-    """Return a face of the lab, and the cells of its array's window; None if it is foreign."""
-    for encoding in lab.arrays:
-        number = number_of_face(encoding, object_name, face)
-        if number is not None:
-            window = encoding.array.window
-            return encoding.face(number), window[0] * window[1]
-    return None
-
-
-def number_of_face(encoding: EmbossedArray, object_name: str, face: str) -> int | None:
-    """Return the number of a face on an array; None if another one bears it."""
-    ids = [number for number, name in encoding.names.items() if name == object_name]
-    numbers: list[int] = np.flatnonzero(np.isin(encoding.faces[:, 0], ids)).tolist()
-    return next((number for number in numbers if encoding.face(number).face == face), None)

@@ -120,32 +120,6 @@ def test_pose_of_a_touch_carries_sensor_points_onto_the_tips_plane(lab):
     assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3))
 
 
-@pytest.mark.parametrize("kind", ["raster", "kinesthetic"])
-def test_a_scan_carries_the_poses_that_the_robot_believes(lab, tmp_path, kind):
-    out, truth = tmp_path / "a.h5", tmp_path / "a.json"
-    words = ["simulate", f"{lab / 'lab.db'}#Cube/F1", "--scan", kind, "--theta", "30",
-             "--force", "50", "--touches", "3", "--frames", "2"]  # fmt: skip
-    assert run([*words, "-o", str(out), "--truth", str(truth)]) == 0
-    held, told = Recording(out), json.loads(truth.read_text())
-    block, kept = held.block(), told["touches"]
-    assert (told["scan"], held.origin.more["scan"], len(kept), len(held)) == (kind, kind, 3, 6)
-    true = np.repeat([one["T_base_probe"] for one in kept], 2, axis=0)
-    off_mm = np.linalg.norm((block.pose - true)[:, :3, 3], axis=1)
-    places = np.array([(one["x_mm"], one["y_mm"]) for one in kept])
-    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    assert min(steps) == pytest.approx(4.25 * 1.5875, abs=1.0)
-    assert max(steps) < 2 * 4.25 * 1.5875
-    assert [one["theta_deg"] for one in kept] == pytest.approx([30] * 3, abs=0.3)
-    if kind == "raster":
-        assert (block.pose == true).all()
-        assert not block.wrist.any()
-        return
-    assert 0.02 < off_mm.max() < 6 * held.origin.more["pose_error_mm"] < 2
-    assert [one["felt_n"] for one in kept] == pytest.approx([50] * 3, abs=1.1)
-    middle = (10 - 50 / 8 + 7.5) * 1023 / 25
-    assert block.wrist.mean(axis=1) == pytest.approx([middle] * 6, abs=8)
-
-
 def test_a_round_face_is_scanned_from_all_around(lab, tmp_path):
     target, truth = f"{lab / 'lab.db'}", tmp_path / "a.json"
     (face,) = (face for face in registered_object(target, "Can").faces if face.round is not None)

@@ -12,17 +12,13 @@ import time
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-import numpy as np
 import psutil
 import pyarrow.parquet as pq
 import pytest
 
-from recognizer.touch.lab import open_lab
-from recognizer.touch.reader import Reader
 from recognizer.validation.command import run
-from recognizer.validation.draw import draw_touch
 from recognizer.validation.errors import SetError
-from recognizer.validation.touch_plan import TouchPlan, written_surface
+from recognizer.validation.touch_plan import written_surface
 
 TOUCHES, SHARD = 18, 6
 COMMAND = [sys.executable, "-m", "recognizer.validation.command"]
@@ -208,24 +204,6 @@ def test_a_report_of_what_no_database_knows_shows_no_errors_of_right_answers(ref
     )
     assert "When it answers" in blank
     assert ("How far off" in blank, "How far off" in usual) == (False, True)
-
-
-def test_written_files_are_what_is_registered(reference):
-    database = str(reference[0] / "lab.db")
-    reader = Reader(open_lab(database))
-    for number in range(4):
-        said, written = (
-            draw_touch(TouchPlan(database, level="low", files=files), number, reader)
-            for files in (False, True)
-        )
-        assert said.touch == written.touch
-        points = said.touch.on_surface(reader.sensor.centres_mm()).reshape(-1, 2)
-        points = points[said.contact.scene.region.distance_mm(points) > 0.5]
-        points = points[said.contact.scene.region.contains(points)]
-        a, b = (each.contact.scene.surface.heights_mm(points) for each in (said, written))
-        np.testing.assert_allclose(a, b, atol=2e-5)
-        near = said.contact.scene.region.distance_mm(points).min() > 1
-        assert not near or np.array_equal(said.counts, written.counts)
 
 
 def test_a_changed_file_is_found_out(reference, tmp_path):

@@ -6,12 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from probe.circuit import (
-    QUIET,
-    Electronics,
-    effective_resistances,
-    invert_readings,
-)
+from probe.circuit import QUIET, Electronics, effective_resistances, invert_readings
 from probe.circuit.network import solve_floating
 from probe.circuit.reading import scan_shares, shares, unscan_shares
 

@@ -10,13 +10,7 @@ from hypothesis import strategies as st
 from reference.expanded_solid import assert_expanded
 from reference.laid_symbols import filled, is_closed, mesh_volume
 
-from generator.alphabet import (
-    ALPHABETS,
-    SymbolStyle,
-    check_printable,
-    footprint_half_mm,
-    outlines,
-)
+from generator.alphabet import ALPHABETS, SymbolStyle, check_printable, footprint_half_mm, outlines
 from generator.errors import AlphabetError, SolidError
 from generator.plane.polygon import distance, edges_cross, points_inside, signed_area
 from generator.polyhedron.shapes import prism, pyramid

@@ -1,6 +1,6 @@
 """The compiled loops of reading: their library, their arguments, and the numbers they use.
 
-The forms in numpy are in `tests/reference/touch_loops.py`.
+An evaluation and the last fit have forms in numpy, `linearize` and `posterior`.
 
 Noise: psi of a reading (`template.psi`) spreads in proportion to its value (gain, height and force
 law differ from tactel to tactel), to the slope of the template (tips stand aside), and little where

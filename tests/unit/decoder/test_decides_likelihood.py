@@ -275,12 +275,14 @@ def test_the_index_is_the_one_congruent_to_row_and_column(name):
 
 @pytest.mark.parametrize(
     "options",
-    [{"doubt": 0.0}, {"doubt": 1.01}, {"blank": -0.01}, {"blank": 1.0},
-     {"rotations": ()}, {"rotations": (4,)}, {"rotations": (0, -1)}],
+    [{"doubt": 0.0}, {"doubt": 1.01}, {"blank": -0.01}, {"blank": 1.0}, {"prior": [1, 2]},
+     {"prior": np.zeros((0, 2), int)}, {"rotations": ()}, {"rotations": (4,)},
+     {"rotations": (0, -1)}],
 )  # fmt: skip
-def test_what_is_no_probability_and_no_turn_is_refused(options):
-    with pytest.raises(WindowError):
-        Likelihood(BINARY, **options)
+def test_what_is_no_probability_no_place_and_no_turn_is_refused(options):
+    with pytest.raises(WindowError) as refused:
+        Likelihood(BINARY, **options).decode(np.zeros((6, 6), int))
+    assert refused.value.fix
     Likelihood(BINARY, doubt=1.0, blank=0.0, rotations=(0, 1, 2, 3))  # the bounds
     Likelihood(BINARY, doubt=1e-12, blank=0.999, rotations=(3,))
 

@@ -78,15 +78,6 @@ def test_a_batch_may_be_empty():
     assert len(decode_good_tuple(ROBUST, np.zeros((0, 6, 6), int))) == 0
 
 
-def test_a_surface_without_code_is_told_apart():
-    rng = np.random.default_rng(11)
-    noise = rng.integers(0, 2, (2000, 8, 8))
-    found = Likelihood(ROBUST).decode(noise)
-    assert found.answered.mean() < 1e-3
-    reasons = [d.reason for d in found]
-    assert reasons.count("not an encoded surface") > 1900
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1.01e6])
 def test_scores_that_are_not_finite_are_refused(bad):
     scores = np.zeros((6, 6, 2))
@@ -95,16 +86,6 @@ def test_scores_that_are_not_finite_are_refused(bad):
     scores[1, 1, 1] = bad
     with pytest.raises(WindowError, match="finite"):
         decode_likelihood(ROBUST, scores)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [{"error": 0.5}, {"prior": [1, 2]}, {"prior": np.zeros((0, 2), int)}],
-)  # fmt: skip
-def test_options_out_of_range_are_refused(options):
-    with pytest.raises(WindowError) as refused:
-        decode_likelihood(ROBUST, np.zeros((6, 6), int), **options)
-    assert refused.value.fix
 
 
 def test_good_tuple_is_the_weaker_way():

@@ -4,20 +4,11 @@ import numpy as np
 import pytest
 from reference.polynomials import windows_are_unique
 
-from generator.array import (
-    FoldedArray,
-    Sequence,
-    array_from,
-    next_larger,
-    profile,
-)
+from generator.array import FoldedArray, Sequence, array_from, next_larger, profile
 from generator.array.field import field_of_order
 from generator.array.fold import folds, usual_fold
 from generator.array.polynomial import is_primitive, primitive_polynomial
-from generator.array.window import (
-    least_weight_by_dual,
-    minimum_distance,
-)
+from generator.array.window import least_weight_by_dual, minimum_distance
 from generator.errors import ArrayError
 
 

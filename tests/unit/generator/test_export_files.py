@@ -18,11 +18,7 @@ from generator.errors import WriteError
 from generator.export import threemf as package_module
 from generator.export.bed import arrange_plates
 from generator.export.check import cut_triangles, perhaps_folded, triangles_cross
-from generator.export.fixed_text import (
-    decimal_numbers,
-    decimal_width,
-    number_lines,
-)
+from generator.export.fixed_text import decimal_numbers, decimal_width, number_lines
 from generator.export.robot.crate import Attribute, Prim, crate_chunks
 from generator.export.threemf import deflate_text, zip_package
 from generator.polyhedron.shapes import dodecahedron

@@ -10,10 +10,7 @@ from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet.outline import SymbolStyle
 from generator.layout.obstacle import solid_edges
 from generator.layout.placement import FaceLayout, Placement
-from generator.layout.recognition_rate import (
-    answered_share,
-    measured_types,
-)
+from generator.layout.recognition_rate import answered_share, measured_types
 from generator.layout.sensor_view import (
     MEETS_MM2,
     SAG_MM,

@@ -13,13 +13,7 @@ import numpy as np
 import pytest
 
 from generator.errors import PrintError
-from generator.printed.deposit import (
-    Beads,
-    Deposit,
-    beads_of,
-    dot_size,
-    section_size,
-)
+from generator.printed.deposit import Beads, Deposit, beads_of, dot_size, section_size
 from generator.printed.faults import NAMED, PrintFaults, print_faults
 from generator.printed.gcode import toolpath_of
 from generator.printed.view import DEPTH_MM, face_surface, heights_from_above, heights_sideways

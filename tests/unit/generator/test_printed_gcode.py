@@ -12,14 +12,7 @@ import numpy as np
 import pytest
 
 from generator.errors import PrintError
-from generator.printed.gcode import (
-    ROLES,
-    ArcError,
-    chords,
-    read_gcode,
-    role_of,
-    toolpath_of,
-)
+from generator.printed.gcode import ROLES, ArcError, chords, read_gcode, role_of, toolpath_of
 
 FILES = Path(__file__).parent / "gcode"
 SECTION = 0.2 * (0.45 - 0.2 * (1 - math.pi / 4))  #: of the beads in gcode/README.md

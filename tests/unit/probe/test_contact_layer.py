@@ -7,14 +7,14 @@ import pytest
 from reference.indenters import Formula, sphere
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from probe.contact.contract import Touch, WristStiffness
+from probe.contact.contract import STEEPEST_RAD, Touch, WristStiffness
 from probe.contact.layer import layer
 from probe.contact.layer_equilibrium import deep_mm, descend, equilibrium, plate_of, springs_mm
 from probe.contact.layer_influence import influence
 from probe.contact.layer_patch import DepthWindow, levels_of, patch_under
 from probe.contact.plate import PlatePose
 from probe.errors import ContactError
-from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, RoughSurface, Washer
+from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, RoughSurface, TiltedPlane, Washer
 
 FREE, HELD = WristStiffness(0.0, 0.0), WristStiffness(math.inf, math.inf)
 
@@ -78,6 +78,31 @@ def test_no_tension_no_penetration_and_balance(scene, poisson, method):
         np.array([touch.force_n, 0, 0])[plate.free], abs=1e-4 * touch.force_n
     )
     assert found.plate[~plate.free] == pytest.approx(plate.start[~plate.free])
+
+
+@pytest.mark.parametrize(
+    ("seed", "surface"),
+    [(10, RaisedStrip(1.3)), (13, TiltedPlane(0.05, -0.08)), (23, RoughSurface(1, 0.1, 1.5))],
+)
+def test_scenes_at_random_are_finite_and_balanced(seed, surface):
+    rng = np.random.default_rng([5, seed])
+    height, young = 10 ** rng.uniform(math.log10(0.05), math.log10(20)), 10 ** rng.uniform(-1, 2)
+    sensor = pad(height_mm=height, young_mpa=young,
+                 poisson=float(rng.choice([0, 0.3, 0.45, 0.49, 0.4999, 0.5])))  # fmt: skip
+    force = young * min(height, 2.0) * 10 ** rng.uniform(-3, 0.5)
+    wrist = WristStiffness(*(force * 10 ** rng.uniform(2, 6, 2)))
+    x, y = rng.uniform(-5, 5, 2)
+    tilts = rng.uniform(-0.17, 0.17, 2) * (rng.random() < 0.5)
+    touch = Touch(x, y, rng.uniform(0, 6.3), force, *tilts, wrist)
+    found, why = attempt(surface, sensor, touch, cells_per_tactel=2)
+    if found is None:
+        assert any(word in why for word in ("tips", "press the pad", "strokes"))
+        return
+    assert np.isfinite(found.forces_n).all()
+    assert found.forces_n.min() >= 0
+    assert found.forces_n.sum() == pytest.approx(force, rel=1e-9)
+    assert np.isfinite([found.z_mm, found.tilt_x_rad, found.tilt_y_rad]).all()
+    assert max(abs(found.tilt_x_rad), abs(found.tilt_y_rad)) <= STEEPEST_RAD
 
 
 @pytest.mark.parametrize("exponent", range(-9, 10, 3))

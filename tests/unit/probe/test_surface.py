@@ -10,10 +10,7 @@ from reference.indenters import block, nib_region
 from probe.errors import SurfaceError
 from probe.surface import indenters
 from probe.surface.body import close_below, manifold_from, mesh_heights, triangulate
-from probe.surface.face import (
-    list_lookup,
-    template,
-)
+from probe.surface.face import list_lookup, template
 from probe.surface.mesh import mesh, sort_numbers
 from probe.surface.polygon import polygon
 from probe.surface.symbols import Relief, emboss, outline

@@ -16,10 +16,7 @@ from probe.simulate.scene import bare_scene
 from probe.simulate.simulation import TouchOptions
 from probe.simulate.world.levels import SOUND
 from probe.simulate.world.sensor import MOUNTINGS, LevelSensor, mount
-from probe.simulate.world.surfaces import (
-    DistortedSurface,
-    place_adjacent,
-)
+from probe.simulate.world.surfaces import DistortedSurface, place_adjacent
 from probe.surface.indenters import RaisedStrip
 from probe.surface.polygon import polygon
 

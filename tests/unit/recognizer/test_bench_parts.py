@@ -27,7 +27,7 @@ from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from recognizer.bench.answers import answer_json
-from recognizer.bench.broker import Broker
+from recognizer.bench.broker import Broker, Subscriber
 from recognizer.bench.errors import BenchError, BusyError, UnknownError
 from recognizer.bench.feed import PAUSE_S, ProbeFeed, ReplayFeed
 from recognizer.bench.files import (
@@ -298,12 +298,44 @@ def test_a_mosaic_is_packed_thinned_and_tells_what_was_not_felt():
     assert len(mosaic_message(empty, 0)) == 32
 
 
+def test_a_page_gets_the_newest_of_every_topic_and_nothing_twice():
+    async def told():
+        board, page = Broker(), Subscriber()
+        board.attach(asyncio.get_running_loop())
+        board.subscribers.add(page)
+        for i in range(3):
+            board.publish("status", {"i": i})
+        board.publish("answer", {"face": "F1"})
+        await asyncio.wait_for(page.news.wait(), 5)
+        return [json.loads(text) for text in board.news(page)], board.news(page)
+
+    newest = [{"topic": "status", "i": 2}, {"topic": "answer", "face": "F1"}]
+    assert asyncio.run(told()) == (newest, [])
+
+
 def taken(feed, seconds):
     frames, end_s = [], time.monotonic() + seconds
     while time.monotonic() < end_s and feed.as_json()["playing"]:
         frames += feed.take(0.05)
     frames += feed.take(0.0)
     return [frame.seq for frame in frames]
+
+
+def test_a_recording_plays_in_order_goes_where_it_is_told_and_pauses_at_its_end(tmp_path):
+    feed = ReplayFeed(Recording(recorded(tmp_path / "x.h5", [0] * 20 + [200] * 20 + [0] * 20)))
+    assert feed.seconds == pytest.approx(0.59)
+    assert taken(feed, 5.0) == list(range(60))
+    assert feed.as_json()["at"] == pytest.approx(feed.seconds, abs=1e-3)
+    feed.play(playing=None, speed=None, at_s=0.305)
+    assert [frame.seq for frame in feed.take(0.0)] == [30]  # shown although it pauses
+    assert feed.take(0.0) == []
+    for at_s, first in ((0.205, 20), (None, 0)):  # from its beginning again
+        feed.play(playing=True, speed=20.0, at_s=at_s)
+        assert taken(feed, 5.0) == list(range(first, 60))
+    strength = np.array(feed.overview())
+    assert (strength[22:38].min(), strength[:18].max(), strength[42:].max()) == (1.0, 0.0, 0.0)
+    with pytest.raises(BenchError, match="speed"):
+        feed.play(playing=None, speed=1e9, at_s=None)
 
 
 def test_an_empty_recording_and_one_whose_clock_jumps(tmp_path):

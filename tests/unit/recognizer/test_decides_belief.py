@@ -7,11 +7,7 @@ import numpy as np
 import pytest
 
 import recognizer.touch.evidence
-from recognizer.touch.evidence import (
-    VerifiedHypothesis,
-    symbols_to_name,
-    weigh_cells,
-)
+from recognizer.touch.evidence import VerifiedHypothesis, symbols_to_name, weigh_cells
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW

@@ -8,11 +8,7 @@ import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.options import ReaderOptions
-from recognizer.touch.signal import (
-    contact_counts,
-    noise_of,
-    signal_of,
-)
+from recognizer.touch.signal import contact_counts, noise_of, signal_of
 
 
 def rows_of(*sums, turned=False):

@@ -12,9 +12,7 @@ from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
-from recognizer.thesis.edge_fit import (
-    face_edges,
-)
+from recognizer.thesis.edge_fit import face_edges
 from recognizer.thesis.edges import (
     EdgePoints,
     classical_edges,

@@ -14,12 +14,7 @@ from probe.contact.tabs import tabs
 from probe.scan import surface_to_sensor
 from probe.surface.face import endless_face
 from recognizer.errors import MosaicError
-from recognizer.scan.mosaic.canvas import (
-    CanvasEntry,
-    add_to_canvas,
-    empty_canvas,
-    image_of,
-)
+from recognizer.scan.mosaic.canvas import CanvasEntry, add_to_canvas, empty_canvas, image_of
 from recognizer.scan.mosaic.mosaic import ALONE, AMBIGUOUS, add_touch, no_touches
 from recognizer.scan.mosaic.patch import (
     interpolate_patch,
@@ -39,12 +34,7 @@ from recognizer.scan.mosaic.planar import (
     transform_points,
     wrap_angle,
 )
-from recognizer.scan.mosaic.pose_graph import (
-    PLANE,
-    Constraint,
-    covariances,
-    solve_pose_graph,
-)
+from recognizer.scan.mosaic.pose_graph import PLANE, Constraint, covariances, solve_pose_graph
 from recognizer.scan.mosaic.register import APART, CONSTANT, NOISE, register_patches
 from recognizer.scan.mosaic.search import KnownRaster, cross_correlate, peaks
 from recognizer.touch.recognition import Recognition, refusal

@@ -1,6 +1,7 @@
 """The reader as a program uses it, and its stages: touches in, object, face and pose out."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -43,6 +44,20 @@ def reader(url):
 
 def felt(url, name, face, touch):
     return tabs(registered_surface(url, name, face).surface, SensorType(), touch).forces_n
+
+
+def test_a_print_keeps_the_middle_of_its_symbols(reader):
+    for number in range(len(reader.lab.arrays[0].faces)):
+        face = reader.lab.arrays[0].face(number)
+        about, middle = face.printed.T_part_face, face.centres_mm.mean(axis=0)
+        np.testing.assert_allclose(about @ [*middle, 0.0, 1.0], [0, 0, 0, 1], atol=1e-9)
+        if face.T_part_face is not None:
+            np.testing.assert_array_equal(about[:3, :3], face.T_part_face[:3, :3])
+        pose = np.eye(4)
+        pose[:2, 3] = middle + np.array([10.0, 0.0])
+        tenth = replace(face.printed.as_built, scale_x=0.9, scale_y=0.9)
+        at, _ = replace(face.printed, as_built=tenth).pose(pose, np.eye(3))
+        assert at[:2, 3] == pytest.approx(middle + np.array([9.0, 0.0]))
 
 
 @pytest.fixture(scope="module")

@@ -15,11 +15,7 @@ from probe.contact.press import press
 from probe.surface.face import endless_face
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.curvature import guess_curvatures
-from recognizer.touch.symbols.image import (
-    Image,
-    image_of_signal,
-    pressing_of,
-)
+from recognizer.touch.symbols.image import Image, image_of_signal, pressing_of
 
 SENSOR = SensorType()
 INK = 0.35  # about the mean response of the symbols of the default alphabet

@@ -9,12 +9,7 @@ import pytest
 from encoded_objects.base.sensor_type import Overlay, SensorType
 from recognizer.touch.options import ReaderOptions
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW, refusal
-from recognizer.touch.search_gate import (
-    gap_share,
-    is_nearly_chance,
-    may_find_more,
-    shows_strokes,
-)
+from recognizer.touch.search_gate import gap_share, is_nearly_chance, may_find_more, shows_strokes
 from recognizer.touch.signal import signal_of
 from recognizer.touch.verdict import Evidence
 
