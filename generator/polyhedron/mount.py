@@ -182,7 +182,7 @@ class _Space:
             f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} mm: a hole of "
             f"{2 * bore.profile[0][1]:g} mm at ({', '.join(f'{x:.4g}' for x in bore.centre - low)})"
             f" mm needs {WALL_MM:g} mm around it",
-            fix="take a smaller mount or a larger part; face: F2 names another face",
+            fix="take a smaller mount, a larger part, or another face (face: NAME)",
         )
 
     def require_room(self, bore: Bore) -> None:
@@ -204,7 +204,7 @@ class _Space:
             raise ShapeError(
                 f"a hole of {2 * radius:g} mm through {self.solid.faces[self.face].name} does not "
                 "come out of one parallel face",
-                fix="mount another face (face: F2), or take magnets or a rod, which go in blind",
+                fix="mount another face (face: NAME), or take magnets or a rod, which go in blind",
             )
         return depth, behind
 
@@ -216,7 +216,7 @@ class _Space:
             raise ShapeError(
                 f"a hole of {2 * profile[0][1]:g} mm needs {needed_mm:.3g} mm behind face "
                 f"{self.solid.faces[self.face].name}, which has {depth:.3g} mm there",
-                fix="take a thicker part, a smaller mount, or another face: face: F2",
+                fix="take a thicker part, a smaller mount, or another face (face: NAME)",
             )
         return Bore(place, profile)
 
