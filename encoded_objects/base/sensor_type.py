@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -339,7 +340,7 @@ def sensor_type_text(sensor: SensorType) -> str:
 
 
 def choose_sensor_type(
-    asked: str | SensorType | None, stored: str, shape: tuple[int, int] | None, place: str
+    asked: str | Path | SensorType | None, stored: str, shape: tuple[int, int] | None, place: str
 ) -> SensorType:
     """Return the type of images: the one asked for, else the stored one, else `fsr-16`.
 
@@ -357,7 +358,7 @@ def choose_sensor_type(
     Raises
     ------
     SensorTypeError
-        Images of another shape than the type.
+        No sensor type, or images of another shape than the type.
     """
     unknown = False
     if isinstance(asked, SensorType):
@@ -365,7 +366,10 @@ def choose_sensor_type(
     elif asked:
         from encoded_objects.base.sensor_type_file import sensor_type_named
 
-        found = sensor_type_named(asked)
+        if not isinstance(asked, str | Path):
+            fix = "give a SensorType, or the name or the file of one"
+            raise SensorTypeError([Problem(f"{asked!r} is no sensor type", fix)])
+        found = sensor_type_named(str(asked))
     elif stored and stored != sensor_type_text(USUAL_SENSOR):
         from encoded_objects.base.sensor_type_file import parse_sensor_type
 
