@@ -34,6 +34,7 @@ GEL_IMPRINT_MM = 0.3
 #: at 8.5 mm, 4.2 tactels, 30 and 30, 10 and 11.
 TACTELS = 3.15
 PAD_TACTELS = 4.41  #: under a pad; 7 mm of `fsr-16`: at 5 mm 18 of 30 are right, at 7 mm 28
+LEAST_TACTELS = 2.0  #: to a symbol: few touches of finer ones are answered
 CELLS = 11.7  #: symbols on the matrix's area: about eight of them are seen whole
 PITCH_GRID_MM = 0.5  #: proposed pitches are multiples of this
 LEAST_PITCH_MM = 3.0  #: finer strokes do not print
@@ -236,7 +237,8 @@ class SensorType:
         """Pitch of symbols that the type reads best, mm; `encode-object --sensor-type` takes it.
 
         The largest that shows `CELLS` symbols on the matrix's area, but at most `TACTELS` tactels
-        to a symbol (`PAD_TACTELS` under a pad, which blurs): finer sampling gains nothing.
+        to a symbol (`PAD_TACTELS` under a pad, which blurs): finer sampling gains nothing. Not
+        under `LEAST_TACTELS` tactels to a symbol, of which few touches are answered.
 
         Examples
         --------
@@ -246,7 +248,8 @@ class SensorType:
         tactels = PAD_TACTELS if self.overlay.kind == "pad" else TACTELS
         area = float(self.present().sum()) * math.prod(self.step_mm)
         most = min(tactels * max(self.step_mm), math.sqrt(area / CELLS))
-        return max(LEAST_PITCH_MM, math.floor(most / PITCH_GRID_MM + 1e-9) * PITCH_GRID_MM)
+        grid = math.floor(most / PITCH_GRID_MM + 1e-9) * PITCH_GRID_MM
+        return max(LEAST_PITCH_MM, grid, LEAST_TACTELS * max(self.step_mm))
 
     @property
     def coarseness(self) -> float:

@@ -242,7 +242,9 @@ def _of_set(result: Encoded) -> str:
             lies += ", backs down, symbols up, no supports, 100 % scale"
         kinds = [list(some) for _, some in groupby(files, _is_project)]
         where = " and ".join(
-            f"{_first_and_last(some)} in {some[0].parent} ({_opened_by(some[0])})" for some in kinds
+            f"{' ... '.join(dict.fromkeys((some[0].name, some[-1].name)))} in {some[0].parent} "
+            f"({_opened_by(some[0])})"
+            for some in kinds
         )
         steps.append(f"print {where} {lies}")
     if sheet:
@@ -259,32 +261,18 @@ def _build_sheet(files: Sequence[Path]) -> Path | None:
     return next((file for file in files if file.name.endswith("-build.html")), None)
 
 
-def _first_and_last(files: Sequence[Path]) -> str:
-    return files[0].name if len(files) == 1 else f"{files[0].name} ... {files[-1].name}"
-
-
 def _of_object(made: MadeObject) -> list[str]:
     sheet = _build_sheet(made.files)
     steps = [f"open {sheet}"] if sheet else []
-    printable = [f for suffix in (".3mf", ".stl") for f in made.files if f.suffix == suffix]
-    plates = _plates(printable)
-    if not printable:
-        return steps
-    chosen = plates or printable[: made.parts]
-    name = str(chosen[0]) if len(chosen) == 1 else f"{chosen[0]} ... {chosen[-1].name}"
-    if plates:
-        name += f" ({_opened_by(chosen[0])})"
-    if made.lying is None:
-        steps.append(f"print {name} as it lies, backs down, symbols up, no supports, 100 % scale")
-        return steps
-    steps.append(f"print {name} as it lies, {made.lying}, 100 % scale")
+    models = [f for f in made.files if f.suffix == ".3mf" and "-prusaslicer" not in f.stem]
+    plates = [file for file in models if _is_project(file)] or models
+    chosen = plates or [file for file in made.files if file.suffix == ".stl"][: made.parts]
+    if chosen:
+        name = str(chosen[0]) if len(chosen) == 1 else f"{chosen[0]} ... {chosen[-1].name}"
+        name += f" ({_opened_by(chosen[0])})" if plates else ""
+        lies = made.lying or "backs down, symbols up, no supports"
+        steps.append(f"print {name} as it lies, {lies}, 100 % scale")
     return steps
-
-
-def _plates(files: Sequence[Path]) -> list[Path]:
-    """Return the files of plates: projects for Bambu Studio, or what all other slicers open."""
-    models = [f for f in files if f.suffix == ".3mf" and "-prusaslicer" not in f.stem]
-    return [file for file in models if _is_project(file)] or models
 
 
 def _is_project(file: Path) -> bool:

@@ -59,10 +59,9 @@ def _print_object(one: PrintedObject) -> None:
     output.write(f"{one.name} on {one.check.profile}:")
     if rows:
         output.show(table)
-    counts = {v: sum(row.verdicts[v] for row in rows) for v in (SURVIVES, DOUBTFUL, LOST)}
-    total = sum(counts.values())
+    counts = Counter(check.verdict for row in rows for check in row.checks)
     output.write(
-        f"{counts[SURVIVES]} of {output.count_of(total, 'symbol')} survive, "
+        f"{counts[SURVIVES]} of {output.count_of(counts.total(), 'symbol')} survive, "
         f"{counts[DOUBTFUL]} doubtful, {counts[LOST]} lost"
     )
     if note := _height_note(rows):
@@ -86,14 +85,15 @@ def _height_note(rows: Sequence[_Row]) -> str:
 
 
 def _rows(one: PrintedObject) -> list[_Row]:
-    checks = [tile.check for tile in one.check.tiles]
-    faces = list(dict.fromkeys(check.face for check in checks))
-    kinds = sorted({(faces.index(check.face), check.label) for check in checks})
+    by_face: dict[str, dict[int, list[SymbolCheck]]] = {}
+    for tile in one.check.tiles:
+        check = tile.check
+        by_face.setdefault(check.face, {}).setdefault(check.label, []).append(check)
     return [
-        _Row(faces[face], one.symbols[label],
-             tuple(c for c in checks if (c.face, c.label) == (faces[face], label)))
-        for face, label in kinds
-    ]  # fmt: skip
+        _Row(face, one.symbols[label], tuple(checks))
+        for face, by_label in by_face.items()
+        for label, checks in sorted(by_label.items())
+    ]
 
 
 def _values(one: PrintedObject) -> dict[str, Any]:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from encoded_objects.base.options import Application, Argument, Json, Option, command
-
-if TYPE_CHECKING:
-    from generator.printers import Printer
 
 app = Application()
 
@@ -61,21 +58,26 @@ def schema(
 @command(app)
 def printers(as_json: Json = False) -> int:
     """Print the printers that specs can name, with their limits."""
+    from dataclasses import asdict
+
     from encoded_objects.base import output
     from generator.printers import NOZZLES_MM, known_printers
 
-    rows = [_printer_values(printer) for printer in known_printers()]
+    known = known_printers()
     if as_json:
+        rows = [asdict(printer) for printer in known]
+        for row in rows:
+            row["overhang_max_deg"] = round(math.degrees(row.pop("overhang_max_rad")), 6)
         output.write_json({"printers": rows})
         return 0
     table = output.table(
         "printer", "bed", "layer", "stroke >=", "gap >=", "height >=", "made for",
         broken=("made for",),
     )  # fmt: skip
-    for row in rows:
-        bed = " x ".join(f"{side:g}" for side in row["bed_mm"])
-        limits = ("layer_mm", "stroke_min_mm", "gap_min_mm", "height_min_mm")
-        table.add_row(row["name"], bed, *(f"{row[key]:g}" for key in limits), row["description"])
+    for one in known:
+        bed = " x ".join(f"{side:g}" for side in one.bed_mm)
+        limits = (one.layer_mm, one.stroke_min_mm, one.gap_min_mm, one.height_min_mm)
+        table.add_row(one.name, bed, *(f"{limit:g}" for limit in limits), one.description)
     output.show(table)
     nozzles = ", ".join(f"{nozzle:g}" for nozzle in NOZZLES_MM)
     output.write(
@@ -84,14 +86,6 @@ def printers(as_json: Json = False) -> int:
         "print: {printer: {like: ender-3, bed: 300 x 300 mm, layer: 0.15 mm}}"
     )
     return 0
-
-
-def _printer_values(printer: Printer) -> dict[str, Any]:
-    from dataclasses import asdict
-
-    values = asdict(printer)
-    values["overhang_max_deg"] = round(math.degrees(values.pop("overhang_max_rad")), 6)
-    return values
 
 
 def _write_new(path: Path, text: str, force: bool) -> None:

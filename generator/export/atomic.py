@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import filecmp
 import hashlib
 import os
 import shutil
@@ -117,7 +118,9 @@ class Staging:
             Names the first of them.
         """
         for written in self.written:
-            if written.path.exists() and not _same_bytes(written.staged, written.path):
+            if written.path.exists() and not filecmp.cmp(
+                written.staged, written.path, shallow=False
+            ):
                 raise FileThereError(
                     "there is a file of this name, and no object of this database has made it",
                     fix="move it, choose another folder with -o, or replace it with --replace",
@@ -166,16 +169,6 @@ def _locked_folder(folder: Path) -> tuple[Path, int]:
         if hidden.exists() and os.path.samestat(os.fstat(lock), hidden.stat()):
             return hidden, lock
         os.close(lock)
-
-
-def _same_bytes(one: Path, other: Path) -> bool:
-    if not other.is_file() or one.stat().st_size != other.stat().st_size:
-        return False
-    with open(one, "rb") as ours, open(other, "rb") as theirs:
-        while piece := ours.read(1 << 20):
-            if piece != theirs.read(1 << 20):
-                return False
-    return True
 
 
 def remove_leftovers(folder: Path, *, below: bool = False) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from generator.export.bed import BedPlace, Plate
 from generator.export.colours import BODY_RGB, SYMBOL_RGB, hexadecimal
@@ -74,33 +74,24 @@ def draw_back(part: Part) -> str:
     return _svg(outline, shapes)
 
 
-def draw_plate(parts: Sequence[Part], plate: Plate, bed_mm: tuple[float, float]) -> str:
-    """Return a plate from above: the parts as they lie, by name."""
-    loops = []
-    for part in parts:
-        own = [_box(part)]
-        if is_panel(part):
-            own = [part.vertices[list(loop), :2] for loop in part.facets[_FRONT].loops]
-        loops.append((part.name, own))
-    return _draw_bed(loops, plate, bed_mm)
+def outline_of(part: Part) -> list[Points]:
+    """Return what a part covers of its plate, part frame, mm: a panel's front, or a box."""
+    if is_panel(part):
+        return [part.vertices[list(loop), :2] for loop in part.facets[_FRONT].loops]
+    return [rectangle(part.vertices[:, :2].min(axis=0), part.vertices[:, :2].max(axis=0))]
 
 
-def draw_boxes(
-    parts: Sequence[tuple[str, tuple[float, float]]], plate: Plate, bed_mm: tuple[float, float]
-) -> str:
-    """Return a plate from above: the boxes of parts by their names, sizes in mm."""
-    loops = [
-        (name, [np.array([[0, 0], [w, 0], [w, d], [0, d]], dtype=np.float64)])
-        for name, (w, d) in parts
-    ]
-    return _draw_bed(loops, plate, bed_mm)
+def rectangle(low: ArrayLike, high: ArrayLike) -> Points:
+    """Return the corners (4, 2) of a rectangle between two of them, counter-clockwise."""
+    (x0, y0), (x1, y1) = np.asarray(low), np.asarray(high)
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=np.float64)
 
 
-def _draw_bed(
+def draw_plate(
     parts: Sequence[tuple[str, list[Points]]], plate: Plate, bed_mm: tuple[float, float]
 ) -> str:
-    width, depth = bed_mm
-    bed = np.array([[0, 0], [width, 0], [width, depth], [0, depth]], dtype=np.float64)
+    """Return a plate from above: the parts as they lie, by name; loops in part frames, mm."""
+    bed = rectangle((0, 0), bed_mm)
     shapes = [_path([bed], f'fill="#F1F5F9" stroke="{GREY}" stroke-width=".6"')]
     corners = [bed]
     for place in plate.places:
@@ -243,12 +234,6 @@ def _lying(loops: Sequence[Points], place: BedPlace) -> list[Points]:
     turned = [np.stack([-p[:, 1], p[:, 0]], axis=1) if place.turned else p for p in loops]
     corner = turned[0].min(axis=0)
     return [p - corner + np.array([place.x_mm, place.y_mm]) for p in turned]
-
-
-def _box(part: Part) -> Points:
-    """Return the four corners of what a part covers, part frame."""
-    (x0, y0), (x1, y1) = part.vertices[:, :2].min(axis=0), part.vertices[:, :2].max(axis=0)
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
 
 def _path(loops: Sequence[Points], style: str) -> str:

@@ -153,9 +153,7 @@ def _scene(
         of_symbols, owner = symbol_triangles(part, mesh), np.full(len(part.facets), -1)
         owner[[number for _, number in faces]] = np.arange(len(faces)) + len(names)
         owner = owner[belongs]
-        shown = np.zeros(len(part.facets), np.bool_)
-        shown[numbers] = True
-        kept = np.flatnonzero(shown[mesh.facets])
+        kept = np.flatnonzero(np.isin(mesh.facets, numbers))
         triangles.append(mesh.triangles[kept] + first)
         first += len(mesh.vertices)
         symbols.append(of_symbols[kept])

@@ -62,11 +62,6 @@ class Occupancy:
         """Number of free cells."""
         return self.rows * self.columns - self.used
 
-    @property
-    def density(self) -> float:
-        """Share of the array that is used."""
-        return self.used / (self.rows * self.columns)
-
     def cells(self) -> Cells:
         """Return the taken cells, rows (n,) and columns (n,), sorted by both."""
         return cells_of_tiles(self.tiles)

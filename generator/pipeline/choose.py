@@ -12,6 +12,7 @@ small part of an object's surface: a fillet does not set the pitch of the whole 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -140,20 +141,20 @@ def choose_array(
         made = kept.definition, kept.lab_key
         new = next((entry.pitch_mm for entry in known.values()), None)  # that of those registered
 
-        def at(one: ObjectSpec, pitch_mm: float | None) -> ObjectSpec:
+        def follow(one: ObjectSpec, pitch_mm: float | None = None) -> ObjectSpec:
             return with_profile(one, kept.profile, AUTO, *made, pitch_mm)
 
-        def pitch_of(one: ObjectSpec) -> float | None:
+        def placed(one: ObjectSpec) -> ObjectSpec:
             entry = known.get(one.name)
             if entry is None or not replace_changed:
-                return new if entry is None else entry.pitch_mm
-            try:  # one that is made again from a changed spec has the pitch of that
-                (plan,) = plan_objects([at(one, entry.pitch_mm)], solid)
-            except GeneratorError:
-                return None
-            return entry.pitch_mm if entry.same_spec(plan.meaning) else None
+                return follow(one, new if entry is None else entry.pitch_mm)
+            with suppress(GeneratorError):
+                spec = follow(one, entry.pitch_mm)
+                if entry.same_spec(plan_objects([spec], solid)[0].meaning):
+                    return spec
+            return follow(one)  # made again from a changed spec, it has the pitch of that
 
-        return ArrayChoice(plan_objects([at(one, pitch_of(one)) for one in specs], solid))
+        return ArrayChoice(plan_objects([placed(one) for one in specs], solid))
     short: list[str] = []  # why each smaller array does not do
     smallest = _smallest(specs, lab)
     for candidate in _candidates(smallest):

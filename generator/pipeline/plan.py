@@ -258,6 +258,9 @@ def _round_faces(
     if not found.shown(polyhedron):
         why = "; ".join((*polyhedron.notes, *notes))
         fix = "give it a planar face, or a cylinder or cone face between two circles"
+        if not why and spec.mount:
+            why = f"the mount takes {spec.mount.face}, the only one that could"
+            fix = "mount another face, or leave out which one"
         raise LayoutError(f"no face of the object carries symbols: {why}", fix=fix)
     return found
 

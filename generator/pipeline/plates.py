@@ -19,7 +19,7 @@ from urllib.parse import quote
 from generator.export.atomic import Staging
 from generator.export.bambu import PLATES_MAX, project_3mf, project_names
 from generator.export.bed import Plate, arrange_plates
-from generator.export.drawing import draw_boxes
+from generator.export.drawing import draw_plate, rectangle
 from generator.export.set_files import SetPart, SetPlate, can_draw, overview_pdf, packing_csv
 from generator.export.sheet import Figure, Mark, Section, sheet_html
 from generator.export.threemf import PrintFile, SlicerSettings, print_file
@@ -213,8 +213,8 @@ def _set_sheet(
         what = ", ".join(objects[one][0].plan.spec.name for one in held)
         if len(printers) > 1:
             what = f"{plate.printer.name}: {what}"
-        boxes = [(p.name, p.size_mm[:2]) for p in plate.parts]
-        drawing = draw_boxes(boxes, plate.plate, plate.printer.bed_mm)
+        boxes = [(p.name, [rectangle((0, 0), p.size_mm[:2])]) for p in plate.parts]
+        drawing = draw_plate(boxes, plate.plate, plate.printer.bed_mm)
         text = what + (f"; {cost}" if cost else "")
         drawings.append(Figure(drawing, text, file))
     listed = []

@@ -21,6 +21,7 @@ from generator.export.drawing import (
     draw_plate,
     draw_steps,
     is_panel,
+    outline_of,
 )
 from generator.export.sheet import Figure, Section, picture_html, sheet_html
 from generator.layout.placement import Layout, object_code
@@ -85,9 +86,10 @@ def build_sheet(
     facts = _facts(plan, layout, code, parts, plates)
     sections = [Section(drawing=picture_html(picture)), Section(rows=facts)]
     if plates:
+        outlines = [(part.name, outline_of(part)) for part in parts]
         figures = [
             Figure(
-                draw_plate(parts, plate.plate, plan.printer.bed_mm),
+                draw_plate(outlines, plate.plate, plan.printer.bed_mm),
                 f"{len(plate.plate.places)} part{'s' * (len(plate.plate.places) != 1)}"
                 + (f"; {plate.cost}" if plate.cost else ""),
                 plate.file,

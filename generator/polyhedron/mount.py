@@ -147,7 +147,7 @@ def _bores(space: _Space, mount: Mount, middle: Points, half: Points) -> tuple[B
     if mount.kind == "rod" and isinstance(size, float):
         radius = (size + FIT_MM) / 2
         rest = radius + 2 * WALL_MM  # for the tip
-        deep = min(ROD_DEPTH * size, max(size, space.depth_mm(middle, radius) - rest))
+        deep = min(ROD_DEPTH * size, max(size, space.behind(middle, radius)[0] - rest))
         profile = ((0.0, radius), (deep, radius), (deep + radius, 0.0))
         return (space.pocket(middle, profile, deep + rest),)
     if isinstance(size, float):
@@ -163,7 +163,7 @@ def _bores(space: _Space, mount: Mount, middle: Points, half: Points) -> tuple[B
     places = middle + circle / 2 * np.column_stack([np.cos(turns), np.sin(turns)])
     screws = [space.screwed(place, thread) for place in places]
     radius, at = (pin + FIT_MM) / 2, middle + np.array([circle / 2, 0.0])
-    deep = min(pin, max(pin / 2, space.depth_mm(at, radius) - SKIN_MM))
+    deep = min(pin, max(pin / 2, space.behind(at, radius)[0] - SKIN_MM))
     return (*screws, space.pocket(at, ((0.0, radius), (deep, radius)), deep + SKIN_MM))
 
 
@@ -182,7 +182,7 @@ class _Space:
             f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} mm: a hole of "
             f"{2 * bore.profile[0][1]:g} mm at ({', '.join(f'{x:.4g}' for x in bore.centre - low)})"
             f" mm needs {WALL_MM:g} mm around it",
-            fix="take a smaller mount or a larger part; face: F2 names another face",
+            fix="take a smaller mount, a larger part, or another face (face: NAME)",
         )
 
     def require_room(self, bore: Bore) -> None:
@@ -196,31 +196,27 @@ class _Space:
         if not points_inside(edge, self.outline).all():
             raise self.too_small(bore)
 
-    def depth_mm(self, place: Points, radius: float) -> float:
-        """Return how deep the solid is behind a circle, with plastic around a hole of it."""
-        return self._hits(place, radius)[0]
-
     def through(self, bore: Bore, radius: float) -> tuple[float, int]:
         """Return depth and number of the parallel face that a hole comes out of, so wide there."""
         self.require_room(bore)
-        depth, behind = self._hits(bore.centre, radius)
+        depth, behind = self.behind(bore.centre, radius)
         if behind is None:
             raise ShapeError(
                 f"a hole of {2 * radius:g} mm through {self.solid.faces[self.face].name} does not "
                 "come out of one parallel face",
-                fix="mount another face (face: F2), or take magnets or a rod, which go in blind",
+                fix="mount another face (face: NAME), or take magnets or a rod, which go in blind",
             )
         return depth, behind
 
     def pocket(self, place: Points, profile: Profile, needed_mm: float) -> Bore:
         """Return a blind hole; refuse one that would break through."""
         self.require_room(Bore(place, profile))
-        depth = self.depth_mm(place, profile[0][1])
+        depth, _ = self.behind(place, profile[0][1])
         if depth < needed_mm - 1e-9:
             raise ShapeError(
                 f"a hole of {2 * profile[0][1]:g} mm needs {needed_mm:.3g} mm behind face "
                 f"{self.solid.faces[self.face].name}, which has {depth:.3g} mm there",
-                fix="take a thicker part, a smaller mount, or another face: face: F2",
+                fix="take a thicker part, a smaller mount, or another face (face: NAME)",
             )
         return Bore(place, profile)
 
@@ -246,8 +242,11 @@ class _Space:
         self.through(bore, sunk)
         return Bore(place, ((0.0, clear), (seat, clear), (deep, sunk)), behind)
 
-    def _hits(self, place: Points, radius: float) -> tuple[float, int | None]:
-        """Return the least depth behind a circle, and the parallel face that all of it meets."""
+    def behind(self, place: Points, radius: float) -> tuple[float, int | None]:
+        """Return the least depth behind a circle, and the parallel face that all of it meets.
+
+        The circle is that of a hole with plastic around it.
+        """
         rim = np.vstack([place, place + (radius + WALL_MM) * _circle(32)])
         starts = self.T[:3, 3] + rim @ self.T[:3, :2].T
         inward = -self.T[:3, 2]

@@ -235,16 +235,15 @@ def _objects(tree: Tree, problems: list[Problem], files: bool) -> Iterable[Tree]
         elif isinstance(entry, str):
             if file := _object_file(tree.folder / entry, own, problems):
                 yield _merge(shared, file)
-        elif isinstance(entry, dict):
-            if "objects" in entry:
-                fix = "list all objects in one set"
-                problems.append(Problem("a set inside a set", fix, own.key_mark(("objects",))))
-            else:
-                yield _merge(shared, own)
-        else:
+        elif not isinstance(entry, dict):
             fix = "write  - name: ...  or  - file.yaml"
             cause = "an object of a set is a block of settings or a file name"
             problems.append(Problem(cause, fix, own.value_mark(())))
+        elif "objects" in entry:
+            fix = "list all objects in one set"
+            problems.append(Problem("a set inside a set", fix, own.key_mark(("objects",))))
+        else:
+            yield _merge(shared, own)
 
 
 def _object_file(path: Path, entry: Tree, problems: list[Problem]) -> Tree | None:

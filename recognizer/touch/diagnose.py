@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.sensor_type import LEAST_TACTELS, SensorType, force_share
 from recognizer.touch import recognition as cause
 from recognizer.touch.evidence import VerifiedHypothesis
 from recognizer.touch.recognition import Cause
@@ -29,7 +29,6 @@ Ints = NDArray[np.int64]
 
 
 # Chosen on 40 touches of each cause, own engine, `typical`, seed 61 (`docs/recognizer.md`).
-TOO_FINE = 2.0  #: tactels a symbol: few touches of finer ones are answered
 FULL_LOAD = 90.0  #: percentile of the envelope that counts as loaded in full
 PLATEAU = 95.0  #: percentile of the readings that stands for a symbol's
 PART = 0.2  #: of the full load, from which a place is loaded ...
@@ -41,7 +40,9 @@ SMEARED = 0.85  #: variation below which contours may be smeared ...
 SHARP = 0.6  #: ... if they are so much less sharp one way than across
 SOFT = 16.0  #: signal to noise below which a touch is soft
 SOFT_N = 0.15  #: plateau below which it is, where readings are newtons
-HARD_N = 250.0  #: sum of the readings from which contrast is lost, where they are newtons ...
+PRESS_N = (30.0, 120.0)  #: that `fsr-16` reads well
+#: Sum of the readings from which contrast is lost, on `fsr-16`, where they are newtons ...
+HARD_N = 250.0
 HARD = 0.08  #: ... or share of all that they can read: 120 N .071, 250 N .080, 1000 N .097
 FALLING = 0.42  #: share of the load by which it falls from the middle to the rim ...
 LYING = 0.65  #: ... of a plate that lies on so much of the sensor: less is an edge
@@ -136,7 +137,7 @@ def diagnose(touch: TouchImages, found: list[VerifiedHypothesis]) -> Cause:
         return Cause(cause.NO_LOAD, {})
     pitch = min(each.style.pitch_mm for each in reader.lab.arrays)
     coarsest = max(each.style.pitch_mm for each in reader.lab.arrays)
-    if coarsest < TOO_FINE * reader.sensor.pitch_mm:
+    if coarsest < LEAST_TACTELS * max(reader.sensor.step_mm):
         best_mm = reader.sensor.symbol_pitch_mm
         return Cause(cause.TOO_FINE, {"pitch_mm": pitch, "best_mm": best_mm})
     image = image_features(reader.sensor, signal, pitch)
@@ -178,7 +179,7 @@ def diagnose(touch: TouchImages, found: list[VerifiedHypothesis]) -> Cause:
 def _hard_from(sensor: SensorType, signal: Signal) -> float:
     """Return the sum of readings from which a sensor is pressed too hard, inf if not known."""
     if signal.newtons:
-        return HARD_N
+        return HARD_N * force_share(sensor)
     return HARD * sensor.full * signal.forces.size if sensor.exponent == 1.0 else math.inf
 
 
@@ -187,8 +188,9 @@ def _by_image(sensor: SensorType, image: ImageFeatures, signal: Signal) -> Cause
     if image.variation < SMEARED and image.sharpness < SHARP:
         total, most = float(signal.forces.sum()), _hard_from(sensor, signal)
         if total > most:
+            low, high = (force * force_share(sensor) for force in PRESS_N)
             numbers = {"sum": total, "most": most, "newtons": float(signal.newtons)}
-            return Cause(cause.HARD, numbers)
+            return Cause(cause.HARD, numbers | {"least_n": low, "most_n": high})
         return Cause(cause.MOVING, {"sharpness": image.sharpness,
                                     "direction_deg": image.direction_deg})  # fmt: skip
     if image.variation < EVEN:

@@ -81,7 +81,7 @@ class Cause:
     @property
     def way_out(self) -> str:
         """What a person does about it."""
-        return _CAUSES[self.code][1]
+        return _CAUSES[self.code][1].format(**self.evidence)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -295,7 +295,7 @@ _CAUSES: dict[str, tuple[Callable[[Numbers], str], str]] = {
             + (f"{n['sum']:.0f} N" if n["newtons"] else f"{n['sum']:.0f} counts")
             + f" where {n['most']:.0f} are usual, and gaps read nearly as much as strokes"
         ),
-        "press with 30 to 120 N",
+        "press with {least_n:.2g} to {most_n:.3g} N",
     ),
     TILTED: (
         lambda n: f"tilted: the load falls by {_percent(n['slope'])} across the sensor",

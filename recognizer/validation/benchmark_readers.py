@@ -230,12 +230,12 @@ def network(world: ReaderWorld) -> Read:
     place = np.c_[np.tile(public["x_mm"], 2), np.tile(public["y_mm"], 2)] / 20.0
     some, inputs = np.tile(known, 2), _features(images)
     options = {"hidden_layer_sizes": LAYERS, "max_iter": EPOCHS, "random_state": 0}
-    one_hot = np.eye(len(names) + 1)[label]
+    faces = np.eye(len(names) + 1)  # a row is the input that names a face
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         which = MLPClassifier(**options).fit(inputs, label)
         where = MLPRegressor(**options).fit(
-            np.c_[inputs, one_hot][some], np.c_[place, np.cos(turn), np.sin(turn)][some]
+            np.c_[inputs, faces[label]][some], np.c_[place, np.cos(turn), np.sin(turn)][some]
         )
 
     def read(counts: NDArray[np.uint16]) -> ReaderAnswer | None:
@@ -244,7 +244,7 @@ def network(world: ReaderWorld) -> Read:
         label = int(which.classes_[shares.argmax()])
         if label < 0:
             return None
-        x, y, c, s = where.predict(np.c_[image, one_hot[[label]]])[0].tolist()
+        x, y, c, s = where.predict(np.c_[image, faces[[label]]])[0].tolist()
         return ReaderAnswer(names[label], 20 * x, 20 * y, math.atan2(s, c), float(shares.max()))
 
     return read

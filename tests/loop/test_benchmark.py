@@ -11,10 +11,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from encoded_objects.base.errors import EncodedObjectsError
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from generator.command import run as encode_object
 from probe.recording.imported import import_array
 from recognizer.validation import encoded_set
 from recognizer.validation.benchmark import FIRST, FROZEN, _figures_of, digest_of, run_benchmark
+from recognizer.validation.benchmark_readers import ReaderWorld, network
 from recognizer.validation.command import run
 
 PAGE = Path(__file__).parents[2] / "docs" / "benchmark.md"
@@ -72,6 +74,21 @@ def test_readers_are_judged_alike(made):
     seen = (np.load(folder / "public" / f"{WORLD}.npz")["label"] >= 0).sum()
     assert own["public"]["right"]["count"] == seen > 0
     assert own["hidden"]["right"]["count"] == 0
+
+
+def test_the_network_knows_the_touches_that_it_learned(made):
+    folder, _ = made
+    touches = dict(np.load(folder / "public" / f"{WORLD}.npz"))
+    lab = str(folder / "labs" / WORLD / "lab.db")
+    often = {name: np.repeat(one, 50, axis=0) for name, one in touches.items()}
+    read = network(ReaderWorld(WORLD, lab, sensor_type_named(WORLD), often))
+    known = np.flatnonzero(touches["label"] >= 0)
+    assert len(known)
+    for n in known:
+        answer = read(touches["counts"][n])
+        assert answer.name == touches["names"][touches["label"][n]]
+        off = answer.x_mm - touches["x_mm"][n], answer.y_mm - touches["y_mm"][n]
+        assert np.hypot(*off) < 2
 
 
 def test_a_rate_of_wrong_answers_sets_the_score():

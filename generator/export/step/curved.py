@@ -9,6 +9,8 @@ ISO 10303-42 (geometry): CYLINDRICAL_SURFACE, CONICAL_SURFACE, B_SPLINE_SURFACE_
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,84 +105,81 @@ class _RoundFace:
         return found
 
 
+@dataclass(slots=True)
+class _Corner:
+    """A corner of one ring of a symbol, and the edge from it to the next corner."""
+
+    places: Points  #: (n, 3) mm, part frame: the corner, then the inner control points of the edge
+    point: str = ""
+    vertex: str = ""
+    edge: str = ""
+    inner: tuple[str, ...] = ()  #: control points of a bent edge
+
+
 class _RoundSymbol:
     def __init__(self, on: _RoundFace, symbol: BentSymbol) -> None:
         self.on, self.symbol = on, symbol
         self.file, self.add = on.file, on.file.add
         T = on.face.T_part_axis
-        self.places = [
-            [[np.round(transform(T, edge), _PLACES) for edge in ring] for ring in tier]
+        self.tiers = [
+            [[_Corner(np.round(transform(T, edge), _PLACES)) for edge in ring] for ring in tier]
             for tier in symbol.rings
         ]
-        self.points = [
-            [[on.file.point(edge[0], _PLACES) for edge in ring] for ring in tier]
-            for tier in self.places
-        ]
-        self.corners = [
-            [[self.add(f"VERTEX_POINT('',{point})") for point in ring] for ring in tier]
-            for tier in self.points
-        ]
-        self.controls: dict[tuple[int, int, int], tuple[str, ...]] = {}
-        self.edges = [
-            [[self.curve(t, r, k) for k in range(len(ring))] for r, ring in enumerate(tier)]
-            for t, tier in enumerate(self.places)
-        ]
+        rings = [ring for tier in self.tiers for ring in tier]
+        for corner in chain(*rings):
+            corner.point = self.file.point(corner.places[0], _PLACES)
+        for corner in chain(*rings):
+            corner.vertex = self.add(f"VERTEX_POINT('',{corner.point})")
+        for ring in rings:
+            for corner, following in zip(ring, ring[1:] + ring[:1], strict=True):
+                self.draw_edge(corner, following)
         self.name = step_string(f"{on.face.name}/{symbol.name}")
 
     def write(self) -> None:
         """Write sides, top and what of the face is inside; note the foot as a bound of it."""
         on, heights = self.on, self.symbol.z_mm
-        foot, *holes = range(len(self.edges[0]))
-        on.bounds.append(self.ring(0, foot, forward=False, kind="FACE_BOUND"))
+        foot, *holes = self.tiers[0]
+        on.bounds.append(self.ring(foot, forward=False, kind="FACE_BOUND"))
         for hole in holes:
-            outline = self.ring(0, hole, forward=False, kind="FACE_OUTER_BOUND")
+            outline = self.ring(hole, forward=False, kind="FACE_OUTER_BOUND")
             on.add_face([outline], heights[0], f"{self.name}/inside")
-        for tier in range(len(heights) - 1):
-            for ring in range(len(self.edges[0])):
-                self.sides(tier, ring)
+        for below, above in pairwise(self.tiers):
+            for low, high in zip(below, above, strict=True):
+                self.sides(low, high)
         bounds = [
-            self.ring(-1, ring, forward=True, kind="FACE_BOUND" if ring else "FACE_OUTER_BOUND")
-            for ring in range(len(self.edges[-1]))
+            self.ring(ring, forward=True, kind="FACE_BOUND" if k else "FACE_OUTER_BOUND")
+            for k, ring in enumerate(self.tiers[-1])
         ]
         self.colour(on.add_face(bounds, heights[-1], f"{self.name}/top"))
 
-    def sides(self, tier: int, ring: int) -> None:
-        low, high = self.edges[tier][ring], self.edges[tier + 1][ring]
+    def sides(self, low: list[_Corner], high: list[_Corner]) -> None:
+        """Write the sides between two rings."""
         risers = []
-        for k in range(len(low)):
-            a, b = self.places[tier][ring][k][0], self.places[tier + 1][ring][k][0]
-            along = self.file.vector(unit(b - a))
-            line = self.add(f"LINE('',{self.points[tier][ring][k]},{along})")
-            ends = f"{self.corners[tier][ring][k]},{self.corners[tier + 1][ring][k]}"
-            risers.append(self.add(f"EDGE_CURVE('',{ends},{line},.T.)"))
+        for a, d in zip(low, high, strict=True):
+            along = self.file.vector(unit(d.places[0] - a.places[0]))
+            line = self.add(f"LINE('',{a.point},{along})")
+            risers.append(self.add(f"EDGE_CURVE('',{a.vertex},{d.vertex},{line},.T.)"))
         for k in range(len(low)):
             j = (k + 1) % len(low)
+            a, b, c, d = low[k], low[j], high[j], high[k]
             edges = [
                 self.file.oriented(edge, forward=forward)
                 for edge, forward in (
-                    (low[k], True), (risers[j], True), (high[k], False), (risers[k], False)
+                    (a.edge, True), (risers[j], True), (d.edge, False), (risers[k], False)
                 )
             ]  # fmt: skip
             bound = self.file.bound(edges, "FACE_OUTER_BOUND")
-            surface = self.side_surface(tier, ring, k)
+            surface = self.side_surface(a, b, c, d)
             self.colour(self.on.add_any_face([bound], surface, f"{self.name}/side"))
 
-    def side_surface(self, tier: int, ring: int, k: int) -> str:
-        """Return the plane, or the ruled surface, of a side."""
-        below, above = (tier, ring, k), (tier + 1, ring, k)
-        j = (k + 1) % len(self.edges[tier][ring])
-        a, b = self.places[tier][ring][k][0], self.places[tier][ring][j][0]
-        d, c = self.places[tier + 1][ring][k][0], self.places[tier + 1][ring][j][0]
-        if below not in self.controls and above not in self.controls:
-            normal = unit(np.cross(c - a, d - b))
-            if (
-                abs(float((b - a) @ normal)) < _PLANAR_MM
-                and abs(float((c - a) @ normal)) < _PLANAR_MM
-            ):
-                at = self.points[tier][ring][k]
-                placement = self.file.placement(at, normal, unit(b - a))
-                return self.add(f"PLANE('',{placement})")
-        rows = list(zip(self.control_points(*below), self.control_points(*above), strict=True))
+    def side_surface(self, a: _Corner, b: _Corner, c: _Corner, d: _Corner) -> str:
+        """Return the plane, or the ruled surface, of a side: a to b is below, d to c above."""
+        if not a.inner and not d.inner:
+            p, q, r, s = (corner.places[0] for corner in (a, b, c, d))
+            normal = unit(np.cross(r - p, s - q))
+            if max(abs(float((q - p) @ normal)), abs(float((r - p) @ normal))) < _PLANAR_MM:
+                return self.add(f"PLANE('',{self.file.placement(a.point, normal, unit(q - p))})")
+        rows = list(zip(self.control_points(a, b), self.control_points(d, c), strict=True))
         grid = ",".join(f"({low},{high})" for low, high in rows)
         n = len(rows)
         return self.add(
@@ -188,38 +187,31 @@ class _RoundSymbol:
             f"({n},{n}),(2,2),(0.,1.),(0.,1.),.UNSPECIFIED.)"
         )
 
-    def control_points(self, tier: int, ring: int, k: int) -> tuple[str, ...]:
-        inner = self.controls.get((tier, ring, k))
-        points = self.points[tier][ring]
-        if inner is None:
-            inner = tuple(
-                self.file.point(place, _PLACES) for place in self.places[tier][ring][k][1:]
-            )
-        return (points[k], *inner, points[(k + 1) % len(points)])
+    def control_points(self, corner: _Corner, following: _Corner) -> tuple[str, ...]:
+        inner = corner.inner or [self.file.point(place, _PLACES) for place in corner.places[1:]]
+        return (corner.point, *inner, following.point)
 
-    def curve(self, tier: int, ring: int, k: int) -> str:
-        """Return the edge from one corner to the next."""
-        own = self.places[tier][ring]
-        j = (k + 1) % len(own)
-        a, b = own[k][0], own[j][0]
-        off = np.linalg.norm(np.cross(own[k][1:] - a, unit(b - a)), axis=1)
-        ends = f"{self.corners[tier][ring][k]},{self.corners[tier][ring][j]}"
+    def draw_edge(self, corner: _Corner, following: _Corner) -> None:
+        """Write the edge from one corner to the next."""
+        a, b = corner.places[0], following.places[0]
+        off = np.linalg.norm(np.cross(corner.places[1:] - a, unit(b - a)), axis=1)
         if off.max() < _STRAIGHT_MM:
-            line = f"LINE('',{self.points[tier][ring][k]},{self.file.vector(unit(b - a))})"
-            return self.add(f"EDGE_CURVE('',{ends},{self.add(line)},.T.)")
-        self.controls[tier, ring, k] = tuple(self.file.point(p, _PLACES) for p in own[k][1:])
-        through = self.control_points(tier, ring, k)
-        n = len(through)
-        spline = self.add(
-            f"B_SPLINE_CURVE_WITH_KNOTS('',{n - 1},({','.join(through)}),.UNSPECIFIED.,.F.,.F.,"
-            f"({n},{n}),(0.,1.),.UNSPECIFIED.)"
-        )
-        return self.add(f"EDGE_CURVE('',{ends},{spline},.T.)")
+            curve = self.add(f"LINE('',{corner.point},{self.file.vector(unit(b - a))})")
+        else:
+            corner.inner = tuple(self.file.point(p, _PLACES) for p in corner.places[1:])
+            through = self.control_points(corner, following)
+            n = len(through)
+            curve = self.add(
+                f"B_SPLINE_CURVE_WITH_KNOTS('',{n - 1},({','.join(through)}),.UNSPECIFIED.,.F.,"
+                f".F.,({n},{n}),(0.,1.),.UNSPECIFIED.)"
+            )
+        ends = f"{corner.vertex},{following.vertex}"
+        corner.edge = self.add(f"EDGE_CURVE('',{ends},{curve},.T.)")
 
-    def ring(self, tier: int, ring: int, *, forward: bool, kind: str) -> str:
-        edges = self.edges[tier][ring]
-        order = edges if forward else edges[::-1]
-        return self.file.bound([self.file.oriented(edge, forward=forward) for edge in order], kind)
+    def ring(self, ring: list[_Corner], *, forward: bool, kind: str) -> str:
+        order = ring if forward else ring[::-1]
+        edges = [self.file.oriented(corner.edge, forward=forward) for corner in order]
+        return self.file.bound(edges, kind)
 
     def colour(self, face: int) -> None:
         self.on.coloured.append(self.file.next)

@@ -224,8 +224,7 @@ def write_product(
     entities: Entities, name: str, solid: str, units: str, origin: str
 ) -> ProductReferences:
     """Write the product that the solid is the shape of."""
-    add = entities.add
-    shape = add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('{name}',({origin},{solid}),{units})")
+    shape = entities.add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('{name}',({origin},{solid}),{units})")
     return write_product_of(entities, name, shape)
 
 

@@ -12,7 +12,7 @@ mm, angles in rad.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from itertools import groupby, pairwise
 from operator import itemgetter
 from typing import Any
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from generator.errors import ShapeError
-from generator.polyhedron.read.kernel import wires_of
+from generator.polyhedron.read.kernel import is_line, wires_of
 from generator.polyhedron.read.soup import MOST_FACETS
 from generator.polyhedron.shapes import CHORD_ERROR_MM, FACETS
 
@@ -34,7 +34,7 @@ _REMAKE = "check the model in a CAD program, make that face anew, and export it 
 
 @dataclass(slots=True)
 class _Found:
-    points: list[Any] = field(default_factory=list)  #: (3,) mm
+    points: list[list[float]] = field(default_factory=list)  #: x, y, z, mm
     faces: list[list[list[int]]] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
     surfaces: list[dict[str, Any]] = field(default_factory=list)
@@ -74,16 +74,7 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
             f"symbols to {CHORD_ERROR_MM * coarser:g} mm: finer, they have {counts[-2]} "
             "facets"
         )
-    return {
-        "points": [list(map(float, point)) for point in found.points],
-        "faces": found.faces,
-        "names": found.names,
-        "surfaces": found.surfaces,
-        "blank": found.blank,
-        "kinds": found.kinds,
-        "notes": notes,
-        "error_mm": BLANK_ERROR_MM * coarser,
-    }
+    return asdict(found) | {"notes": notes, "error_mm": BLANK_ERROR_MM * coarser}
 
 
 def _tessellate(solid: Any, faces: list[Any], kinds: list[str], coarser: float) -> _Found:
@@ -210,15 +201,15 @@ class _Nodes:
         if polygon is None:
             raise ShapeError("the CAD kernel cannot divide an edge of face", fix=_REMAKE)
         nodes = [polygon.Node(k) for k in range(1, polygon.NbNodes() + 1)]
-        key = self.edges.Add(edge)
-        if len(nodes) > 2 and key not in self.divided and _is_straight(edge):
+        key, point = self.edges.Add(edge), BRep_Tool.Degenerated_s(edge)
+        if len(nodes) > 2 and key not in self.divided and not point and is_line(edge):
             nodes = [nodes[0], nodes[-1]]
             self.dropped.add(key)
         numbers = self.on_edge.get(key)
         if numbers is None:
             start = self._vertex(TopExp.FirstVertex_s(edge))
             end = self._vertex(TopExp.LastVertex_s(edge))
-            if BRep_Tool.Degenerated_s(edge):
+            if point:
                 numbers = [start] * len(nodes)
             else:
                 numbers = [start, *(self._new(node) for node in nodes[1:-1]), end]
@@ -238,23 +229,13 @@ class _Nodes:
         return self._add(self.mesh.Node(node).Transformed(self.location.Transformation()))
 
     def _add(self, point: Any) -> int:
-        self.found.points.append((point.X(), point.Y(), point.Z()))
+        self.found.points.append([point.X(), point.Y(), point.Z()])
         return len(self.found.points) - 1
 
     def _point(self, node: int) -> int:
         if node not in self.of_face:
             self.of_face[node] = self._new(node)
         return self.of_face[node]
-
-
-def _is_straight(edge: Any) -> bool:
-    from OCP.BRep import BRep_Tool
-    from OCP.BRepAdaptor import BRepAdaptor_Curve
-    from OCP.GeomAbs import GeomAbs_Line
-
-    if BRep_Tool.Degenerated_s(edge):
-        return False
-    return bool(BRepAdaptor_Curve(edge).GetType() == GeomAbs_Line)
 
 
 def _run_of(

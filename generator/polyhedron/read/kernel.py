@@ -174,11 +174,10 @@ def _edges_of(wire: Any, face: Any) -> Iterator[tuple[Any, Any]]:
 def _refuse_bent(edge: Any) -> None:
     """Refuse an edge that leaves the straight line between its ends."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
-    from OCP.GeomAbs import GeomAbs_Line
 
-    curve = BRepAdaptor_Curve(edge)
-    if curve.GetType() == GeomAbs_Line:
+    if is_line(edge):
         return
+    curve = BRepAdaptor_Curve(edge)
     parameters = np.linspace(curve.FirstParameter(), curve.LastParameter(), 17)
     on_curve = [curve.Value(float(t)) for t in parameters]
     points = np.array([(p.X(), p.Y(), p.Z()) for p in on_curve])
@@ -191,6 +190,14 @@ def _refuse_bent(edge: Any) -> None:
             f"an edge at ({x:.6g}, {y:.6g}, {z:.6g}) is not straight",
             fix="leave out round parts: every edge joins two planar faces",
         )
+
+
+def is_line(edge: Any) -> bool:
+    """Whether the kernel has an edge as a straight line."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.GeomAbs import GeomAbs_Line
+
+    return bool(BRepAdaptor_Curve(edge).GetType() == GeomAbs_Line)
 
 
 def sub_shapes(shape: Any, kind: Any) -> list[Any]:

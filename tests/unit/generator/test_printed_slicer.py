@@ -132,6 +132,16 @@ def test_plastic_that_is_not_where_the_part_is(program, part, text):
         slice_part(part, FINE)
 
 
+def test_a_bead_ends_before_a_sharp_point(program, part):
+    corners = [(x, y, z) for x, y in ((-20, -4), (20, -4), (20, 4)) for z in (0, 1)]
+    trimesh.convex.convex_hull(corners).export(part)  # 11 degrees
+    program(gcode=wall(51.6, 50, (36.8, 8)))
+    assert slice_part(part, FINE).low_mm[0] == -20
+    program(gcode=wall(52.5, 50, (35, 8)))
+    with pytest.raises(PrintError, match="short of the part"):
+        slice_part(part, FINE)
+
+
 def test_a_slicer_that_refuses_is_quoted_and_files_that_are_no_part(program, part):
     for script, said in (
         ("echo 'the part is too large' >&2; exit 3\n", "refuses: the part is too large"),

@@ -137,6 +137,7 @@ def test_saying_what_holds_already_means_the_same_object(tmp_path):
         (TAG, {"print": {"parts": "panels"}}, "a tag is printed in one piece"),
         ({"tag": [40]}, {}, "a tag has two sides, not 1"),
         (TAG, {"mount": {"screws": "M3", "rod": 6}}, "held in one way"),
+        (TAG, {"mount": {"screws": "M3", "face": "F1"}}, "the mount takes F1, the only one"),
         (TAG, {"mount": {"screws": "M7"}}, "'M7' is no screw known here"),
         (TAG, {"mount": "ISO 9409-1-51-4-M6"}, "is no flange known here"),
         (TAG, {"mount": "50-4-M6"}, "the mount does not fit face F2"),

@@ -132,6 +132,7 @@ def test_the_pitch_that_is_proposed():
     small, sparse = SensorType(8, 8, 1.5875), SensorType(missing=few)
     assert small.symbol_pitch_mm < SensorType().symbol_pitch_mm
     assert sparse.symbol_pitch_mm < SensorType().symbol_pitch_mm
+    assert SensorType(4, 4, 6.0).symbol_pitch_mm == 12.0  # two tactels, though few are seen whole
 
 
 def test_frames_of_another_shape_are_not_recorded(tmp_path):

@@ -58,6 +58,7 @@ def test_what_the_image_shows_by_itself(reader, monkeypatch):
     hard = diagnose(TouchImages(reader, signal_of(2.0 * smeared)), [])
     assert hard.code == cause.HARD
     assert str(hard).startswith("pressed too hard: readings add up to ")
+    assert hard.way_out == "press with 30 to 120 N"
     for share, code in ((1.01, cause.HARD), (0.99, cause.MOVING)):
         newtons = signal_of(smeared * share * 250 / smeared.sum(), floor=0.0, newtons=True)
         assert diagnose(TouchImages(reader, newtons), []).code == code
@@ -105,7 +106,8 @@ def test_every_cause_has_words_and_a_way_out():
     numbers = dict.fromkeys(
         ("plateau", "signal_to_noise", "newtons", "loaded", "symbols", "direction_deg",
          "sharpness", "silent", "explained", "explained_anywhere", "symbols_anywhere", "slope",
-         "width_mm", "variation", "columns", "pitch_mm", "best_mm", "sum", "most"), 0.5
+         "width_mm", "variation", "columns", "pitch_mm", "best_mm", "sum", "most", "least_n",
+         "most_n"), 0.5
     )  # fmt: skip
     others = {*cause.WAYS_OUT, cause.CHECKED, cause.UNCHECKED}
     others |= {cause.AS_DESIGNED, cause.AS_BUILT, cause.NOT_MEASURED}
