@@ -19,7 +19,6 @@ from recognizer.validation.campaign import (
 from recognizer.validation.compare import BETTER, SAME, WORSE, compare_shares, compare_sizes
 from recognizer.validation.encoded_set import EXTRA, is_extra, refuse_without_specs
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.workers import workers_of
 from recognizer.validation.statistics import (
     calibration,
     chi2_quantile,
@@ -29,6 +28,7 @@ from recognizer.validation.statistics import (
     share_of,
     state_of,
 )
+from recognizer.validation.workers import workers_of
 
 
 @pytest.mark.parametrize(("hits", "of"), [(0, 10), (1, 10), (9, 10), (10, 10), (995, 1000), (3, 7)])
