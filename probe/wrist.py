@@ -158,11 +158,17 @@ def wrist_pose(wrist: Wrist, distances: ArrayLike) -> WristPose:
             fix="check the transducers: two opposite ones must have the sum of the other two",
         )
     tilts = (-wrist.tilt_rad, wrist.tilt_rad)
-    freedoms = (("z", z, wrist.travel_mm), ("theta_x", theta_x, tilts), ("theta_y", theta_y, tilts))
-    for (name, value, (low, high)), error in zip(freedoms, sd, strict=True):
+    turn = (math.degrees(1.0), "degrees")
+    freedoms = (
+        ("z", z, wrist.travel_mm, (1.0, "mm")),
+        ("theta_x", theta_x, tilts, turn),
+        ("theta_y", theta_y, tilts, turn),
+    )
+    for (name, value, (low, high), (scale, unit)), error in zip(freedoms, sd, strict=True):
         if not low - _MANY * error <= value <= high + _MANY * error:
             raise PoseError(
-                f"{name} is {value:.4g}, the end stops are at {low:.4g} and {high:.4g}",
+                f"{name} of the wrist is {scale * value:.4g} {unit}, the end stops are at "
+                f"{scale * low:.4g} and {scale * high:.4g}",
                 fix="check the transducers and their zero",
             )
     return WristPose(z, theta_x, theta_y, covariance)

@@ -172,7 +172,12 @@ def repair(recording: Recording, as_json: Json = False) -> int:
     elif not done.changed:
         write(f"{done.path} is whole; {count_of(done.frames, 'frame')}")
     else:
-        write(f"{done.path}: {count_of(done.frames, 'frame')} saved, {done.lost} lost")
+        short = ", ".join(f"/{name}" for name in done.continued)
+        write(
+            f"{done.path}: {count_of(done.frames, 'frame')} saved, {done.lost} lost"
+            + (f"; continued to the last image: {short}" if short else "")
+            + (f"; the old file is {done.kept}" if done.kept else "")
+        )
     return 0
 
 

@@ -40,6 +40,7 @@ _TYPES: Final = {
     "format_version": int, "tool_version": str, "piece": int, "sensor": str, "calibration": str,
     "units": str, "sensor_type": str,
 }  # fmt: skip
+_MOST_STEP_NS: Final = 3.6e12  #: an hour from frame to frame: more is no rate
 _IMPORT: Final = "import the array that holds the images (N, rows, columns)"
 #: by kind of numbers: the values of a dataset, and what to do with others
 _MEANT: Final = {
@@ -200,7 +201,6 @@ def _checked(file: h5py.File, path: Path, *, closed: bool) -> FrameFile:
             fix="import a part of each image",
             place=path,
         )
-    lengths = {shape[0] for shape in shapes.values()}
     ours = {name: attributes.pop(name, None) for name in _OURS} if own else {}
     said = {name: attributes.pop(name) for name in RecordingOrigin().texts() if name in attributes}
     origin = RecordingOrigin.of_texts(said, attributes)
@@ -210,9 +210,8 @@ def _checked(file: h5py.File, path: Path, *, closed: bool) -> FrameFile:
         closed,
         tool_version=str(ours.get("tool_version", "")),
         piece=int(ours.get("piece") or 1),
-        frames=min(lengths),
+        lengths={name: shape[0] for name, shape in shapes.items()},
         shape=(rows, columns),
-        even=len(lengths) == 1,
         poses="pose" in names,
         read=lambda start, stop: _read_block(file, path, start, stop),
     )
@@ -232,28 +231,52 @@ def _check_attributes(attributes: dict[str, Any], path: Path) -> None:
 
 
 def _read_block(file: h5py.File, path: Path, start: int, stop: int) -> FrameBlock:
-    values: dict[str, Any] = {}
-    with explain_errors(path, "read"):
-        for name in DATASETS:
-            if name in file:
-                values[name] = file[name][start:stop]
-    number = np.arange(start, stop)
-    values.setdefault("t_ns", np.rint(number * (1e9 / NOMINAL_HZ)))
-    values.setdefault("seq", number)
-    values.setdefault("wrist", np.zeros((len(number), 4)))
-    for name, array in values.items():
-        dtype = DATASETS[name][1]
-        if not _fits_exactly(array, dtype):
+    values = {
+        name: _read_values(file, name, path, start, stop)
+        for name in DATASETS
+        if name in file or name != "pose"
+    }
+    return FrameBlock(
+        values["frames"], values["t_ns"], values["seq"], values["wrist"], values.get("pose")
+    ).frozen()
+
+
+def _read_values(file: h5py.File, name: str, path: Path, start: int, stop: int) -> NDArray[Any]:
+    """Return and check entries `start` ... `stop` - 1; those that a dataset lacks are made."""
+    dtype = DATASETS[name][1]
+    length = len(file[name]) if name in file else 0
+    found: list[NDArray[Any]] = []
+    if start < length:
+        with explain_errors(path, "read"):
+            values = file[name][start:stop]
+        if not _fits_exactly(values, dtype):
             kind, fix = _MEANT[dtype.kind]
             raise RecordingError(
                 f"/{name} holds other things than {kind} in frames {start} ... {stop - 1}",
                 fix=fix,
                 place=path,
             )
-        values[name] = array.astype(dtype.newbyteorder("="))
-    return FrameBlock(
-        values["frames"], values["t_ns"], values["seq"], values["wrist"], values.get("pose")
-    ).frozen()
+        found.append(values.astype(dtype.newbyteorder("=")))
+    if length < stop:
+        found.append(_make_values(file, name, path, np.arange(max(start, length), stop)))
+    return found[0] if len(found) == 1 else np.concatenate(found)
+
+
+def _make_values(file: h5py.File, name: str, path: Path, number: NDArray[np.int64]) -> NDArray[Any]:
+    """Return entries for frames of these numbers, which a dataset lacks; see `FrameFile.read`."""
+    shape, dtype = DATASETS[name]
+    if shape:
+        fill = np.nan if dtype.kind == "f" else 0
+        return np.full((len(number), *shape), fill, dtype.newbyteorder("="))
+    first, last, end = 0, 0, 0
+    step = 1e9 / NOMINAL_HZ if name == "t_ns" else 1.0
+    if name in file and len(file[name]):
+        end = len(file[name]) - 1
+        first, last = (int(_read_values(file, name, path, i, i + 1)[0]) for i in (0, end))
+    if name == "t_ns" and 0 < last - first < _MOST_STEP_NS * end:
+        step = (last - first) / end
+    made: NDArray[Any] = last + np.rint((number - end) * step).astype(np.int64)
+    return made
 
 
 def _shape_of(file: h5py.File, path: Path, name: str) -> tuple[int, ...]:

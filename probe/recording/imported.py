@@ -4,7 +4,8 @@ Sources: .npy and .npz, MATLAB files (v4 to v7 by scipy, v7.3 is HDF5), HDF5, a 
 has it, a table (.csv), a folder of grey pictures in the order of their names. Time may be the first
 axis of an array or, as MATLAB users have it, the last. A table holds an image a line (rows *
 columns numbers, row 0 first; a head line is skipped, and where it names `r0c0`, `r0c1`, ... as our
-own tables do, those columns are taken), or one image (rows lines of columns numbers).
+own tables do, or `r1c1`, ..., those columns are taken, and with them `seq`, `t_ns`, `wrist0` ...
+and `p00` ...), or one image (rows lines of columns numbers).
 
 Whole numbers 0 ... 65535 are taken as they are. Other values of a sensor type that says what
 one count is (depth in mm, force in N) are counted in that unit, below 0 as 0. Anything else
@@ -18,11 +19,12 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 import tokenize
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
@@ -38,13 +40,13 @@ from encoded_objects.base.sensor_type import (
     shipped_like,
 )
 from probe.errors import RecordingError
-from probe.frame import WRIST
+from probe.frame import WRIST, are_rigid
 from probe.recording.files import check_name, explain_errors
 from probe.recording.guard import open_hdf5
 from probe.recording.hdf5 import write_recording
-from probe.recording.layout import NOMINAL_HZ, FrameBlock, RecordingOrigin
+from probe.recording.layout import DATASETS, NOMINAL_HZ, FrameBlock, RecordingOrigin
 from probe.recording.read import Recording
-from probe.recording.table import table_header
+from probe.recording.table import POSE_HEADER
 from probe.recording.zarr import is_store, store_arrays
 
 if TYPE_CHECKING:
@@ -55,6 +57,14 @@ _AT_ONCE: Final = 1024  #: images read at a time
 _MOST_BYTES: Final = 1 << 29  #: of the arrays of an archive, which are read as a whole
 _MOST_TABLE: Final = 128 << 20  #: bytes of a table: its cells take 16 times that in memory
 _FULL: Final = 65535  #: counts
+_PLACE: Final = re.compile(r"r(\d{1,6})c(\d{1,6})", re.ASCII | re.IGNORECASE)  #: of a tactel
+_OTHER: Final = {
+    "t_ns": "a time is a whole number of ns",
+    "seq": "a number is whole",
+    "pose": "a pose is a rigid transform of 16 numbers, or empty",
+    "wrist": "readings of the wrist are whole numbers 0 ... 65535",
+}  #: what a column must hold
+_WHOLE: Final = re.compile(r"\s*[+-]?\d{1,19}\s*", re.ASCII)
 
 
 def import_array(
@@ -98,14 +108,13 @@ def import_array(
     kind = choose_sensor_type(sensor_type, "", None, str(path))
     with _arrays_at(path, kind.shape) as arrays:
         found = _choose_array(path, arrays, dataset, kind)
-        scale = _scale(path, found, kind)
+        scale = scale_of(path, found.name, _images(path, found, kind.shape), kind)
         more: dict[str, Any] = {"imported_from": path.name, "imported_array": found.name}
-        if scale:
-            more |= {"scale": scale[1], "scale_offset": scale[0]}
-        units = "counts" if scale is None or scale[1] == kind.unit else "scaled"
+        units, scaled = scale_attributes(scale, kind)
+        more |= scaled
         origin = RecordingOrigin(sensor, "", units, sensor_type_text(kind), MappingProxyType(more))
         images = _images(path, found, kind.shape)
-        blocks = (_block(part, first, scale, 1e9 / rate_hz) for first, part in images)
+        blocks = (_block(found, part, first, scale, 1e9 / rate_hz) for first, part in images)
         write_recording(out, origin, blocks, replace=replace)
     return Recording(out)
 
@@ -117,6 +126,8 @@ class FileArray:
     name: str
     values: Any  #: an ndarray, or a dataset of HDF5
     reverse: bool = False  #: its axes stand in the order of MATLAB
+    others: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    """What it says of its images besides, under the names of `DATASETS`."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -203,14 +214,20 @@ def _images(
         yield first, images
 
 
-def _scale(path: Path, found: FileArray, kind: SensorType) -> tuple[float, float] | None:
-    """Return how counts become values, value = offset + scale * count; None if they are counts."""
+def scale_of(
+    path: Path, name: str, numbered: Iterable[tuple[int, NDArray[Any]]], kind: SensorType
+) -> tuple[float, float] | None:
+    """Return how counts become values, value = offset + scale * count; None if they are counts.
+
+    `numbered` gives arrays of images and the number of the first in each. Raises RecordingError: a
+    value is no number, or all are too small.
+    """
     least, most, whole = 0.0, 0.0, True
-    for first, images in _images(path, found, kind.shape):
+    for first, images in numbered:
         bad = ~np.isfinite(images)
         if bad.any():
             raise RecordingError(
-                f"{found.name} holds values that are no numbers, "
+                f"{name} holds values that are no numbers, "
                 f"the first in image {first + int(np.argwhere(bad)[0, 0])}",
                 fix="replace them, or leave those images out",
                 place=path,
@@ -224,25 +241,45 @@ def _scale(path: Path, found: FileArray, kind: SensorType) -> tuple[float, float
     scale = most / _FULL - least / _FULL
     if scale < np.finfo(np.float64).tiny:
         raise RecordingError(
-            f"{found.name} holds nothing above {most:g}",
+            f"{name} holds nothing above {most:g}",
             fix="multiply the values by a power of ten",
             place=path,
         )
     return least, scale
 
 
-def _block(
-    images: NDArray[Any], first: int, scale: tuple[float, float] | None, period_ns: float
-) -> FrameBlock:
+def scale_attributes(
+    scale: tuple[float, float] | None, kind: SensorType
+) -> tuple[str, dict[str, float]]:
+    """Return the units of a recording that was scaled so, and what it says of the scale."""
+    if scale is None:
+        return "counts", {}
+    units = "counts" if scale[1] == kind.unit else "scaled"
+    return units, {"scale": scale[1], "scale_offset": scale[0]}
+
+
+def to_counts(images: NDArray[Any], scale: tuple[float, float] | None) -> NDArray[np.uint16]:
+    """Return values as the counts that `scale_of` makes of them."""
     if scale:
         images = np.rint(images / scale[1] - scale[0] / scale[1]).clip(0, _FULL)
+    return images.astype(np.uint16)
+
+
+def _block(
+    found: FileArray,
+    images: NDArray[Any],
+    first: int,
+    scale: tuple[float, float] | None,
+    period_ns: float,
+) -> FrameBlock:
     number = np.arange(first, first + len(images))
+    others = {name: values[number] for name, values in found.others.items()}
     return FrameBlock(
-        images.astype(np.uint16),
-        np.rint(number * period_ns).astype(np.int64),
-        number,
-        np.zeros((len(images), WRIST), np.uint16),
-        None,
+        to_counts(images, scale),
+        others.get("t_ns", np.rint(number * period_ns).astype(np.int64)),
+        others.get("seq", number),
+        others.get("wrist", np.zeros((len(images), WRIST), np.uint16)),
+        others.get("pose"),
     )
 
 
@@ -348,9 +385,10 @@ def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
                 f"it is no table: {bad}", fix="save it as CSV, UTF-8", place=path
             ) from bad
     head = [] if not lines or _are_numbers(lines[0]) else [name.strip() for name in lines.pop(0)]
-    wanted = [name for name in table_header(image) if name.startswith("r")]
-    if all(name in head for name in wanted):
-        columns = [head.index(name) for name in wanted]
+    others: dict[str, NDArray[Any]] = {}
+    if columns := _image_columns(path, head, image):
+        even = all(len(line) == len(head) for line in lines)
+        others = _other_columns(path, head, lines) if even else {}
         lines = [[line[c] for c in columns] if len(line) == len(head) else line for line in lines]
     values = _numbers(path, lines, bool(head))
     rows, columns_ = image
@@ -364,7 +402,63 @@ def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
             fix=f"write {rows * columns_} numbers a line, or give the --sensor-type",
             place=path,
         )
-    return FileArray(path.stem, values)
+    return FileArray(path.stem, values, others=others)
+
+
+def _image_columns(path: Path, head: list[str], image: tuple[int, int]) -> list[int]:
+    """Return the columns of the tactels by their names, row 0 first; none where they have none."""
+    named = {i: found for i, name in enumerate(head) if (found := _PLACE.fullmatch(name))}
+    places = {(int(found[1]), int(found[2])): i for i, found in named.items()}
+    for first in (0, 1):
+        wanted = [(r + first, c + first) for r in range(image[0]) for c in range(image[1])]
+        if len(named) == len(places) and sorted(places) == wanted:
+            return [places[place] for place in wanted]
+    if not named:
+        return []
+    last = f"r{image[0] - 1}c{image[1] - 1}"
+    raise RecordingError(
+        f"its head names {len(places)} tactels in {len(named)} columns, not r0c0 ... {last}, nor "
+        f"r1c1 ... r{image[0]}c{image[1]}, each once",
+        fix="name every tactel once, or give the --sensor-type",
+        place=f"{path}:1",
+    )
+
+
+def _other_columns(path: Path, head: list[str], lines: list[list[str]]) -> dict[str, NDArray[Any]]:
+    """Return what columns of our own names say of each image; see `export_csv`."""
+    ours = {"t_ns": ["t_ns"], "seq": ["seq"], "pose": POSE_HEADER,
+            "wrist": [f"wrist{i}" for i in range(WRIST)]}  # fmt: skip
+    found: dict[str, NDArray[Any]] = {}
+    for dataset, names in ours.items():
+        if not set(names) <= set(head):
+            continue
+        shape, dtype = DATASETS[dataset]
+        columns = [head.index(name) for name in names]
+        for number, line in enumerate(lines, 2):
+            cells = [line[c] for c in columns]
+            values = _exact_values(cells, dtype)
+            if values is None or (dtype.kind == "f" and not are_rigid(values.reshape(1, *shape))):
+                raise RecordingError(
+                    f"{', '.join(cells)[:60]} in {names[0]}{' ...' if names[1:] else ''}: "
+                    f"{_OTHER[dataset]}",
+                    fix="write it so, or name the column otherwise",
+                    place=f"{path}:{number}",
+                )
+            found.setdefault(dataset, np.empty((len(lines), *shape), dtype.newbyteorder("=")))
+            found[dataset][number - 2] = values.reshape(shape)
+    return found
+
+
+def _exact_values(cells: list[str], dtype: np.dtype[Any]) -> NDArray[Any] | None:
+    """Return the numbers in cells, empty ones as NaN; None where one is none of that type."""
+    try:
+        if dtype.kind == "f":
+            return np.array([cell.strip() or "nan" for cell in cells], np.float64)
+        if all(map(_WHOLE.fullmatch, cells)):
+            return np.array([int(cell) for cell in cells], dtype.newbyteorder("="))
+    except (ValueError, OverflowError):
+        pass
+    return None
 
 
 def _picture(path: Path, image: tuple[int, int]) -> NDArray[np.float64]:

@@ -151,9 +151,8 @@ def open_journal(path: Path, *, live: bool = False) -> Iterator[FrameFile]:
             closed=False,
             tool_version=str(head["tool_version"]),
             piece=piece,
-            frames=records.number,
+            lengths={"frames": records.number},
             shape=(rows, columns),
-            even=True,
             poses=poses,
             read=read,
         )

@@ -156,13 +156,23 @@ class FrameFile:
     closed: bool  #: its writer closed it, and its end is there
     tool_version: str
     piece: int  #: number in its series, from 1
-    frames: int  #: with everything that belongs to them
+    lengths: Mapping[str, int]  #: of its datasets
     shape: tuple[int, int]  #: rows and columns of its images
-    even: bool  #: all datasets have that length
     poses: bool  #: frames in it may have a pose
     read: Callable[[int, int], FrameBlock]
     """Return and check frames `start` ... `stop` - 1; RecordingError where the file is damaged, or
-    a value is no count, time, number or pose."""
+    a value is no count, time, number or pose. A dataset that ends before /frames is continued:
+    times at its rate, numbers by one, no wrist and no pose."""
+
+    @property
+    def frames(self) -> int:
+        """The frames with everything that belongs to them."""
+        return min(self.lengths.values())
+
+    @property
+    def even(self) -> bool:
+        """Whether all datasets have one length."""
+        return len(set(self.lengths.values())) == 1
 
     def blocks(self) -> Iterator[FrameBlock]:
         """Yield all frames, many whole chunks at a time; see `read`."""

@@ -8,8 +8,8 @@
     metadata "recording"                          the attributes of the recording, as JSON
 
 What was exported comes back as it was. Of a file by somebody else `sensor_msgs/Image` messages
-(32FC1, 16UC1 or mono8) are enough; their stamps are the times, and a `PoseStamped` belongs to the
-image of its stamp.
+(32FC1, 16UC1 or mono8) are enough, values that are no counts are scaled as those of an array;
+their stamps are the times, and a `PoseStamped` belongs to the image of its stamp.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO, TYPE_CHECKING, Any, BinaryIO, Final, Self
 
 import numpy as np
@@ -36,6 +37,7 @@ from probe.frame import Frame, frame_from
 from probe.recording.files import check_name, explain_errors
 from probe.recording.guard import FREE, MOST_CHUNK, PACKED
 from probe.recording.hdf5 import write_recording
+from probe.recording.imported import scale_attributes, scale_of, to_counts
 from probe.recording.layout import FrameBlock, RecordingOrigin, block_of, json_value
 from probe.recording.read import Recording
 from probe.recording.ros import (
@@ -137,16 +139,22 @@ def import_mcap(
     is taken.
     """
     check_name(out, replace=replace)
-    origin, frames = _read_mcap(path)
+    origin, ours = _read_mcap(path)
+    kind = SensorType()
     if sensor_type and not origin.sensor_type:
         kind = choose_sensor_type(sensor_type, "", None, str(path))
         origin = dataclasses.replace(origin, sensor_type=sensor_type_text(kind))
-    write_recording(out, origin, _blocks(frames, path), replace=replace)
+    scale = None if ours else scale_of(path, "the file", _values(path), kind)
+    if scale:
+        units, scaled = scale_attributes(scale, kind)
+        more = MappingProxyType({**origin.more, **scaled})
+        origin = dataclasses.replace(origin, units=units, more=more)
+    write_recording(out, origin, _blocks(_frames(path, scale), path), replace=replace)
     return Recording(out)
 
 
-def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
-    """Return the origin of the frames of an MCAP file, and these in order of their time."""
+def _read_mcap(path: Path) -> tuple[RecordingOrigin, bool]:
+    """Return the origin of the frames of an MCAP file, and whether it is one of ours."""
     with _open_mcap(path) as reader:
         summary = reader.get_summary()
         kinds = {} if summary is None else {s.id: s.name for s in summary.schemas.values()}
@@ -165,7 +173,7 @@ def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
                 fix="write it as one of these", place=path
             )  # fmt: skip
         origin = RecordingOrigin.of_texts(said, dict(more))
-    return origin, _frames(path)
+    return origin, TOUCH_FRAME in kinds.values()
 
 
 def _is_kept(value: object) -> bool:
@@ -261,7 +269,15 @@ def _blocks(frames: Iterator[Frame], path: Path) -> Iterator[FrameBlock]:
         yield block_of(some)
 
 
-def _frames(path: Path) -> Iterator[Frame]:
+def _values(path: Path) -> Iterator[tuple[int, NDArray[Any]]]:
+    """Yield images of others as they are, by their numbers."""
+    for number, (_, message) in enumerate(_messages(path, {IMAGE})):
+        values = _counts(message, number, path)
+        if values.size:
+            yield number, values
+
+
+def _frames(path: Path, scale: tuple[float, float] | None) -> Iterator[Frame]:
     """Yield the frames of an MCAP file: ours in the order of the file, others' in that of time."""
     number = 0
     poses = {_stamp(message): _pose(message, path) for _, message in _messages(path, {POSE})}
@@ -270,13 +286,13 @@ def _frames(path: Path) -> Iterator[Frame]:
     for kind, message in _messages(path, {IMAGE, TOUCH_FRAME}):
         if kind == IMAGE:
             if image is not None:
-                yield _frame(image, rest, poses, number, path)
+                yield _frame(image, rest, poses, scale, number, path)
                 number += 1
             image, rest = message, None
         elif image is not None:
             rest = message
     if image is not None:
-        yield _frame(image, rest, poses, number, path)
+        yield _frame(image, rest, poses, scale, number, path)
 
 
 def _messages(path: Path, kinds: Collection[str]) -> Iterator[tuple[str, Message]]:
@@ -304,6 +320,7 @@ def _frame(
     image: Message,
     rest: Message | None,
     poses: Mapping[int, NDArray[np.float64]],
+    scale: tuple[float, float] | None,
     number: int,
     path: Path,
 ) -> Frame:
@@ -313,7 +330,9 @@ def _frame(
         t_ns, seq, wrist = rest["t_ns"], rest["seq"], np.array(rest["wrist"], np.uint16)
         T = np.array(rest["pose"]).reshape(4, 4) if rest["has_pose"] else None
     try:
-        return frame_from(_counts(image, number, path), t_ns=t_ns, seq=seq, wrist=wrist, pose=T)
+        counts = _counts(image, number, path)
+        counts = to_counts(counts, scale) if scale else counts
+        return frame_from(counts, t_ns=t_ns, seq=seq, wrist=wrist, pose=T)
     except FrameError as error:
         raise RecordingError(f"image {number}: {error.cause}", fix=error.fix, place=path) from error
 

@@ -1,8 +1,9 @@
 """The file of a killed writer, or a bad copy -> a recording that anybody can read.
 
-Frames that can be read are copied into a new file, which takes the place of the old one.
-Where frames were lost, the old file stays as `touch.damaged.h5`: another tool may get more
-out of it.
+Images that can be read are copied into a new file, which takes the place of the old one. Times,
+numbers, wrist readings and poses that end before the images are continued, see `FrameFile.read`.
+Where anything was lost, the old file stays as `touch.damaged.h5`: another tool may get more out
+of it.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ class RepairResult:
     frames: int  #: in it
     lost: int  #: frames that were in the file and could not be read
     changed: bool  #: whether there was anything to repair
+    continued: tuple[str, ...] = ()  #: datasets that ended before the images
+    kept: Path | None = None  #: where the old file is; None: it held nothing more
 
 
 def repair(path: Path | str) -> RepairResult:
@@ -61,7 +64,9 @@ def repair(path: Path | str) -> RepairResult:
     with _open_damaged(path) as file:
         target = _free_name(path, file.piece) if is_part(path) else path
         frames = sum(map(len, _readable_blocks(file)))
-        lost, origin = file.frames - frames, file.origin
+        lost, origin = max(file.lengths.values()) - frames, file.origin
+        images = file.lengths["frames"]
+        short = tuple(name for name, length in file.lengths.items() if length < images)
         if file.closed and file.even and not lost:
             if path != target:
                 with explain_errors(path, "rename"):
@@ -69,18 +74,20 @@ def repair(path: Path | str) -> RepairResult:
             return RepairResult(target, frames, 0, changed=path != target)
         if lost and not frames:
             raise RecordingError("no frame in it can be read", fix="copy it again", place=path)
-        if lost:
-            more = MappingProxyType({**origin.more, "frames_lost": lost})
-            origin = dataclasses.replace(origin, more=more)
+        said = {"frames_lost": lost, "continued": ", ".join(short)}
+        more = {**origin.more, **{name: value for name, value in said.items() if value}}
+        origin = dataclasses.replace(origin, more=MappingProxyType(more))
         draft = draft_of(target)
         write_hdf5(draft, origin, _readable_blocks(file), target, file.piece)
+    kept = None
     with explain_errors(path, "replace"):
-        if lost or not file.own:
-            os.link(path, _first_free(target.with_name(f"{target.stem}.damaged{target.suffix}")))
+        if lost or short or not file.own:
+            kept = _first_free(target.with_name(f"{target.stem}.damaged{target.suffix}"))
+            os.link(path, kept)
         os.replace(draft, path)
         if path != target:
             os.rename(path, target)
-    return RepairResult(target, frames, lost, changed=True)
+    return RepairResult(target, frames, lost, changed=True, continued=short, kept=kept)
 
 
 @contextmanager
@@ -100,9 +107,10 @@ def _open_damaged(path: Path) -> Iterator[FrameFile]:
 
 def _readable_blocks(file: FrameFile) -> Iterator[FrameBlock]:
     """Yield the blocks that can be read, one for each that was compressed."""
-    for start in range(0, file.frames, CHUNK):
+    images = file.lengths["frames"]
+    for start in range(0, images, CHUNK):
         try:
-            yield file.read(start, min(start + CHUNK, file.frames))
+            yield file.read(start, min(start + CHUNK, images))
         except RecordingError:
             continue
 

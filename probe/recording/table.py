@@ -7,6 +7,7 @@ known in any frame p00 ... p33, T_base_sensor by rows (mm), empty in the frames 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from probe.frame import WRIST
 from probe.recording.files import explain_errors
 from probe.recording.layout import FrameBlock
 from probe.recording.read import Recording
+
+POSE_HEADER: Final = [f"p{r}{c}" for r in range(4) for c in range(4)]
 
 
 def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
@@ -30,7 +33,7 @@ def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
         open(draft, "x", encoding="ascii", newline="") as stream,
     ):
         poses = any(file.poses for file in recording.files)
-        pose = [f"p{r}{c}" for r in range(4) for c in range(4)] if poses else []
+        pose = POSE_HEADER if poses else []
         stream.write(",".join([*table_header(recording.shape), *pose]) + "\n")
         for block in recording.blocks():
             stream.write("".join(line + "\n" for line in _lines(block, poses)))

@@ -1,8 +1,9 @@
 """A simulated sensor as its type describes it: scene + touch -> contact -> counts.
 
 The contact model presses, the film remembers (hysteresis, creep), and the board of
-`probe.circuit` reads with noise; a gel has no film and no board, but a camera's noise. Its
-tactels are sound and alike; `world.sensor` has sensors with faults. Thesis 4.2.
+`probe.circuit` reads with noise. Readings that are conductances have no such board, forces and
+depths no film either: they are counted in the type's unit, with the type's noise. Tactels are
+sound and alike; `world.sensor` has sensors with faults. Thesis 4.2.
 """
 
 from __future__ import annotations
@@ -15,7 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.circuit import QUIET, Electronics, FilmState, Fsr, Noise, fsr_of, read_counts
+from probe.circuit import (
+    QUIET,
+    Electronics,
+    FilmState,
+    Fsr,
+    Noise,
+    conductances,
+    fsr_of,
+    read_counts,
+)
 from probe.contact.contract import Contact, Touch
 from probe.contact.press import Accuracy, press
 from probe.frame import Frame, frame_from
@@ -47,7 +57,7 @@ class SimulatedSensor:
     board: Electronics
     film: Fsr
     accuracy: Accuracy = "auto"  #: of the contact model, `probe.contact.press`
-    quiet: bool = False  #: without the noise of a gel's camera
+    quiet: bool = False  #: without noise
 
     def press(self, scene: Scene, touch: Touch) -> Contact:
         """Return the contact of a touch; raises `ContactError` if it has no equilibrium."""
@@ -69,11 +79,12 @@ class SimulatedSensor:
         """Yield counts (rows, columns) under forces (rows, columns), a frame apart each."""
         state: FilmState | None = None
         for image in forces_n:
-            if self.sensor.value == "depth":
-                yield self._depths(image, rng)
-            else:
+            if self.sensor.value == "counts":
                 counts, state = read_counts(image, self.board, self.film, state, rng)
-                yield counts
+            else:
+                values, state = self._values(image, state)
+                counts = self._counted(values, rng)
+            yield counts
 
     def frames(self, forces_n: Iterable[Array], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield frames under forces (rows, columns), numbered and timed from 0."""
@@ -84,11 +95,19 @@ class SimulatedSensor:
         """Return when a frame is read, ns after frame 0."""
         return round(seq * self.board.frame_s * 1e9)
 
-    def _depths(self, forces_n: Array, rng: np.random.Generator) -> Counts:
-        from probe.contact.gel import depths_mm
+    def _values(self, forces_n: Array, state: FilmState | None) -> tuple[Array, FilmState | None]:
+        """Return depths (mm), conductances (S) or forces (N), and the film's new state."""
+        if self.sensor.value == "depth":
+            from probe.contact.gel import depths_mm
 
+            return depths_mm(self.sensor, forces_n), state
+        if self.sensor.value == "conductance":
+            return conductances(self.film, forces_n, state, self.board.frame_s)
+        return forces_n**self.sensor.exponent, state
+
+    def _counted(self, values: Array, rng: np.random.Generator) -> Counts:
         noise = 0.0 if self.quiet else self.sensor.noise
-        counts = depths_mm(self.sensor, forces_n) / self.sensor.unit
+        counts = values / self.sensor.unit
         counts = counts + noise * rng.standard_normal(self.sensor.shape)
         counts[~self.sensor.present()] = 0.0
         return np.clip(np.rint(counts), 0, self.sensor.full).astype(np.uint16)

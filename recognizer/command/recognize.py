@@ -202,7 +202,7 @@ def _answers(
             found = reader.read(touch.counts, calibration=source.calibration, seq=touch.seq)
         else:
             signal = reader.signal(touch.counts, calibration=source.calibration)
-            pose = pose_during(touch, count, by_touch, options.joint_error)
+            pose = pose_during(touch, count, by_touch, options.joint_error, source.place)
             found = belief.add(signal, pose, seq=touch.seq)
         joints = by_touch[count - 1] if len(by_touch) >= count else options.joints_deg
         in_base, trouble = _object_in_base(touch, found, joints, options.joint_error)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from encoded_objects.base.foreign import MOST_TEXT, foreign_bytes
+from probe.errors import PoseError
 from recognizer.command.options import five_angles
 from recognizer.errors import RecognizerError
 
@@ -79,16 +80,21 @@ def sensor_pose(
 
     if joints_deg is None:
         return SensorPose(np.asarray(touch.pose), np.zeros((6, 6)))
+    if not np.any(touch.wrist):
+        raise PoseError(
+            "its frames have no readings of the wrist, all are 0",
+            fix="record them, or leave --joints out and record poses (/pose)",
+        )
     errors = np.full(len(joints_deg), math.radians(error_deg))
     return carried_pose(Arm(), Wrist(), np.radians(joints_deg), errors, touch.wrist)
 
 
 def pose_during(
-    touch: TouchImage, number: int, joints_deg: Joints, error_deg: float
+    touch: TouchImage, number: int, joints_deg: Joints, error_deg: float, place: str = ""
 ) -> SensorPose | ArrayLike | None:
-    """Return the pose of the sensor during a touch of a scan, numbered from 1.
+    """Return the pose of the sensor during a touch of a scan of `place`, numbered from 1.
 
-    Raises ScanError: angles for fewer touches than there are; PoseError: see `sensor_pose`.
+    Raises ScanError: angles for fewer touches than there are, or of no arm, see `sensor_pose`.
     """
     if not joints_deg:
         return touch.pose
@@ -97,7 +103,11 @@ def pose_during(
             f"joint angles of {len(joints_deg)} touches, but there is touch {number}",
             fix="give --joints FILE with a line of five angles for each touch",
         )
-    return sensor_pose(touch, joints_deg[number - 1], error_deg)
+    try:
+        return sensor_pose(touch, joints_deg[number - 1], error_deg)
+    except PoseError as error:
+        cause = f"touch {number} of the scan: {error.cause}"
+        raise ScanError(cause, fix=error.fix, place=place) from error
 
 
 def read_joints(path: Path) -> Joints:

@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 
 COUNTS_PER_N = 150.0  #: of a tactel under small forces, unless the supply is too low
 BIAS = 8.0  #: counts of an unloaded tactel
+VIRTUAL_OHM = 1e-3  #: load of a board whose readings are conductances or forces
 FULL = 1023  #: of the readings that these counts are of; of other widths in proportion
 PEAK = 1.4  #: force before a film with hysteresis is read, of the force when it is
 SLIDE_STEP_MM = 0.5  #: places along a slide are at most this far apart
@@ -80,7 +81,7 @@ class SensorInstance:
         return Fsr(
             gain_s=plain.gain_s * np.exp(level.gain * self.gains),
             exponent=level.exponent * sensor.exponent * plain.exponent,
-            break_n=plain.break_n,
+            break_n=none if sensor.value == "force" else plain.break_n,
             preload_n=none,
             series_ohm=none,
             stuck_s=hot.reshape(rows, columns),
@@ -145,7 +146,11 @@ class LevelSensor:
     def _read_board(
         self, surface: HeightMap, touch: Touch, instance: SensorInstance, rng: np.random.Generator
     ) -> tuple[Array, Contact]:
-        """Return counts that are not rounded, and the contact, of a film and a board."""
+        """Return counts that are not rounded, and the contact, of a film and a board.
+
+        A board that gives conductances or forces has undone its divider: of a level count all but
+        `load_ohm`, and `noise_n` as for a gel.
+        """
         sensor, level, contacts = self.sensor, self.level, engine_named(self.engine)
         tips = instance.tips(sensor, level, contacts.points)
         forces, contact = _slip(contacts, surface, sensor, touch, tips, level.slide_mm, rng)
@@ -156,7 +161,14 @@ class LevelSensor:
             before = contacts.press(surface, sensor, rocked, tips).forces_n
             _, state = conductances(film, blur(before, level.cross_talk))
         conductance, _ = conductances(film, blur(forces, level.cross_talk), state)
-        share = loaded_columns(conductance, instance.floating_rows(level), level.load_ohm)
+        load_ohm = level.load_ohm if sensor.value == "counts" else VIRTUAL_OHM
+        share = loaded_columns(conductance, instance.floating_rows(level), load_ohm)
+        if sensor.value != "counts":
+            seen = _row_leakage(share / load_ohm, level.bleed)
+            if sensor.value == "force":
+                seen = (seen - film.leak_s) / GAIN_S
+            counts = seen / sensor.unit + _noise(sensor, level, rng)
+            return np.where(sensor.present(), counts, 0.0), contact
         coarse = sensor.full / FULL
         amplification = max(1.0, COUNTS_PER_N / (FULL * level.load_ohm * GAIN_S))
         offered = sensor.full * amplification * _row_leakage(share, level.bleed)
@@ -183,8 +195,7 @@ class LevelSensor:
         top = max(float(depth.max()), 1e-12)
         seen = top * (depth / top) ** (level.exponent * sensor.exponent)
         counts: Array = seen * np.exp(level.gain / 2 * shade) / sensor.unit
-        noise = sensor.noise * level.noise_n / TYPICAL.noise_n
-        counts = counts + noise * rng.standard_normal(sensor.shape)
+        counts = counts + _noise(sensor, level, rng)
         counts[instance.dead(level) | ~sensor.present()] = 0.0
         return counts, contact
 
@@ -219,6 +230,13 @@ def _slip(
                      y_mm=touch.y_mm + way * math.sin(towards))  # fmt: skip
         forces.append(contacts.press(surface, sensor, at, tips).forces_n)
     return np.mean(forces, axis=0), middle
+
+
+def _noise(sensor: SensorType, level: Level, rng: np.random.Generator) -> Array:
+    """Return the type's noise as a level has it, counts (rows, columns)."""
+    noise = sensor.noise * level.noise_n / TYPICAL.noise_n
+    drawn: Array = noise * rng.standard_normal(sensor.shape)
+    return drawn
 
 
 def _row_leakage(share: Array, bleed: float) -> Array:

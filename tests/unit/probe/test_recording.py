@@ -39,6 +39,11 @@ def refused(path: Path, match: str) -> None:
     assert str(path) in str(caught.value)
 
 
+def test_a_recording_is_a_file():
+    with pytest.raises(RecordingError, match="list is no file; give the path of a recording"):
+        Recording([np.zeros((16, 16))])
+
+
 def test_the_file_is_plain_hdf5_with_its_origin(tmp_path):
     path = tmp_path / "touch.h5"
     record(path, frames(70), sensor="bench 1", calibration="ab12", attributes={"force_n": 80.0})
@@ -218,3 +223,36 @@ def test_a_disk_without_space_for_hdf5_leaves_the_journal(tmp_path, monkeypatch)
     monkeypatch.undo()
     assert repair(tmp_path / "touch.h5").path == tmp_path / "touch.h5"
     assert len(Recording(tmp_path / "touch.h5")) == 1
+
+
+@pytest.mark.parametrize(
+    ("t_ns", "made"),
+    [
+        (np.arange(5) * 20_000_000 + 3, np.arange(146) * 20_000_000 + 3),
+        ([7], 7 + np.rint(np.arange(146) * (1e9 / 220))),
+        (np.empty(0, np.int64), np.rint(np.arange(146) * (1e9 / 220))),
+    ],
+    ids=["at its rate", "one time", "none"],
+)
+def test_repair_keeps_every_image_where_its_time_number_or_pose_is_missing(tmp_path, t_ns, made):
+    poses = np.tile(np.eye(4), (146, 1, 1))
+    path = foreign(
+        tmp_path / "a.h5", frames=COUNTS[:146], t_ns=t_ns, seq=np.arange(9, 109),
+        wrist=np.full((146, 4), 5), pose=poses[:70],
+    )  # fmt: skip
+    content = path.read_bytes()
+    result = repair(path)
+    assert (result.frames, result.lost, result.continued) == (146, 0, ("t_ns", "seq", "pose"))
+    assert result.kept.read_bytes() == content
+    block = Recording(path).block()
+    np.testing.assert_array_equal(block.counts, COUNTS[:146])
+    np.testing.assert_array_equal(block.t_ns, made)
+    np.testing.assert_array_equal(block.seq, np.arange(9, 155))
+    np.testing.assert_array_equal(block.pose[:70], poses[:70])
+    assert np.isnan(block.pose[70:]).all()
+    assert Recording(path).origin.more["continued"] == "t_ns, seq, pose"
+
+
+def test_repair_counts_entries_without_an_image_as_lost(tmp_path):
+    path = foreign(tmp_path / "a.h5", frames=COUNTS[:5], t_ns=np.arange(146))
+    assert (repair(path).lost, len(Recording(path))) == (141, 5)

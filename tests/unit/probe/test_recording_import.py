@@ -22,6 +22,7 @@ from probe.recording.imported import import_array
 from probe.recording.mcap import export_mcap, import_mcap
 from probe.recording.read import Recording
 from probe.recording.ros import DEFINITIONS, IMAGE, POSE, TOUCH_FRAME, covariance_message
+from probe.recording.table import export_csv
 from recognizer.validation.dataset_formats import write_ftp1
 
 COUNTS = np.random.default_rng(5).integers(0, 1024, (70, 16, 16)).astype(np.uint16)
@@ -157,7 +158,7 @@ def test_images_of_others_become_a_recording(tmp_path, encoding, dtype):
     ("options", "said"),
     [
         ({"encoding": "rgb8", "dtype": "<u2"}, "image 0 is encoded as rgb8"),
-        ({"encoding": "32FC1", "dtype": "<f4", "image": np.full((16, 16), 0.5)}, "whole numbers"),
+        ({"encoding": "32FC1", "dtype": "<f4", "image": np.full((16, 16), np.nan)}, "no numbers"),
         ({"step": 31}, "bytes, not 16 rows of 31"),
     ],
 )
@@ -167,6 +168,70 @@ def test_images_that_are_none_are_refused_and_nothing_is_left(tmp_path, options,
         import_mcap(path, tmp_path / "r.h5")
     assert caught.value.fix
     assert [p.name for p in tmp_path.iterdir()] == ["robot.mcap"]
+
+
+def test_values_of_others_that_are_no_counts_are_scaled_as_those_of_an_array(tmp_path):
+    image = np.linspace(-0.9, 0.01, 256).reshape(16, 16)
+    path = robots_file(tmp_path / "robot.mcap", encoding="32FC1", dtype="<f4", image=image)
+    made = import_mcap(path, tmp_path / "r.h5")
+    np.save(tmp_path / "a.npy", (image + np.arange(2)[:, None, None]).astype("<f4"))
+    same = import_array(tmp_path / "a.npy", tmp_path / "a.h5")
+    np.testing.assert_array_equal(made.block().counts, same.block().counts)
+    for name in ("scale", "scale_offset"):
+        assert made.origin.more[name] == same.origin.more[name]
+    assert made.origin.units == "scaled"
+
+
+def test_a_table_of_ours_comes_back_with_times_numbers_wrist_and_poses(tmp_path):
+    given = [f for i in range(5) for f in made_frames(1, first=7 * i, pose=pose_at(i / 3))]
+    given += made_frames(3, first=50)
+    record(tmp_path / "a.h5", given)
+    export_csv(tmp_path / "a.h5", tmp_path / "a.csv")
+    before = Recording(tmp_path / "a.h5").block().datasets()
+    after = import_array(tmp_path / "a.csv", tmp_path / "b.h5").block().datasets()
+    assert set(before) == set(after)
+    for name, values in before.items():
+        np.testing.assert_array_equal(values, after[name])
+
+
+HEADS = {
+    "ours": lambda r, c: f"r{r}c{c}",
+    "from 1": lambda r, c: f"r{r + 1}c{c + 1}",
+    "in capitals": lambda r, c: f"R{r}C{c}",
+}
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_tactels_of_a_table_are_taken_by_name(tmp_path, head):
+    names = [HEADS[head](r, c) for c in range(16) for r in range(16)]  # by columns
+    lines = [",".join(["t_ns", *names])]
+    lines += [",".join(map(str, [20 * n, *image.T.flat])) for n, image in enumerate(COUNTS[:3])]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    block = import_array(tmp_path / "a.csv", tmp_path / "a.h5").block()
+    np.testing.assert_array_equal(block.counts, COUNTS[:3])
+    assert block.t_ns.tolist() == [0, 20, 40]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "r3c4",
+            "r0c0",
+            r"a\.csv:1: its head names 255 tactels in 256 columns, not r0c0 \.\.\. r15c15",
+        ),
+        ("r3c4", "x", "its head names 255 tactels in 255 columns"),
+        ("r0c0", "r1c1", "its head names 255 tactels in 256 columns"),
+        ("r3c4", "r16c3", "its head names 256 tactels in 256 columns"),
+        ("\n5", "\n5.5", r"a\.csv:2: 5\.5 in t_ns: a time is a whole number of ns"),
+        ("\n5", "\n9223372036854775808", "a time is a whole number of ns"),
+    ],
+)
+def test_tables_whose_names_or_times_are_none_are_refused(tmp_path, old, new, said):
+    names = ["t_ns", *(f"r{r}c{c}" for r in range(16) for c in range(16))]
+    text = ",".join([*names, "end"]) + "\n5," + ",".join(map(str, COUNTS[0].flat)) + ",0"
+    (tmp_path / "a.csv").write_text(text.replace(f"{old},", f"{new},", 1))
+    refused(tmp_path / "a.csv", said)
 
 
 def test_a_covariance_is_in_metres():

@@ -2,19 +2,22 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.sensor_type import SensorType, SensorTypeError
+from probe.circuit.fsr import conductances, fsr_of
 from probe.circuit.network import loaded_columns
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import CircuitError, SurfaceError
 from probe.simulate.scene import bare_scene
-from probe.simulate.simulation import TouchOptions
-from probe.simulate.world.levels import SOUND
+from probe.simulate.sensor import simulated_sensor
+from probe.simulate.simulation import TouchOptions, simulate
+from probe.simulate.world.levels import SOUND, TYPICAL
 from probe.simulate.world.sensor import MOUNTINGS, LevelSensor, mount
 from probe.simulate.world.surfaces import DistortedSurface, place_adjacent
 from probe.surface.indenters import RaisedStrip
@@ -57,13 +60,21 @@ ONES, APART = np.ones((5, 4)), np.ones((3, 3)) * [[1], [0], [1]]
         (lambda: mount(np.zeros((12, 32)), "quarter turn"), "cannot be mounted 'quarter turn'"),
         (lambda: place_adjacent(polygon([STAR]), OBLONG, np.random.default_rng(1)),
          "no edge beside which"),
-        (lambda: TouchOptions(frames=0), "frames 0; give a whole number from 1 on"),
-        (lambda: TouchOptions(touches=0), "touches 0; give a whole number from 1 on"),
-        (lambda: TouchOptions(seed=-1), "seed -1; give a whole number from 0 on"),
+        (lambda: TouchOptions(frames=0), "frames 0; give a whole number of 1 or more"),
+        (lambda: TouchOptions(touches=0), "touches 0; give a whole number of 1 or more"),
+        (lambda: TouchOptions(seed=-1), "seed -1; give a whole number of 0 or more"),
+        (lambda: simulate("washer", x="a"), "x 'a'; give a finite number"),
+        (lambda: simulate("washer", x=[1, 2]), "x .1, 2.; give a finite number"),
+        (lambda: simulate("washer", theta="30deg"), "theta '30deg'; give a finite number"),
+        (lambda: simulate("washer", tilt_x=math.nan), "tilt_x nan; give a finite number"),
+        (lambda: simulate("washer", scan="spiral"), "scan 'spiral'; give raster or kinesthetic"),
+        (lambda: simulate(None), "None is no target; name a written part"),
+        (lambda: simulate(Path("washer.x")), "washer.x: this names no surface"),
+        (lambda: simulate("washer", sensor_type=5), "5 is no sensor type"),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(call, match):
-    with pytest.raises((CircuitError, SurfaceError), match=match):
+    with pytest.raises((CircuitError, SensorTypeError, SurfaceError), match=match):
         call()
 
 
@@ -85,6 +96,31 @@ def test_film_on_its_way_back_reads_higher_where_it_was_pressed_more():
     ratio = felt[now > 0.05] / now[now > 0.05]
     assert ratio.min() < 1.1
     assert ratio.max() == pytest.approx(1.4)  # not one factor for all
+
+
+@pytest.mark.parametrize("value", ["force", "conductance"])
+def test_forces_and_conductances_are_counted_in_their_unit_with_the_type_s_noise(value):
+    unit = {"force": 1e-3, "conductance": 1e-7}[value]
+    sensor = replace(SensorType(), value=value, unit=unit, bits=14, noise=30.0, missing=((0, 0),))
+    scene, touch = bare_scene(RaisedStrip(20.0, 20.0)), Touch(0.0, 0.0, 0.0, 100.0)
+    for quiet in (True, False):
+        single = simulated_sensor(sensor, quiet=quiet)
+        level = LevelSensor(sensor, SOUND if quiet else replace(SOUND, noise_n=TYPICAL.noise_n))
+        for one in (single, level):
+            reading = one.read(scene, touch, np.random.default_rng(1))
+            forces = reading.contact.forces_n
+            film = replace(fsr_of(), series_ohm=0.0 * forces) if one is level else fsr_of()
+            true = forces if value == "force" else conductances(film, forces)[0]
+            true = np.where(sensor.present(), np.minimum(true / unit, sensor.full), 0.0)
+            error = (reading.counts - true)[(true > 100) & (true < sensor.full)]
+            if quiet:
+                assert np.abs(error).max() <= 1.0
+            else:
+                assert error.std() == pytest.approx(30.0, rel=0.3)
+            assert reading.counts[0, 0] == 0
+            if value == "force":
+                total = reading.counts.sum(dtype=float) * unit
+                assert total == pytest.approx(100.0, rel=0.001 if quiet else 0.03)
 
 
 def test_mountings_put_each_tactel_where_they_say():

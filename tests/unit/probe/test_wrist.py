@@ -97,9 +97,9 @@ def tilted(*pose, off=0.0):
         (lambda: tilted(5, 0.05, 0.05, off=0.2), r"0\.05 mm off a plane; check the transducers"),
         (lambda: wrist_pose(Wrist(), [1, 2, 3]), "give AA', BB', CC', DD'"),
         (lambda: wrist_pose(Wrist(), [1, 2, 3, math.nan]), "give AA', BB', CC', DD'"),
-        (lambda: tilted(-0.1, 0, 0), "z is .* end stops are at"),
-        (lambda: tilted(11, 0, 0), "z is .* end stops are at"),
-        (lambda: tilted(5, 0, 10.2 * DEG), "theta_y is .* end stops are at"),
+        (lambda: tilted(-0.1, 0, 0), r"z of the wrist is -0\.1 mm, the end stops are at 0 and 10"),
+        (lambda: tilted(11, 0, 0), "z of the wrist is 11 mm"),
+        (lambda: tilted(5, 0, 10.2 * DEG), r"theta_y of the wrist is 10\.2 degrees, .* -10 and 10"),
         (lambda: stiffness(Wrist(gamma_rad=60 * DEG)), "makes a moment about y"),
     ],
 )  # fmt: skip

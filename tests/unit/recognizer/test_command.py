@@ -4,6 +4,7 @@ import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -224,3 +225,7 @@ def test_joint_angles_of_each_touch_say_where_it_stood(tmp_path):
     assert first.covariance.any()
     with pytest.raises(ScanError, match="there is touch 3"):
         pose_during(touch, 3, joints, 0.1)
+    for readings, said in ((np.zeros(4), "no readings of the wrist"), (wrist * 2.0, "mm, the end")):
+        with pytest.raises(ScanError, match=rf"a\.h5: touch 2 of the scan: .*{said}") as caught:
+            pose_during(replace(touch, wrist=readings), 2, joints, 0.1, "a.h5")
+        assert caught.value.fix
