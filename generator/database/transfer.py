@@ -126,9 +126,9 @@ def check_cells(target: Connection, name: str, here: ArrayHere, cells: Rows) -> 
         raise CopyRefusedError(
             f"needs {np.count_nonzero(held)} cells that "
             f"{_holders(target, here.array_id, r[held], c[held])} here",
-            f"make '{name}' again here from its spec, on cells of its own, and print it again. Labs "
-            "with a key each (encode-object lab) have arrays of their own; without one, or with "
-            "the same, share one database instead, postgresql://HOST/NAME",
+            f"make '{name}' again here from its spec, on cells of its own, and print it again. "
+            "Labs with a key each (encode-object lab) have arrays of their own; without one, or "
+            "with the same, share one database instead, postgresql://HOST/NAME",
         )
 
 
