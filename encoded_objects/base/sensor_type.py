@@ -10,14 +10,17 @@ against rows, z away from the object; tactel (0, 0) top left. mm, N, MPa.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.document import DocumentError, Problem
+from encoded_objects.base.number import LENGTH_MAX_MM, needed_number
 
 SENSOR_FILES = (".yaml", ".yml")  #: suffixes of files of types; other words are names
 USUAL_FORCE_N = 80.0  #: on `fsr-16`, as the thesis pressed its washer
@@ -39,10 +42,96 @@ LEAST_PITCH_MM = 3.0  #: finer strokes do not print
 OverlayKind = Literal["tab", "pad", "gel"]
 Value = Literal["counts", "conductance", "force", "depth"]
 Wiring = Literal["grounded", "floating", "virtual"]
+_NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,59}\Z")
+
+
+class Bounds(NamedTuple):
+    """Allowed values of a setting."""
+
+    least: float
+    most: float
+    whole: bool = False
+    above: bool = False  #: `least` itself is not allowed
+
+
+_LENGTH, _LENGTH_OR_ZERO = Bounds(0, LENGTH_MAX_MM, above=True), Bounds(0, LENGTH_MAX_MM)
+#: Of the numbers of a type and its overlay, in a file as in Python. A packet holds rows and columns
+#: in a byte each.
+BOUNDS = {
+    "rows": Bounds(2, 255, whole=True),
+    "columns": Bounds(2, 255, whole=True),
+    "pitch_mm": _LENGTH,
+    "row_pitch_mm": _LENGTH_OR_ZERO,
+    "unit": Bounds(0, 1e6, above=True),
+    "bits": Bounds(4, 16, whole=True),
+    "exponent": Bounds(0.2, 3.0, above=True),
+    "noise": Bounds(0, 1e4, above=True),
+    "height_mm": _LENGTH,
+    "tab_diameter_mm": _LENGTH,
+    "young_mpa": Bounds(0, 1e4, above=True),
+    "poisson": Bounds(0, 0.5),
+    "membrane_mm": _LENGTH_OR_ZERO,
+    "blur_mm": _LENGTH_OR_ZERO,
+}
 
 
 class SensorTypeError(DocumentError):
     """A sensor type that is not known, or a file of one that cannot be used."""
+
+
+def _check_values(given: Any, choices: dict[str, Any]) -> None:
+    """Refuse values that no file of a type may have; numbers of NumPy become plain ones."""
+    problems = []
+    for name, bounds in BOUNDS.items():
+        if name not in given.__slots__:
+            continue
+        value = getattr(given, name)
+        if fix := needed_number(value, **bounds._asdict()):
+            problems.append(Problem(f"{name} {value!r}", fix))
+        else:
+            object.__setattr__(given, name, int(value) if bounds.whole else float(value))
+    for name, kind in choices.items():
+        value, allowed = getattr(given, name), get_args(kind)
+        if value not in allowed:
+            problems.append(Problem(f"{name} {value!r}", f"give {' or '.join(allowed)}"))
+    if problems:
+        raise SensorTypeError(problems)
+
+
+def name_fault(name: object) -> tuple[str, str] | None:
+    """Return what is wrong with a type's name, and the way out."""
+    if isinstance(name, str) and _NAME.match(name):
+        return None
+    fix = "use small letters, digits and - _ . as in flexitac-12x32"
+    return f"{name!r} is no name for a sensor type", fix
+
+
+def missing_fault(row: int, column: int, rows: int, columns: int) -> tuple[str, str] | None:
+    """Return what is wrong with the place of a missing tactel, and the way out."""
+    if row in range(rows) and column in range(columns):
+        return None
+    cause = (
+        f"a missing tactel in row {row}, column {column}; the matrix has rows "
+        f"0 ... {rows - 1} and columns 0 ... {columns - 1}"
+    )
+    return cause, "count rows and columns from 0"
+
+
+def misfits(
+    value: str, kind: str, pitch_mm: float, row_pitch_mm: float
+) -> Iterator[tuple[tuple[str, ...], str, str]]:
+    """Yield what does not fit together: the setting in a file, the cause, the way out."""
+    depth = value == "depth"
+    if depth != (kind == "gel"):
+        fix = (
+            "a gel shows depth, tabs and pads do not: write both or neither of "
+            "value: depth and overlay: {kind: gel}"
+        )
+        where = ("value",) if depth else ("overlay", "kind")
+        yield where, f"value {value} with a {kind} overlay", fix
+    if row_pitch_mm and kind != "tab":
+        cause = f"rows {row_pitch_mm:g} mm and columns {pitch_mm:g} mm apart under a {kind}"
+        yield ("row_pitch",), cause, "take tabs, or one pitch for both"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +150,10 @@ class Overlay:
     poisson: float = 0.4999
     membrane_mm: float = 0.0  #: of a gel: way over which its membrane bridges next to a stroke
     blur_mm: float = 0.0  #: of a gel: standard deviation of what optics and matching blur
+
+    def __post_init__(self) -> None:
+        """Refuse what a file of a type would not say either."""
+        _check_values(self, {"kind": OverlayKind})
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,13 +184,23 @@ class SensorType:
     row_pitch_mm: float = 0.0  #: from row to row where it is another; 0: the same
 
     def __post_init__(self) -> None:
-        """Refuse two pitches under a pad or a gel."""
-        if self.row_pitch_mm and self.overlay.kind != "tab":
-            cause = (
-                f"rows {self.row_pitch_mm:g} mm and columns {self.pitch_mm:g} mm apart under a "
-                f"{self.overlay.kind}"
-            )
-            raise SensorTypeError([Problem(cause, "take tabs, or one pitch for both")])
+        """Refuse what a file of a type would not say either."""
+        if not isinstance(self.overlay, Overlay):
+            fix = 'give an Overlay: Overlay(kind="pad")'
+            raise SensorTypeError([Problem(f"overlay {self.overlay!r}", fix)])
+        _check_values(self, {"value": Value, "wiring": Wiring})
+        faults = [name_fault(self.name)]
+        faults += [
+            fault[1:]
+            for fault in misfits(self.value, self.overlay.kind, self.pitch_mm, self.row_pitch_mm)
+        ]
+        try:
+            faults += [missing_fault(row, column, *self.shape) for row, column in self.missing]
+            hash(self.missing)
+        except (TypeError, ValueError):
+            faults.append((f"missing {self.missing!r}", "give a tuple of pairs: ((row, column),)"))
+        if problems := [Problem(*fault) for fault in faults if fault]:
+            raise SensorTypeError(problems)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -240,7 +343,7 @@ def sensor_type_text(sensor: SensorType) -> str:
 
 
 def choose_sensor_type(
-    asked: str | SensorType | None, stored: str, shape: tuple[int, int] | None, place: str
+    asked: str | Path | SensorType | None, stored: str, shape: tuple[int, int] | None, place: str
 ) -> SensorType:
     """Return the type of images: the one asked for, else the stored one, else `fsr-16`.
 
@@ -258,7 +361,7 @@ def choose_sensor_type(
     Raises
     ------
     SensorTypeError
-        Images of another shape than the type.
+        No sensor type, or images of another shape than the type.
     """
     unknown = False
     if isinstance(asked, SensorType):
@@ -266,7 +369,10 @@ def choose_sensor_type(
     elif asked:
         from encoded_objects.base.sensor_type_file import sensor_type_named
 
-        found = sensor_type_named(asked)
+        if not isinstance(asked, str | Path):
+            fix = "give a SensorType, or the name or the file of one"
+            raise SensorTypeError([Problem(f"{asked!r} is no sensor type", fix)])
+        found = sensor_type_named(str(asked))
     elif stored and stored != sensor_type_text(USUAL_SENSOR):
         from encoded_objects.base.sensor_type_file import parse_sensor_type
 

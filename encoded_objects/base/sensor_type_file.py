@@ -17,7 +17,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, ValidationError
 
 from encoded_objects.base.document import DocumentKind, Problem, suggest
+from encoded_objects.base.number import needed_number
 from encoded_objects.base.sensor_type import (
+    BOUNDS,
     SENSOR_FILES,
     Overlay,
     OverlayKind,
@@ -25,6 +27,9 @@ from encoded_objects.base.sensor_type import (
     SensorTypeError,
     Value,
     Wiring,
+    misfits,
+    missing_fault,
+    name_fault,
 )
 from encoded_objects.base.settings import (
     Block,
@@ -37,19 +42,14 @@ from encoded_objects.base.settings import (
 )
 from encoded_objects.base.yaml_tree import Place, Tree, read_tree, tree_of
 
-LINES_MAX = 255  #: rows or columns: a packet holds each in a byte
-_NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,59}\Z")
 _LINES = re.compile(r"\s*([0-9]{1,4})\s*(?:-\s*([0-9]{1,4})\s*)?\Z")
 _PLAIN, _USUAL = SensorType(), Overlay()
 
 
 def _type_name(value: Any) -> str:
-    if not isinstance(value, str) or not _NAME.match(value):
-        raise refuse(
-            f"{value!r} is no name for a sensor type",
-            "use small letters, digits and - _ . as in flexitac-12x32",
-        )
-    return value
+    if fault := name_fault(value):
+        raise refuse(*fault)
+    return str(value)
 
 
 def _range_of_lines(value: Any) -> tuple[int, int]:
@@ -63,13 +63,16 @@ def _range_of_lines(value: Any) -> tuple[int, int]:
     return first, last
 
 
-def _number(low: float, high: float, what: str) -> BeforeValidator:
+def _number(name: str, what: str) -> BeforeValidator:
+    low, high, _, above = BOUNDS[name]
+    floor = f"above {low:g}" if above else f"{low:g} or more"
+
     def check(value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise refuse(f"{what} must be a number", f"write a number above {low:g}")
-        if not low < value <= high:
+            raise refuse(f"{what} must be a number", f"write a number {floor}")
+        if needed_number(value, least=low, most=high, above=above):
             raise refuse(
-                f"{what} must be above {low:g} and at most {high:g}, not {value:g}",
+                f"{what} must be {floor} and at most {high:g}, not {value:g}",
                 "write a number within these bounds",
             )
         return float(value)
@@ -77,7 +80,12 @@ def _number(low: float, high: float, what: str) -> BeforeValidator:
     return BeforeValidator(check)
 
 
-_Lines = Annotated[int, whole_number(2, LINES_MAX, "rows and columns")]
+def _whole(name: str, what: str) -> BeforeValidator:
+    low, high, *_ = BOUNDS[name]
+    return whole_number(int(low), int(high), what)
+
+
+_Lines = Annotated[int, _whole("rows", "rows and columns")]
 _Range = Annotated[
     tuple[int, int],
     BeforeValidator(_range_of_lines),
@@ -94,9 +102,9 @@ class OverlaySettings(Block):
     """Of a tab; thickness of pad or gel. mm."""
     tip: Length = _USUAL.tab_diameter_mm
     """Diameter of a tab's tip, mm."""
-    young: Annotated[float, _number(0, 1e4, "young")] = _USUAL.young_mpa
+    young: Annotated[float, _number("young_mpa", "young")] = _USUAL.young_mpa
     """Young's modulus at small strain, MPa."""
-    poisson: Annotated[float, _number(0, 0.5, "poisson")] = _USUAL.poisson
+    poisson: Annotated[float, _number("poisson", "poisson")] = _USUAL.poisson
     """Poisson's ratio."""
     membrane: LengthOrZero = _USUAL.membrane_mm
     """Of a gel: way over which the membrane bridges beside a stroke, mm."""
@@ -138,15 +146,15 @@ class SensorTypeSettings(Block):
     """What stands between the sensor and the object."""
     value: Value = _PLAIN.value
     """What a reading is: ADC counts, conductance, force, or depth of the imprint."""
-    unit: Annotated[float, _number(0, 1e6, "unit")] = _PLAIN.unit
+    unit: Annotated[float, _number("unit", "unit")] = _PLAIN.unit
     """Of one count: S of conductance, N of force, mm of depth."""
-    bits: Annotated[int, whole_number(4, 16, "bits")] = _PLAIN.bits
+    bits: Annotated[int, _whole("bits", "bits")] = _PLAIN.bits
     """Of a reading."""
-    exponent: Annotated[float, _number(0.2, 3.0, "exponent")] = _PLAIN.exponent
+    exponent: Annotated[float, _number("exponent", "exponent")] = _PLAIN.exponent
     """Law: a reading grows with force (depth) to this power."""
     wiring: Wiring = _PLAIN.wiring
     """Of the rows that are not read: at ground, floating, or columns held at 0 V."""
-    noise: Annotated[float, _number(0, 1e4, "noise")] = _PLAIN.noise
+    noise: Annotated[float, _number("noise", "noise")] = _PLAIN.noise
     """Standard deviation of a tactel at rest, counts."""
     missing: list[MissingSettings] = Field(default_factory=list)
     """Places without a tactel."""
@@ -155,23 +163,9 @@ class SensorTypeSettings(Block):
         """Yield what does not fit together: the place of the setting, the cause, the way out."""
         for number, place in enumerate(self.missing):
             row, column = place.rows[1], place.columns[1]
-            if row >= self.rows or column >= self.columns:
-                cause = (
-                    f"a missing tactel in row {row}, column {column}; the matrix has rows "
-                    f"0 ... {self.rows - 1} and columns 0 ... {self.columns - 1}"
-                )
-                yield ("missing", number), cause, "count rows and columns from 0"
-        kind, depth = self.overlay.kind, self.value == "depth"
-        if depth != (kind == "gel"):
-            fix = (
-                "a gel shows depth, tabs and pads do not: write both or neither of "
-                "value: depth and overlay: {kind: gel}"
-            )
-            where: Place = ("value",) if depth else ("overlay", "kind")
-            yield where, f"value {self.value} with a {kind} overlay", fix
-        if self._row_pitch() and kind != "tab":
-            fix = "leave row_pitch out, or write overlay: {kind: tab}"
-            yield ("row_pitch",), f"rows as far apart as no columns under a {kind}", fix
+            if fault := missing_fault(row, column, self.rows, self.columns):
+                yield ("missing", number), *fault
+        yield from misfits(self.value, self.overlay.kind, self.pitch, self._row_pitch())
 
     def _row_pitch(self) -> float:
         """Return the pitch of rows where it is another, else 0."""

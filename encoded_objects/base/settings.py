@@ -27,9 +27,9 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from encoded_objects.base.document import Problem, SourceMark, did_you_mean, suggest
+from encoded_objects.base.number import LENGTH_MAX_MM
 from encoded_objects.base.yaml_tree import Place, Tree
 
-LENGTH_MAX_MM = 10_000.0
 MILLIMETRES = {
     "mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "µm": 0.001, "μm": 0.001,
     "in": 25.4, "inch": 25.4, "inches": 25.4, '"': 25.4,

@@ -18,6 +18,7 @@ from typing import Any, overload
 
 from encoded_objects.base.yaml_tree import Tree, tree_of
 from generator.cad.read import polyhedron_from
+from generator.database.open import without_unused
 from generator.layout.placement import Layout
 from generator.pipeline.encode import encode as encode_specs
 from generator.pipeline.encode import plan_in_lab
@@ -28,7 +29,7 @@ from generator.polyhedron import Polyhedron
 from generator.polyhedron.read import MESHES, STEP
 from generator.solid import Part
 from generator.spec import Problem, SpecError, read_specs
-from generator.spec.option import database_option
+from generator.spec.option import database_option, format_option
 from generator.spec.problem import SPEC
 from generator.spec.read import SOURCE, spec_of, tree_from
 from generator.spec.resolved import ShapeSpec
@@ -95,10 +96,10 @@ def encode(
     given: str | Path | Mapping[str, Any],
     *,
     name: str | None = ...,
-    database: str | None = ...,
+    database: str | Path | None = ...,
     profile: str | None = ...,
     folder: Path | str | None = ...,
-    formats: Sequence[str] | None = ...,
+    formats: str | Sequence[str] | None = ...,
     verify: bool = ...,
     replace: bool = ...,
     **settings: Any,
@@ -108,10 +109,10 @@ def encode(
     given: Any,
     *,
     name: str,
-    database: str | None = ...,
+    database: str | Path | None = ...,
     profile: str | None = ...,
     folder: Path | str | None = ...,
-    formats: Sequence[str] | None = ...,
+    formats: str | Sequence[str] | None = ...,
     verify: bool = ...,
     replace: bool = ...,
     **settings: Any,
@@ -120,10 +121,10 @@ def encode(
     given: Any,
     *,
     name: str | None = None,
-    database: str | None = None,
+    database: str | Path | None = None,
     profile: str | None = None,
     folder: Path | str | None = None,
-    formats: Sequence[str] | None = None,
+    formats: str | Sequence[str] | None = None,
     verify: bool = False,
     replace: bool = False,
     **settings: Any,
@@ -146,8 +147,8 @@ def encode(
     folder
         For the files; the spec's own or `out/NAME` if left out.
     formats
-        Of step, stl, 3mf, glb, mjcf, urdf, sdf, usd; the first three if left out, `()` for
-        pictures alone.
+        Of step, stl, 3mf, glb, mjcf, urdf, sdf, usd, as a list or as `"stl,3mf"`; the first three
+        if left out, `()` for pictures alone.
     verify
         Read STEP and STL back by independent programs before anything is kept.
     replace
@@ -181,27 +182,29 @@ def encode(
     """
     named = {"name": name, "profile": profile, **settings}
     url = None if database is None else database_option(database)
+    chosen = None if formats is None else format_option(formats)
     where = None if folder is None else Path(folder)
     if isinstance(given, str | Path | Mapping):
         specs = read_specs([_spec_source(given, named)], database=url)
         return encode_specs(
-            specs, folder=where, formats=formats, database=url, verify=verify, replace=replace
+            specs, folder=where, formats=chosen, database=url, verify=verify, replace=replace
         )
     polyhedron = polyhedron_from(given)
     url = url or database_option("lab.db")
     spec = spec_of(named, ShapeSpec("solid", {"sha256": _digest(polyhedron)}))
-    engine, (plan,), dry_build = plan_in_lab(
-        [spec], url, make=True, replace_changed=replace, solid=polyhedron
-    )
-    assert engine is not None  # it was made
-    to_make = MakeJob(
-        plan,
-        where or plan.spec.folder,
-        plan.spec.formats if formats is None else tuple(formats),
-        verify,
-        replace,
-    )
-    made = make_under_lock(engine, to_make, dry_build=dry_build)
+    with without_unused(url):
+        engine, (plan,), dry_build = plan_in_lab(
+            [spec], url, make=True, replace_changed=replace, solid=polyhedron
+        )
+        assert engine is not None  # it was made
+        to_make = MakeJob(
+            plan,
+            where or plan.spec.folder,
+            plan.spec.formats if chosen is None else chosen,
+            verify,
+            replace,
+        )
+        made = make_under_lock(engine, to_make, dry_build=dry_build)
     parts = parts_of(plan, made.layout)[0]
     return EncodedSolid(made, url, polyhedron, made.layout, parts)
 

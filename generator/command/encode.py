@@ -53,11 +53,11 @@ def encode(
                names=("-o", "--output")),
     ] = None,
     formats: Annotated[
-        str,
+        str | None,
         Option("step, stl, 3mf, bambu (Bambu Studio, OrcaSlicer), glb, stpz (STEP, gzipped), mjcf, "
                "urdf, sdf, usd: files to write, with commas between.", "LIST",
                names=("--format",)),
-    ] = "",
+    ] = None,
     database: Annotated[
         str,
         Option("Registers the cells: lab.db, sqlite:///lab.db, postgresql://host/name.", "URL"),
@@ -126,7 +126,7 @@ def encode(
     from generator.spec import read_specs
     from generator.spec.option import database_option, format_option, sensor_type_option
 
-    wanted = format_option(formats) if formats and not printed_check else None
+    wanted = None if formats is None or printed_check else format_option(formats)
     url = database_option(database) if database else None
     sensor = sensor_type_option(sensor_type) if sensor_type else ""
     found = read_specs(specs, database=url, sensor_type=sensor, files=not no_files)

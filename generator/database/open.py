@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import os
 import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -31,7 +33,7 @@ from encoded_objects.base.errors import install_line
 from encoded_objects.base.foreign import regular_size
 from generator.array.lab_key import draw_lab_key
 from generator.database.migrate import migrate
-from generator.database.tables import FORMAT, SCHEMA_VERSION, meta, metadata
+from generator.database.tables import FORMAT, SCHEMA_VERSION, meta, metadata, objects
 from generator.database.transaction import (
     WAIT_S,
     begin_sqlite,
@@ -44,12 +46,15 @@ from generator.database.transaction import (
 from generator.errors import DatabaseError
 
 
-def normal_url(url: str) -> URL:
-    """Return the URL of a file name, `sqlite:///file` or `postgresql://...`; checks no more.
+def normal_url(url: str | Path) -> URL:
+    """Return the URL of a file, `sqlite:///file` or `postgresql://...`; checks no more.
 
     >>> normal_url("postgresql://lab@host/objects").drivername
     'postgresql+psycopg'
     """
+    url = str(url) if isinstance(url, Path) else url
+    if not isinstance(url, str):
+        raise DatabaseError(f"{url!r} is no database", fix="give a file such as lab.db")
     if not url.strip():
         raise DatabaseError("no database is named", fix="give a file such as lab.db")
     if "://" not in url:
@@ -195,7 +200,7 @@ def _read_only(connection: Any, _record: object) -> None:
 
 
 def open_database(
-    url: str,
+    url: str | Path,
     *,
     writable: bool = True,
     wait_s: float = WAIT_S,
@@ -249,6 +254,25 @@ def open_if_there(url: str, *, writable: bool = True) -> Engine | None:
 def existing_database(url: str) -> Engine:
     """Return an engine for writing on a database that is there; raises as `open_database`."""
     return open_if_there(url) or open_database(url, writable=False)  # which says what is missing
+
+
+@contextmanager
+def without_unused(url: str) -> Iterator[None]:
+    """Remove a SQLite file that was made meanwhile where an error leaves no object in it."""
+    normal = normal_url(url)
+    there = _file_is_there(normal)
+    try:
+        yield
+    except BaseException:
+        path = Path(normal.database or "")
+        if not there and path.exists():
+            with (
+                suppress(DatabaseError, OSError),  # the error at hand is the one to say
+                write_transaction(database_engine(normal, writable=True, wait_s=1.0)) as connection,
+            ):
+                if connection.execute(select(objects)).first() is None:
+                    path.unlink()
+        raise
 
 
 def database_exists(url: str) -> bool:

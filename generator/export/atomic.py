@@ -203,6 +203,8 @@ def _named_errors(path: Path, action: str) -> Iterator[None]:
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         fix = _FIXES.get(error.errno or 0, "check the folder or choose another one with -o")
+        if error.errno == errno.ENAMETOOLONG and action.endswith("folder"):
+            fix = "choose a folder of a shorter name with -o"
         raise WriteError(f"cannot {action}: {reason}", fix=fix, place=str(path)) from error
 
 

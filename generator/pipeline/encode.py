@@ -19,7 +19,7 @@ from sqlalchemy import Connection, Engine
 
 from generator.database.cells import occupancy
 from generator.database.lab import lab_key as stored_lab_key
-from generator.database.open import open_database, open_if_there
+from generator.database.open import open_database, open_if_there, without_unused
 from generator.database.register import register
 from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError, PrintError
@@ -89,53 +89,57 @@ def encode(
     if trial is not None and trial.exists():
         fix = "name a new file, or remove this one"
         raise DatabaseError("a trial makes a database, and there is one", fix=fix, place=str(trial))
-    progress("planning", 0.0)
-    engine, plans, dry_build = plan_in_lab(
-        specs, url, lab_key=lab_key, make=not dry_run, replace_changed=replace
-    )
-    for plan in plans:
-        wanted = plan.spec.formats if formats is None else formats
-        if "bambu" in wanted and not plan.printer.nozzle_mm:
-            with error_location(plan.spec.source, "print.printer"):
-                fix = "leave bambu out of formats, or choose a printer of filament"
-                name = plan.printer.name
-                cause = f"Bambu Studio and OrcaSlicer print filament, and {name} prints resin"
-                raise PrintError(cause, fix=fix)
-    rest = part_of_progress(progress, 0.1, 1.0)
-    files: tuple[Path, ...] = ()
-    to_print: tuple[Path, ...] = ()
-    if engine is None or dry_run:
-        with read_transaction(engine) if engine else nullcontext() as connection:
-            made, used = _dry_run(connection, plans, replace, rest)
-        if trial is not None:
-            with write_transaction(open_database(str(trial))) as connection:
-                for plan, one in zip(plans, made, strict=True):
-                    register(connection, object_record(plan, one.layout), replace=False)
-    else:
-        to_make = [
-            MakeJob(
-                plan, _folder(plan, folder, len(plans)),
-                plan.spec.formats if formats is None else tuple(formats),
-                verify, replace, slice_plates and len(plans) == 1,
-            )
-            for plan in plans
-        ]  # fmt: skip
-        for parent in sorted({job.folder.parent for job in to_make}):
-            remove_leftovers(parent, below=True)
-        if len(to_make) == 1:
-            made = [make_under_lock(engine, to_make[0], rest, dry_build)]
+    with without_unused(url):
+        progress("planning", 0.0)
+        engine, plans, dry_build = plan_in_lab(
+            specs, url, lab_key=lab_key, make=not dry_run, replace_changed=replace
+        )
+        for plan in plans:
+            wanted = plan.spec.formats if formats is None else formats
+            if "bambu" in wanted and not plan.printer.nozzle_mm:
+                with error_location(plan.spec.source, "print.printer"):
+                    fix = "leave bambu out of formats, or choose a printer of filament"
+                    name = plan.printer.name
+                    cause = f"Bambu Studio and OrcaSlicer print filament, and {name} prints resin"
+                    raise PrintError(cause, fix=fix)
+        rest = part_of_progress(progress, 0.1, 1.0)
+        files: tuple[Path, ...] = ()
+        to_print: tuple[Path, ...] = ()
+        if engine is None or dry_run:
+            with read_transaction(engine) if engine else nullcontext() as connection:
+                made, used = _dry_run(connection, plans, replace, rest)
+            if trial is not None:
+                with write_transaction(open_database(str(trial))) as connection:
+                    for plan, one in zip(plans, made, strict=True):
+                        register(connection, object_record(plan, one.layout), replace=False)
         else:
-            from generator.pipeline.sets import make_set, set_folder  # loads what sets alone need
+            to_make = [
+                MakeJob(
+                    plan, _folder(plan, folder, len(plans)),
+                    plan.spec.formats if formats is None else tuple(formats),
+                    verify, replace, slice_plates and len(plans) == 1,
+                )
+                for plan in plans
+            ]  # fmt: skip
+            for parent in sorted({job.folder.parent for job in to_make}):
+                remove_leftovers(parent, below=True)
+            if len(to_make) == 1:
+                made = [make_under_lock(engine, to_make[0], rest, dry_build)]
+            else:
+                from generator.pipeline.sets import (
+                    make_set,
+                    set_folder,
+                )  # loads what sets alone need
 
-            made, files, to_print = make_set(
-                engine, url, to_make, set_folder(to_make, folder), jobs, rest,
-                slice_plates=slice_plates,
-            )  # fmt: skip
-        with read_transaction(engine) as connection:
-            used = occupancy(connection, plans[0].array).used
-    array = plans[0].array
-    seconds = time.perf_counter() - began
-    return Encoded(tuple(made), url, array.rows, array.columns, used, seconds, files, to_print)
+                made, files, to_print = make_set(
+                    engine, url, to_make, set_folder(to_make, folder), jobs, rest,
+                    slice_plates=slice_plates,
+                )  # fmt: skip
+            with read_transaction(engine) as connection:
+                used = occupancy(connection, plans[0].array).used
+        array = plans[0].array
+        seconds = time.perf_counter() - began
+        return Encoded(tuple(made), url, array.rows, array.columns, used, seconds, files, to_print)
 
 
 def plan_in_lab(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from pydantic_core import PydanticCustomError
@@ -13,17 +14,23 @@ from generator.spec.problem import SpecError
 from generator.spec.settings import database_url
 
 
-def format_option(text: str) -> tuple[str, ...]:
-    """Return the formats of `--format step,stl`; raises `SpecError`."""
+def format_option(given: str | Sequence[str]) -> tuple[str, ...]:
+    """Return the formats of `--format step,stl`, or of a list, which may be empty.
+
+    Raises `SpecError`.
+    """
     known = tuple(EXPORTERS)
-    names = [part.strip().lower().lstrip(".") for part in text.split(",") if part.strip()]
+    words = given.split(",") if isinstance(given, str) else given
+    if not isinstance(words, Sequence):
+        words = [words]
+    names = [name for word in words if (name := str(word).strip().lower().lstrip("."))]
     fix = f"choose from {','.join(known)}"
     problems = []
     for name in names:
         if name not in known:
             near = suggest(name, known, fix)
             problems.append(Problem(f"unknown format '{name}'", near, file="--format"))
-    if not names:
+    if isinstance(given, str) and not names:
         problems.append(Problem("no format is named", fix, file="--format"))
     if problems:
         raise SpecError(problems)
@@ -38,10 +45,10 @@ def sensor_type_option(text: str) -> str:
     return str(Path(text).absolute()) if Path(text).suffix in SENSOR_FILES else text
 
 
-def database_option(text: str) -> str:
+def database_option(given: str | Path) -> str:
     """Return the URL of `--database`; raises `SpecError`."""
     try:
-        return database_url(text)
+        return database_url(str(given) if isinstance(given, Path) else given)
     except PydanticCustomError as error:
         context = error.context or {}
         problem = Problem(context["cause"], context["fix"], file="--database")

@@ -77,6 +77,9 @@ class Recording:
     tool_version: str = field(init=False, repr=False)  #: that wrote it; empty: not this programme
 
     def __post_init__(self) -> None:
+        if not isinstance(self.path, str | Path):
+            kind = type(self.path).__name__
+            raise RecordingError(f"{kind} is no file", fix="give the path of a recording")
         files: list[File] = []
         first: FrameFile | None = None
         for name in _files_of(Path(self.path), self.live):

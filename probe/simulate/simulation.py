@@ -12,15 +12,15 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from numbers import Integral
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.errors import without_password
 from encoded_objects.base.files import staged_file
+from encoded_objects.base.number import needed_number
 from encoded_objects.base.sensor_type import (
     SensorType,
     choose_sensor_type,
@@ -40,13 +40,19 @@ from probe.simulate.target import surface_of
 
 DRAWS = 50  # of a touch at random until it has an equilibrium
 _WAY = 1 << 32  # of the generator that draws a scan's path: no touch has that number
+_NUMBERS: dict[str, dict[str, Any]] = {
+    **{key: {} for key in ("x_mm", "y_mm", "theta_deg", "force_n", "tilt_x_deg", "tilt_y_deg")},
+    "touches": {"whole": True, "least": 1},
+    "frames": {"whole": True, "least": 1},
+    "seed": {"whole": True, "least": 0},
+}  #: of `TouchOptions`
 
 
 @dataclass(frozen=True, slots=True)
 class TouchOptions:
     """Touches as a person names them: mm, degrees, N; None where they say nothing.
 
-    Raises SurfaceError: no touch, no frame, or a seed below 0.
+    Raises SurfaceError: a value that is no number, or out of its range; an unknown scan.
     """
 
     x_mm: float | None = None
@@ -61,17 +67,18 @@ class TouchOptions:
     scan: ScanKind | None = None  #: None: touches by themselves
 
     def __post_init__(self) -> None:
-        for name, least in (("touches", 1), ("frames", 1), ("seed", 0)):
+        for name, limits in _NUMBERS.items():
             value = getattr(self, name)
-            whole = isinstance(value, Integral) and not isinstance(value, bool)
-            if not (whole and value >= least) and (name, value) != ("touches", None):
-                raise SurfaceError(f"{name} {value!r}", fix=f"give a whole number from {least} on")
+            if value is None and name not in ("frames", "seed"):
+                continue
+            if fix := needed_number(value, **limits):
+                raise SurfaceError(f"{name.rpartition('_')[0] or name} {value!r}", fix=fix)
+        if self.scan not in (None, *get_args(ScanKind)):
+            fix = f"give {' or '.join(get_args(ScanKind))}"
+            raise SurfaceError(f"scan {self.scan!r}", fix=fix)
 
     def draw(self, scene: Scene, sensor: SensorType, rng: np.random.Generator) -> Touch:
-        """Return a touch; values that are not named are drawn, or have a default of the type.
-
-        Raises `SurfaceError` for a value that is no finite number.
-        """
+        """Return a touch; values that are not named are drawn, or have a default of the type."""
         share = force_share(sensor)
         if self.touches is None:
             x, y = scene.centre_mm()
@@ -85,8 +92,6 @@ class TouchOptions:
         named = (self.x_mm, self.y_mm, self.force_n,
                  self.theta_deg, self.tilt_x_deg, self.tilt_y_deg)  # fmt: skip
         values = tuple(b if a is None else a for a, b in zip(named, others, strict=True))
-        if not all(map(math.isfinite, values)):
-            raise SurfaceError("a touch at what is no finite number", fix="give mm, degrees and N")
         x, y, force, theta, tilt_x, tilt_y = values
         return Touch(x, y, math.radians(theta), force, math.radians(tilt_x), math.radians(tilt_y),
                      drawn.wrist)  # fmt: skip
@@ -143,7 +148,7 @@ class SimulatedProbe:
 
     def __init__(
         self,
-        target: str,
+        target: str | Path,
         options: TouchOptions | None = None,
         *,
         sensor_type: str | SensorType | None = None,
@@ -157,11 +162,14 @@ class SimulatedProbe:
         ):
             if given not in known:
                 raise SurfaceError(f"{name} {given!r}", fix=f"give {known[0]} or {known[1]}")
-        self.target, self.options, self.noise = target, options or TouchOptions(), noise
-        self.sensor = choose_sensor_type(sensor_type, "", None, target).with_overlay(overlay)
+        if not isinstance(target, str | Path):
+            fix = "name a written part, a registered face as lab.db#Cube/F1, or washer"
+            raise SurfaceError(f"{target!r} is no target", fix=fix)
+        self.target, self.options, self.noise = str(target), options or TouchOptions(), noise
+        self.sensor = choose_sensor_type(sensor_type, "", None, self.target).with_overlay(overlay)
         self.overlay = self.sensor.overlay.kind
         self.level = level_for(self.sensor, accuracy_of(accuracy))  #: of the contact model
-        self.scene = surface_of(target)
+        self.scene = surface_of(self.target)
         self.path = self._scan_path()  #: None: no scan
         self.drawn_again = 0  #: touches without an equilibrium
 
@@ -294,7 +302,7 @@ class Simulation:
 
 
 def simulate(
-    target: str,
+    target: str | Path,
     *,
     x: float | None = None,
     y: float | None = None,

@@ -21,9 +21,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.base.errors import UsageError
 from encoded_objects.base.sensor_type import SensorType
 from probe.arm import SensorPose
-from probe.frame import are_rigid
+from probe.frame import Frame, are_rigid
 from recognizer.errors import MosaicError
 from recognizer.scan.belief import ScanBelief, ScanHypothesis, begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import (
@@ -87,6 +88,8 @@ class Scan:
     """
 
     def __init__(self, lab: Lab | Reader, *, sensor: SensorType | None = None) -> None:
+        if isinstance(lab, Reader) and sensor is not None:
+            raise UsageError("a reader has its sensor", fix="leave sensor out, or give the lab")
         self._reader = lab if isinstance(lab, Reader) else Reader(lab, sensor or SensorType())
         self._faces = [self._new_face()]  # the last one is touched now
         self._answer = self._faces[0].belief.recognition
@@ -123,7 +126,7 @@ class Scan:
 
     def add(
         self,
-        touch: TouchImage | Signal | ArrayLike,
+        touch: TouchImage | Frame | Signal | ArrayLike,
         pose: SensorPose | ArrayLike | None = None,
         *,
         seq: int | None = None,
@@ -133,7 +136,7 @@ class Scan:
         Parameters
         ----------
         touch
-            Of one object: counts (rows, columns), a signal, or a `TouchImage` of `touch.source`.
+            Of one object: counts (rows, columns), a signal, a frame, or a `TouchImage`.
             Without poses, touches of a face should lie within 8 mm or so of the one before.
         pose
             (4, 4) T_base_sensor, mm, in any fixed frame, with a covariance if it is a `SensorPose`;
@@ -146,8 +149,8 @@ class Scan:
         MosaicError
             Another sensor's image, or a pose that is no rigid transform.
         """
-        given = touch.seq if isinstance(touch, TouchImage) and seq is None else seq
-        if isinstance(touch, TouchImage):
+        given = touch.seq if isinstance(touch, TouchImage | Frame) and seq is None else seq
+        if isinstance(touch, TouchImage | Frame):
             pose, touch = touch.pose if pose is None else pose, touch.counts
         signal = touch if isinstance(touch, Signal) else self._reader.signal(touch)
         number = self.touches if given is None else given
@@ -329,7 +332,10 @@ def _is_one_object(a: _ObjectHypothesis, b: _ObjectHypothesis) -> bool:
 
 
 def _matrix(pose: SensorPose | ArrayLike) -> Array:
-    T = np.asarray(pose.T_base_sensor if isinstance(pose, SensorPose) else pose, np.float64)
+    try:
+        T = np.asarray(pose.T_base_sensor if isinstance(pose, SensorPose) else pose, np.float64)
+    except (TypeError, ValueError):
+        T = np.empty(0)  # no numbers
     if T.shape != (4, 4) or np.isnan(T).any() or not are_rigid(T[None]):
         raise MosaicError(
             "the pose is no rigid transform", fix="give a 4x4 matrix T_base_sensor, mm"

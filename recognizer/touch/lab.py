@@ -233,8 +233,7 @@ def open_lab(database: str | Path) -> Lab:
     >>> embossed.alphabet.name, embossed.style.pitch_mm, embossed.face(0).object
     ('tactel-8', 5.0, 'Cube')
     """
-    url = str(database)
-    engine = open_database(url, writable=False)
+    engine, url = open_database(database, writable=False), str(database)
     with read_transaction(engine) as connection:
         arrays = _embossed_arrays(connection, engine)
     if not arrays:

@@ -8,12 +8,11 @@ mismatch).
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
-from numbers import Integral, Real
 from typing import Any
 
 from encoded_objects.base.errors import UsageError
+from encoded_objects.base.number import needed_number
 
 #: Nats between a symbol and none where rounding decides: of a cell that is seen by its rim alone.
 #: Scores of a cell are bounded, so that differences of 6, 8 and 14 nats are common: limits stand
@@ -26,11 +25,8 @@ def _require(
     name: str, value: Any, *, whole: bool = False, least: int = 0, above: bool = False
 ) -> None:
     """Refuse what is no finite number, or no whole one, or less than the least."""
-    number = isinstance(value, Integral if whole else Real) and not isinstance(value, bool)
-    if not number or not math.isfinite(value) or value < least or (above and value == least):
-        kind = "a whole number" if whole else "a finite number"
-        given = f"above {least}" if above else f"of {least} or more"
-        raise UsageError(f"{name} {value!r}", fix=f"give {kind} {given}")
+    if fix := needed_number(value, whole=whole, least=least, above=above):
+        raise UsageError(f"{name} {value!r}", fix=fix)
 
 
 @dataclass(frozen=True, slots=True)

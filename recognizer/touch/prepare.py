@@ -19,7 +19,8 @@ import generator.alphabet
 import probe.contact
 import recognizer.touch.symbols
 from encoded_objects.base.cache import cached_bytes, content_key
-from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.errors import UsageError
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from generator.alphabet import Alphabet, SymbolStyle
 from recognizer.errors import LabError
 from recognizer.touch.lab import EmbossedArray, Lab
@@ -61,11 +62,9 @@ class PreparedLab:
             raise LabError(
                 f"{self.lab!r} is no open lab", fix=f"open it first: open_lab({str(self.lab)!r})"
             )
-        if not isinstance(self.sensor, SensorType):
-            raise LabError(
-                f"{self.sensor!r} is no sensor type",
-                fix="give a SensorType: SensorType() is fsr-16",
-            )
+        if not isinstance(self.options, ReaderOptions):
+            raise UsageError(f"options {self.options!r}", fix="give ReaderOptions(...)")
+        object.__setattr__(self, "sensor", choose_sensor_type(self.sensor, "", None, "Reader"))
         made = tuple(
             Prepared(each, *template_and_bank(each.alphabet, each.style, self.sensor))
             for each in self.lab.arrays

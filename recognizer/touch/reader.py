@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from probe.frame import Frame
 from probe.recording.read import Recording
 from recognizer.errors import SensorStateError, TouchError
 from recognizer.touch.prepare import PreparedLab
@@ -33,7 +34,7 @@ class Reader(PreparedLab):
     lab
         Of `open_lab`.
     sensor
-        By default `fsr-16` with tabs.
+        A type, its name or file; by default `fsr-16` with tabs.
     options
         How touches are read, and when an answer is given.
     state
@@ -61,6 +62,11 @@ class Reader(PreparedLab):
     def __post_init__(self) -> None:
         PreparedLab.__post_init__(self)
         shape = (self.sensor.rows, self.sensor.columns)
+        if not isinstance(self.state, SensorState | None):
+            raise SensorStateError(
+                f"{self.state!r} is no state of a sensor",
+                fix="read its file first: recognizer.sensor.read_state(...)",
+            )
         if self.state is not None and self.state.shape != shape:
             raise SensorStateError(
                 f"what was learned of a sensor of {self.state.shape}, for one of {shape}",
@@ -70,7 +76,7 @@ class Reader(PreparedLab):
 
     def read(
         self,
-        counts: ArrayLike,
+        counts: ArrayLike | Frame,
         *,
         calibration: Calibration | None = None,
         trust: ArrayLike | None = None,
@@ -81,7 +87,7 @@ class Reader(PreparedLab):
         Parameters
         ----------
         counts
-            (rows, columns) readings that rise with force, as the sensor gives them.
+            (rows, columns) readings that rise with force, as the sensor gives them, or a frame.
         calibration
             Of the sensor: turns counts into newtons.
         trust
@@ -105,15 +111,23 @@ class Reader(PreparedLab):
 
     def signal(
         self,
-        counts: ArrayLike,
+        counts: ArrayLike | Frame,
         *,
         calibration: Calibration | None = None,
         trust: ArrayLike | None = None,
     ) -> Signal:
         """Return the signal of a touch: newtons where there is a calibration."""
-        values = np.asarray(counts, np.float64)
-        known = None if trust is None else np.asarray(trust, np.float64)
         shape, sensor = (self.sensor.rows, self.sensor.columns), self.sensor
+        try:
+            image = counts.counts if isinstance(counts, Frame) else counts
+            values = np.asarray(image, np.float64)
+            known = None if trust is None else np.asarray(trust, np.float64)
+        except (TypeError, ValueError) as error:
+            raise TouchError(
+                "an image that is no matrix of numbers",
+                fix=f"give counts of {shape[0]} rows, {shape[1]} columns, or a Frame",
+                place=sensor.name,
+            ) from error
         if values.shape != shape or (known is not None and known.shape != shape):
             wrong = values.shape if known is None or values.shape != shape else known.shape
             raise TouchError(

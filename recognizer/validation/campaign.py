@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from encoded_objects.base.number import needed_number
 from encoded_objects.base.sensor_type import (
     USUAL_SENSOR,
     SensorType,
@@ -155,6 +156,9 @@ def campaign_of(options: Mapping[str, Any], known: Campaign | None) -> Campaign:
                 fix=f"give {' or '.join(allowed)}",
                 place=f"--{name.replace('_', '-')}",
             )
+    for name, least in {"touches": 1, "seed": 0, "study": 0, "limits": 0, "shard": 1}.items():
+        if name in given and (fix := needed_number(given[name], whole=True, least=least)):
+            raise ValidationError(repr(given[name]), fix=fix, place=f"--{name}")
     named = "kinds" in given
     for name, names in (("kinds", KIND_NAMES), ("levels", tuple(LEVELS))):
         if name in given:

@@ -132,7 +132,7 @@ def validate(
     *,
     folder: str | Path = "validation",
     touches: int | None = None,
-    database: str = "",
+    database: str | Path = "",
     kinds: str = "",
     levels: str = "",
     sensor_type: str | SensorType | None = None,
@@ -198,8 +198,13 @@ def validate(
             f"'{export}' is not known", fix=f"give {' or '.join(EXPORTS)}", place="--export"
         )
     begun, start = datetime.now(UTC), time.monotonic()
-    named = [Path(spec) for spec in ([specs] if isinstance(specs, str | Path) else specs)]
-    place, steps = Path(folder), progress or TouchProgress()
+    given = [specs] if isinstance(specs, str | Path) else specs
+    if not (isinstance(given, Sequence) and all(isinstance(one, str | Path) for one in given)):
+        raise ValidationError(f"{specs!r} names no set", fix="give YAML files, or a database")
+    if not isinstance(folder, str | Path):
+        raise ValidationError(f"{folder!r} is no folder", fix="give a path", place="-o")
+    named = [Path(spec) for spec in given]
+    place, steps, workers = Path(folder), progress or TouchProgress(), workers_of(jobs, cluster)
     sensor = sensor_type and choose_sensor_type(sensor_type, "", None, "--sensor-type")
     options = {
         "touches": touches,
@@ -226,12 +231,12 @@ def validate(
 
         print_options(campaign).plan()  # before anything is made: is all there that it needs?
     with lock_folder(place):
-        work = prepare_run(place, campaign, named, database, resume=resume)
+        work = prepare_run(place, campaign, named, str(database), resume=resume)
         if printed:
             from recognizer.validation.printing import print_set
 
             print_set(work, place, Path(prints) if prints else None, jobs, steps)
-        touch_all(work, place, workers_of(jobs, cluster), steps)
+        touch_all(work, place, workers, steps)
         steps.begin("report", 0, 0)
         results = write_results(work, place)
         if export:

@@ -15,6 +15,7 @@ Folder of a run::
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -26,7 +27,7 @@ from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
-from encoded_objects.base.errors import without_password
+from encoded_objects.base.errors import exit_code_of_write, without_password
 from encoded_objects.base.output import ProgressBar
 from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from generator.database.open import normal_url
@@ -233,9 +234,22 @@ def touch_all(work: Work, folder: Path, workers: Workers, progress: TouchProgres
 
 @contextmanager
 def lock_folder(folder: Path) -> Iterator[None]:
-    """Hold a folder against other runs; raises `ValidationError` if one works in it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    descriptor = os.open(folder, os.O_RDONLY)
+    """Hold a folder against other runs.
+
+    Raises `ValidationError` if one works in it, or if it cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise ValidationError(
+            f"the folder cannot be made or written: {error.strerror}",
+            fix="name another folder with -o",
+            place=str(folder),
+            exit_code=exit_code_of_write(error),
+        ) from error
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -25,11 +25,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from encoded_objects.base.errors import require
+from encoded_objects.base.number import needed_number
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.validation.campaign import Batch, Work, reader_with, series_of
 from recognizer.validation.encoded_set import set_digest
-from recognizer.validation.errors import WorkersError
+from recognizer.validation.errors import ValidationError, WorkersError
 from recognizer.validation.limits import limit_of
 from recognizer.validation.trial import Row, trial
 
@@ -112,7 +113,12 @@ def code_digest() -> str:
 
 
 def workers_of(processes: int, cluster: str = "") -> Workers:
-    """Return who does the work: a cluster, several processes, or this one."""
+    """Return who does the work: a cluster, several processes, or this one.
+
+    Raises ValidationError: a number of processes that is none.
+    """
+    if fix := needed_number(processes, whole=True, least=1):
+        raise ValidationError(repr(processes), fix=fix, place="--jobs")
     if cluster:
         return partial(on_cluster, cluster)
     return in_this_process if processes == 1 else partial(in_processes, processes)

@@ -111,6 +111,14 @@ def test_a_spec_is_a_file_its_text_or_its_settings(tmp_path):
         assert encode(again, **given).objects[0].reused  # the same spec: the same cells
     two = encode({"objects": [settings, settings | {"name": "Second"}]}, **given)
     assert (two.name, two.symbols, str(two).count("\n")) == ("Cube, Second", 300, 1)
+    assert (
+        encode(text, **given | {"formats": "STL", "database": tmp_path / "lab.db"})
+        .objects[0]
+        .reused
+    )
+    for wrong in ("", ["obj"], 5):
+        with pytest.raises(SpecError, match="--format: error: "):
+            encode(text, **given | {"formats": wrong})
     with pytest.raises(SpecError, match="'layout' stands beside a spec"):
         encode(text, layout="net", **given)
     with pytest.raises(SpecError, match=r"encode\(\):1:1: error: unknown setting 'nam'"):

@@ -130,8 +130,9 @@ def test_files_of_others_are_not_replaced_unasked(bench, capsys):
     assert "Cube.png" in err
     assert "--replace" in err
     assert [file.name for file in out.iterdir()] == ["Cube.png"]
-    assert encode_object(["list"]) == 0
-    assert "Cube" not in capsys.readouterr().out  # nothing is registered
+    assert not (bench / "here" / "lab.db").exists()  # nothing is registered
+    assert encode_object([path, "-o", "out", "--format", ""]) == 2
+    assert "no format is named" in capsys.readouterr().err
     assert encode_object([path, "-o", "out", "--replace"]) == 0
     assert (out / "Cube.png").read_bytes() != b"a holiday"
     (out / "Cube.png").write_bytes(b"an older picture")

@@ -33,7 +33,7 @@ EARLIER = Path(__file__).parents[3] / "fixtures" / "database"
 
 def refused(url, **options):
     with pytest.raises(DatabaseError) as caught:
-        open_database(str(url), **options)
+        open_database(url, **options)
     assert caught.value.exit_code == 4
     assert caught.value.fix
     return str(caught.value)
@@ -43,6 +43,7 @@ def refused(url, **options):
     ("given", "backend", "database"),
     [
         ("a b/läb?#%.db", "sqlite", "a b/läb?#%.db"),
+        (Path("a/lab.db"), "sqlite", "a/lab.db"),
         ("sqlite:////data/lab.db", "sqlite", "/data/lab.db"),
         ("sqlite+pysqlite:///lab.db", "sqlite", "lab.db"),
         ("postgresql://u:p@h:5433/objects", "postgresql+psycopg", "objects"),
@@ -58,6 +59,7 @@ def test_urls(given, backend, database):
     ("given", "said"),
     [
         ("", "no database is named"),
+        (None, "None is no database"),
         ("mysql://h/objects", "allowed are sqlite and postgresql"),
         ("postgresql:/objects", "half an address"),
         ("sqlite:lab.db", "half an address"),

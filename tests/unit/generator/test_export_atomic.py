@@ -94,6 +94,12 @@ def test_names_that_cannot_be_written(tmp_path, name, said, fix):
     assert [path.name for path in tmp_path.iterdir()] == ["a.stl"]
 
 
+def test_a_folder_of_too_long_a_name_is_what_is_to_be_shorter(tmp_path):
+    with pytest.raises(GeneratorError, match="too long") as caught, Staging(tmp_path / ("a" * 300)):
+        pass
+    assert caught.value.fix == "choose a folder of a shorter name with -o"
+
+
 def test_no_room_for_the_file(tmp_path):
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

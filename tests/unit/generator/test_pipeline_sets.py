@@ -13,7 +13,7 @@ from encoded_objects.base.document import Problem
 from generator.database.open import open_database
 from generator.database.read import read_layout
 from generator.database.transaction import read_transaction
-from generator.errors import DatabaseError
+from generator.errors import DatabaseError, WriteError
 from generator.pipeline import encode
 from generator.pipeline.files import parts_of
 from generator.pipeline.make import MakeJob, make_at, make_under_lock
@@ -161,3 +161,15 @@ def test_a_refused_set_leaves_no_database(tmp_path, second):
             f"objects:\n- {{name: A, shape: {{cube: 60}}}}\n- {second}\nprofile: one-touch\n",
         )
     assert [file.name for file in tmp_path.iterdir()] == ["lab-set.yaml"]
+
+
+def test_what_cannot_be_written_leaves_no_database_that_is_new(tmp_path):
+    (tmp_path / "out").write_text("a file\n")
+    for text in ("name: A\nshape: {cube: 60}\n", SET):
+        with pytest.raises(WriteError):
+            run(tmp_path, text)
+        assert sorted(file.name for file in tmp_path.iterdir()) == ["lab-set.yaml", "out"]
+    (tmp_path / "lab.db").touch()  # somebody's own
+    with pytest.raises(WriteError):
+        run(tmp_path)
+    assert (tmp_path / "lab.db").exists()

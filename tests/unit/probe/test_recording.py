@@ -39,6 +39,11 @@ def refused(path: Path, match: str) -> None:
     assert str(path) in str(caught.value)
 
 
+def test_a_recording_is_a_file():
+    with pytest.raises(RecordingError, match="list is no file; give the path of a recording"):
+        Recording([np.zeros((16, 16))])
+
+
 def test_the_file_is_plain_hdf5_with_its_origin(tmp_path):
     path = tmp_path / "touch.h5"
     record(path, frames(70), sensor="bench 1", calibration="ab12", attributes={"force_n": 80.0})

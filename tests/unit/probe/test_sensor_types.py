@@ -58,7 +58,7 @@ def test_everything_that_a_file_says_is_kept():
         (LEAST.replace("4", "1"), "a.yaml:2:7: error: rows and columns must be 2 to 255, not 1"),
         (LEAST.replace("2 mm", "2 furlong"), "a.yaml:4:8: error: unknown unit 'furlong'"),
         (LEAST.replace("mine", "My sensor"), "a.yaml:1:7: error: 'My sensor' is no name"),
-        (LEAST + "overlay: {poisson: 0.6}", "poisson must be above 0 and at most 0.5, not 0.6"),
+        (LEAST + "overlay: {poisson: 0.6}", "poisson must be 0 or more and at most 0.5, not 0.6"),
         (LEAST + "value: depth", "a.yaml:5:8: error: value depth with a tab overlay"),
         (LEAST + "overlay: {kind: gel}", "a.yaml:5:17: error: value counts with a gel overlay"),
         (LEAST + "missing:\n  - {rows: 4, columns: 0}", "a.yaml:6:5: error: a missing tactel in"),
@@ -72,6 +72,44 @@ def test_what_is_wrong_stands_at_its_line_and_column(text, says):
         parse_sensor_type(text, "a.yaml")
     assert says in str(refused.value)
     assert refused.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"rows": -3}, "rows -3(?s:.*)a whole number from 2 to 255"),
+        ({"rows": "16"}, "rows '16'"),
+        ({"columns": 16.0}, "columns 16.0"),
+        ({"pitch_mm": np.nan}, "pitch_mm nan(?s:.*)above 0, at most 10000"),
+        ({"pitch_mm": "2 mm"}, "pitch_mm '2 mm'"),
+        ({"row_pitch_mm": -2}, "row_pitch_mm -2"),
+        ({"overlay": "pad"}, r"overlay 'pad'(?s:.*)Overlay\(kind=\"pad\"\)"),
+        ({"name": "My sensor"}, "'My sensor' is no name"),
+        ({"value": "volts"}, "value 'volts'(?s:.*)counts or conductance or force or depth"),
+        ({"value": "depth"}, "value depth with a tab overlay"),
+        ({"wiring": "loose"}, "wiring 'loose'"),
+        ({"bits": 99, "exponent": 0}, "bits 99(?s:.*)exponent 0"),
+        ({"missing": ((99, 99),)}, "a missing tactel in row 99, column 99"),
+        ({"missing": [(1, 2)]}, "give a tuple of pairs"),
+        ({"missing": (3,)}, "give a tuple of pairs"),
+    ],
+)
+def test_python_is_refused_what_a_file_may_not_say(given, says):
+    with pytest.raises(SensorTypeError, match=says):
+        SensorType(**given)
+
+
+@pytest.mark.parametrize(
+    "given", [{"kind": "glove"}, {"height_mm": 0.0}, {"young_mpa": np.nan}, {"poisson": 0.51}]
+)
+def test_an_overlay_of_no_size_is_refused(given):
+    with pytest.raises(SensorTypeError, match=next(iter(given))):
+        Overlay(**given)
+
+
+def test_numbers_of_numpy_stay_readable_in_a_text():
+    given = SensorType(np.int64(8), 8, np.float64(2.5))
+    assert parse_sensor_type(sensor_type_text(given), "text") == given
 
 
 def test_which_type_images_are_of():

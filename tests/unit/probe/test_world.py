@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.sensor_type import SensorType, SensorTypeError
 from probe.circuit.fsr import conductances, fsr_of
 from probe.circuit.network import loaded_columns
 from probe.contact.contract import Touch
@@ -15,7 +16,7 @@ from probe.contact.tips import Tips
 from probe.errors import CircuitError, SurfaceError
 from probe.simulate.scene import bare_scene
 from probe.simulate.sensor import simulated_sensor
-from probe.simulate.simulation import TouchOptions
+from probe.simulate.simulation import TouchOptions, simulate
 from probe.simulate.world.levels import SOUND, TYPICAL
 from probe.simulate.world.sensor import MOUNTINGS, LevelSensor, mount
 from probe.simulate.world.surfaces import DistortedSurface, place_adjacent
@@ -59,13 +60,21 @@ ONES, APART = np.ones((5, 4)), np.ones((3, 3)) * [[1], [0], [1]]
         (lambda: mount(np.zeros((12, 32)), "quarter turn"), "cannot be mounted 'quarter turn'"),
         (lambda: place_adjacent(polygon([STAR]), OBLONG, np.random.default_rng(1)),
          "no edge beside which"),
-        (lambda: TouchOptions(frames=0), "frames 0; give a whole number from 1 on"),
-        (lambda: TouchOptions(touches=0), "touches 0; give a whole number from 1 on"),
-        (lambda: TouchOptions(seed=-1), "seed -1; give a whole number from 0 on"),
+        (lambda: TouchOptions(frames=0), "frames 0; give a whole number of 1 or more"),
+        (lambda: TouchOptions(touches=0), "touches 0; give a whole number of 1 or more"),
+        (lambda: TouchOptions(seed=-1), "seed -1; give a whole number of 0 or more"),
+        (lambda: simulate("washer", x="a"), "x 'a'; give a finite number"),
+        (lambda: simulate("washer", x=[1, 2]), "x .1, 2.; give a finite number"),
+        (lambda: simulate("washer", theta="30deg"), "theta '30deg'; give a finite number"),
+        (lambda: simulate("washer", tilt_x=math.nan), "tilt_x nan; give a finite number"),
+        (lambda: simulate("washer", scan="spiral"), "scan 'spiral'; give raster or kinesthetic"),
+        (lambda: simulate(None), "None is no target; name a written part"),
+        (lambda: simulate(Path("washer.x")), "washer.x: this names no surface"),
+        (lambda: simulate("washer", sensor_type=5), "5 is no sensor type"),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(call, match):
-    with pytest.raises((CircuitError, SurfaceError), match=match):
+    with pytest.raises((CircuitError, SensorTypeError, SurfaceError), match=match):
         call()
 
 

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.sensor_type import Overlay, SensorType
+from encoded_objects.base.sensor_type import Overlay, SensorType, SensorTypeError
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.frame import frame_from
 from probe.recording.record import Recorder
 from probe.simulate.registered import registered_surface
-from recognizer.errors import LabError, TouchError
+from recognizer.errors import LabError, SensorStateError, TouchError
 from recognizer.touch.lab import open_lab
 from recognizer.touch.options import Effort, ReaderOptions
 from recognizer.touch.reader import Reader
@@ -96,11 +97,18 @@ def test_a_calibration_that_is_not_beside_the_recording_is_said(reader, counts, 
         (np.zeros((8, 16)), r"shape \(8, 16\), of a sensor with 16 rows, 16 columns"),
         (np.zeros(256), "shape"),
         (np.full((16, 16), np.nan), "NaN or infinite"),
+        ("abc", "no matrix of numbers"),
+        ([[1, 2], [3]], "no matrix of numbers"),
     ],
 )
 def test_what_is_no_image_of_the_sensor_is_refused(reader, image, said):
     with pytest.raises(TouchError, match=said):
         reader.read(image)
+
+
+def test_a_frame_is_read_by_its_counts(reader, counts):
+    frame = frame_from(counts, t_ns=0, seq=0)
+    assert str(reader.read(frame)) == str(reader.read(frame.counts))
 
 
 def test_trust_must_fit_and_bad_tactels_are_not_believed(reader, counts):
@@ -131,15 +139,22 @@ def test_knobs_that_mean_nothing_are_refused(wrong, said):
 
 
 @pytest.mark.parametrize(
-    ("lab", "sensor", "said"),
+    ("given", "error", "said"),
     [
-        ("lab.db", SensorType(), "'lab.db' is no open lab"),
-        (None, "fsr-8x8", "'fsr-8x8' is no sensor type"),
+        ({"lab": "lab.db"}, LabError, "'lab.db' is no open lab"),
+        ({"sensor": "fsr-9"}, SensorTypeError, "there is no sensor type 'fsr-9'"),
+        ({"sensor": 16}, SensorTypeError, "16 is no sensor type"),
+        ({"options": {"margin": 3}}, UsageError, "options {'margin': 3}"),
+        ({"state": "left.json"}, SensorStateError, "'left.json' is no state of a sensor"),
     ],
 )
-def test_a_reader_takes_an_open_lab_and_a_type(reader, lab, sensor, said):
-    with pytest.raises(LabError, match=said):
-        Reader(lab or reader.lab, sensor)
+def test_a_reader_takes_an_open_lab_and_a_type(reader, given, error, said):
+    with pytest.raises(error, match=said):
+        Reader(**{"lab": reader.lab} | given)
+
+
+def test_a_reader_takes_the_name_of_a_type(reader):
+    assert Reader(reader.lab, "fsr-8x8").sensor == sensor_type_named("fsr-8x8")
 
 
 def test_an_effort_is_of_whole_numbers():

@@ -6,8 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from encoded_objects.base.errors import UsageError
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
+from probe.frame import frame_from
 from probe.scan import surface_to_sensor
 from probe.simulate.registered import registered_surface
 from probe.simulate.scene import Scene
@@ -105,7 +107,7 @@ def one_touch(make_lab):
 @pytest.mark.parametrize(
     "pose",
     [np.full((4, 4), np.nan), np.zeros((4, 4)), np.diag([1.0, 1, -1, 1]), np.diag([7.0, 1, 1, 1]),
-     np.eye(4)[:3]],
+     np.eye(4)[:3], "pose"],
 )  # fmt: skip
 def test_a_pose_that_is_no_rigid_transform_is_refused(lab, pose):
     with pytest.raises(MosaicError, match="no rigid transform"):
@@ -116,6 +118,14 @@ def test_a_pose_that_is_no_rigid_transform_is_refused(lab, pose):
     scan.add(counts, pose=np.eye(4))
     with pytest.raises(MosaicError, match="no rigid transform"):
         scan.add(counts, pose=pose)
+
+
+def test_a_frame_brings_its_pose_and_a_reader_its_sensor(lab):
+    scan = Scan(lab)
+    frame = frame_from(np.zeros((16, 16)), t_ns=0, seq=7, pose=np.eye(4))
+    assert scan.add(frame).seq == 7
+    with pytest.raises(UsageError, match="a reader has its sensor"):
+        Scan(Reader(lab), sensor=SENSOR)
 
 
 def test_faces_of_one_object_are_one_belief_and_a_moved_object_is_a_new_one(one_touch):

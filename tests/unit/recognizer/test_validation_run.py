@@ -17,6 +17,7 @@ from recognizer.touch.symbols.linearize import force_jacobian, prior_precision, 
 from recognizer.validation.campaign import LIMIT_CLASSES, series_of
 from recognizer.validation.dataset import baseline
 from recognizer.validation.draw import draw_touch
+from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import LIMITS, columns_of, read_series
 from recognizer.validation.limits import (
     PLACES,
@@ -51,6 +52,24 @@ def work(made):
 @pytest.fixture(scope="module")
 def reader(work):
     return Reader(open_lab(work.database))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"specs": 5}, "5 names no set"),
+        ({"specs": {"name": "Cube"}}, "names no set"),
+        ({"folder": 5}, "5 is no folder"),
+        ({"folder": "a-file"}, "the folder cannot be made or written"),
+        ({"jobs": 0}, "--jobs: 0"),
+    ],
+)
+def test_a_call_that_is_refused_begins_no_run(given, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a-file").touch()
+    with pytest.raises(ValidationError, match=said):
+        validate(**{"specs": CUBE, "folder": "run"} | given)
+    assert [path.name for path in tmp_path.iterdir()] == ["a-file"]
 
 
 def test_a_data_set_holds_the_touches_of_the_run(made, reader):

@@ -28,6 +28,7 @@ from recognizer.validation.statistics import (
     share_of,
     state_of,
 )
+from recognizer.validation.workers import workers_of
 
 
 @pytest.mark.parametrize(("hits", "of"), [(0, 10), (1, 10), (9, 10), (10, 10), (995, 1000), (3, 7)])
@@ -146,11 +147,19 @@ def test_prints_are_parts_of_the_set():
     [
         ({"surfaces": PRINTED, "kinds": "face,blank,foreign"}, "not blank, foreign"),
         ({"engine": "mujoco", "overlay": "pad"}, "mujoco does not know the overlay pad"),
+        ({"touches": 0}, "--touches: 0; give a whole number of 1"),
+        ({"touches": "10"}, "--touches: '10'"),
+        ({"shard": 1.5}, "--shard: 1.5"),
+        ({"study": -1}, "--study: -1; give a whole number of 0"),
     ],
 )
 def test_what_cannot_be_touched_is_refused(asked, said):
     with pytest.raises(ValidationError, match=said):
         campaign_of(asked, None)
+    for wrong in (0, 1.5):
+        with pytest.raises(ValidationError, match=f"{wrong}") as refused:
+            workers_of(wrong)
+        assert refused.value.fix == "give a whole number of 1 or more"
     with pytest.raises(ValidationError, match="copy, small need objects of their own"):
         refuse_without_specs(["face", "copy", "small"])
 
