@@ -178,7 +178,7 @@ def printable(text: str) -> str:
     return "".join(c if c == " " or c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
-_PASSWORD = re.compile(r"(\w*(?:sql|postgres)[\w+]*://[^:/@\s]*):[^@]*@(?:[^@/?#\s]*@)*")
+_PASSWORD = re.compile(r"((?:sql|postgres)[\w+]*://[^:/@\s]*):[^@]*@(?:[^@/?#\s]*@)*")
 _PASSWORD_OPTION = re.compile(r"([?&](?:ssl)?password=)[^&#\s]*")
 
 
