@@ -126,10 +126,9 @@ def check_cells(target: Connection, name: str, here: ArrayHere, cells: Rows) -> 
         raise CopyRefusedError(
             f"needs {np.count_nonzero(held)} cells that "
             f"{_holders(target, here.array_id, r[held], c[held])} here",
-            f"make '{name}' again here from its spec, on cells of its own, and print it again; or "
-            "import the others with --skip-refused. Labs with a key each (encode-object lab) have "
-            "arrays of their own; without one, or with the same, share one database instead, "
-            "postgresql://HOST/NAME",
+            f"make '{name}' again here from its spec, on cells of its own, and print it again. "
+            "Labs with a key each (encode-object lab) have arrays of their own; without one, or "
+            "with the same, share one database instead, postgresql://HOST/NAME",
         )
 
 
@@ -376,4 +375,5 @@ def _sent_along(homes: tuple[URL, URL], path: Path) -> str:
 def _refusal(refused: Sequence[RefusedCopy], place: str) -> DatabaseError:
     causes = "; ".join(f"'{each.name}' {each.cause}" for each in refused)
     fixes = "; ".join(dict.fromkeys(each.fix for each in refused))
+    fixes += "; or import the others with --skip-refused"
     return DatabaseError(f"nothing was imported: {causes}", fix=fixes, place=place)

@@ -284,7 +284,8 @@ def report_import(made: Recording, source: Path, *, as_json: bool) -> int:
     scaled = ""
     if "scale" in more:
         scaled = f"; value = {more['scale_offset']:g} + {more['scale']:g} * count"
-    write(f"{made.path}: {count_of(len(made), 'frame')} of {source}{scaled}")
+    left = f"; not read: {more['not_read']} (frames come at --rate)" if "not_read" in more else ""
+    write(f"{made.path}: {count_of(len(made), 'frame')} of {source}{scaled}{left}")
     return 0
 
 

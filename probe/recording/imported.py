@@ -46,7 +46,7 @@ from probe.recording.guard import open_hdf5
 from probe.recording.hdf5 import write_recording
 from probe.recording.layout import DATASETS, NOMINAL_HZ, FrameBlock, RecordingOrigin
 from probe.recording.read import Recording
-from probe.recording.table import POSE_HEADER
+from probe.recording.table import POSE_HEADER, table_header
 from probe.recording.zarr import is_store, store_arrays
 
 if TYPE_CHECKING:
@@ -112,6 +112,8 @@ def import_array(
         more: dict[str, Any] = {"imported_from": path.name, "imported_array": found.name}
         units, scaled = scale_attributes(scale, kind)
         more |= scaled
+        if left := _left_out(arrays, found, kind.shape):
+            more["not_read"] = left
         origin = RecordingOrigin(sensor, "", units, sensor_type_text(kind), MappingProxyType(more))
         images = _images(path, found, kind.shape)
         blocks = (_block(found, part, first, scale, 1e9 / rate_hz) for first, part in images)
@@ -128,6 +130,7 @@ class FileArray:
     reverse: bool = False  #: its axes stand in the order of MATLAB
     others: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     """What it says of its images besides, under the names of `DATASETS`."""
+    left: tuple[str, ...] = ()  #: names of columns that are not read
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -202,6 +205,15 @@ def _choose_array(
     else:
         cause, fix = f"no array of images '{name}' in it, but {here}", "take one of these"
     raise RecordingError(cause, fix=fix, place=path)
+
+
+def _left_out(arrays: list[FileArray], found: FileArray, image: tuple[int, int]) -> str:
+    """Return what may be times of the images and is not read, in words; empty where times are."""
+    if "t_ns" in found.others:
+        return ""
+    of_each = [one.name for one in arrays if one.shape == (found.frames(image),)]
+    names = ["".join(filter(str.isprintable, name))[:40] for name in (*found.left, *of_each)]
+    return ", ".join(names[:5]) + (", ..." if names[5:] else "")
 
 
 def _images(
@@ -386,9 +398,12 @@ def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
             ) from bad
     head = [] if not lines or _are_numbers(lines[0]) else [name.strip() for name in lines.pop(0)]
     others: dict[str, NDArray[Any]] = {}
+    left: tuple[str, ...] = ()
     if columns := _image_columns(path, head, image):
+        ours = [*table_header(image), *POSE_HEADER]
         even = all(len(line) == len(head) for line in lines)
         others = _other_columns(path, head, lines) if even else {}
+        left = tuple(name for i, name in enumerate(head) if i not in columns and name not in ours)
         lines = [[line[c] for c in columns] if len(line) == len(head) else line for line in lines]
     values = _numbers(path, lines, bool(head))
     rows, columns_ = image
@@ -402,7 +417,7 @@ def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
             fix=f"write {rows * columns_} numbers a line, or give the --sensor-type",
             place=path,
         )
-    return FileArray(path.stem, values, others=others)
+    return FileArray(path.stem, values, others=others, left=left)
 
 
 def _image_columns(path: Path, head: list[str], image: tuple[int, int]) -> list[int]:

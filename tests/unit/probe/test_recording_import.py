@@ -194,6 +194,16 @@ def test_a_table_of_ours_comes_back_with_times_numbers_wrist_and_poses(tmp_path)
         np.testing.assert_array_equal(values, after[name])
 
 
+def test_times_that_are_not_read_are_named(tmp_path):
+    np.savez(tmp_path / "a.npz", frames=COUNTS, time=np.arange(70) / 50, rate=np.array([50]))
+    names = ["time_s\0", *(f"r{r}c{c}" for r in range(16) for c in range(16))]
+    lines = [",".join(map(str, [n / 50, *image.flat])) for n, image in enumerate(COUNTS)]
+    (tmp_path / "a.csv").write_text("\n".join([",".join(names), *lines]))
+    for name, said in (("a.npz", "time"), ("a.csv", "time_s")):
+        made = import_array(tmp_path / name, tmp_path / "a.h5", replace=True)
+        assert made.origin.more["not_read"] == said
+
+
 HEADS = {
     "ours": lambda r, c: f"r{r}c{c}",
     "from 1": lambda r, c: f"r{r + 1}c{c + 1}",
