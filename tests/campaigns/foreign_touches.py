@@ -50,8 +50,8 @@ def sensors_of(path: Path) -> list[tuple[str | None, SensorType]]:
         (name, array.shape[-2:]) for name, array in store_arrays(path) if len(array.shape) == 3
     ]
     usual = SensorType()
-    other = [(n, known.get(s) or replace(usual, rows=s[0], columns=s[1], name=n.split("/")[0]))
-             for n, s in shapes if min(s) > 3]  # fmt: skip
+    other = [(n, known.get(s) or replace(usual, rows=s[0], columns=s[1], name=f"{s[0]}x{s[1]}"))
+             for n, s in shapes if min(s) > 3 and max(s) < 256]  # fmt: skip
     return list(other)
 
 

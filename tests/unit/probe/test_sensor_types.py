@@ -107,6 +107,11 @@ def test_an_overlay_of_no_size_is_refused(given):
         Overlay(**given)
 
 
+def test_a_gel_takes_no_tabs():
+    with pytest.raises(SensorTypeError, match="value depth with a tab overlay"):
+        sensor_type_named("gel-24x32").with_overlay("tab")
+
+
 def test_numbers_of_numpy_stay_readable_in_a_text():
     given = SensorType(np.int64(8), 8, np.float64(2.5))
     assert parse_sensor_type(sensor_type_text(given), "text") == given
