@@ -151,9 +151,9 @@ def learn_folds(
         if found is not None and expected:  # on round faces the outer tactels touch nothing
             state = replace(state, dead=found.dead & ~answering_of(np.array(expected)).dead)
 
+    touches, drift = known.touches + len(images), _drift(readings)
+
     def finished(one: SensorState) -> SensorState:
-        touches = known.touches + len(images)
-        drift = _drift(readings)
         return replace(one, dead=state.dead, floating=floating, touches=touches, drift=drift)
 
     folds = (
