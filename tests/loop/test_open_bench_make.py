@@ -112,8 +112,12 @@ def test_what_is_made_in_the_lab_is_shown_and_touched(page, own):
     page.get_by_test_id("make-lab").select_option("lab")
     making(page, {"shape": "cube", "name": "Die", "output.formats": "[stl]",
                   "output.lab_key": ""})  # fmt: skip
+    slow = []  # its picture comes after the reader has read the lab again
+    page.route("**/api/objects/Die", lambda one: slow.append(one))
     name, files = made(page)
     assert name == "Die.zip"
+    expect(page.get_by_test_id("object").locator("option")).to_have_count(2)
+    page.unroute("**/api/objects/Die")  # lets it go
     assert "lab.db" not in files
     assert all((folder / one).read_bytes() == files[one] for one in files if one != "Die.yaml")
     expect(page.get_by_test_id("object")).to_have_value("Die")

@@ -39,7 +39,7 @@ export class Objects {
     if (encodings.length) await this.array(0);
     const held = await this.held();
     choices(this.list, held.map((one) => [one.name, `${one.name}${one.retired ? " (retired)" : ""}`]));
-    const first = figures.shown || held[0]?.name;
+    const first = this.asked || held[0]?.name;
     if (first) await this.show(first);
   }
 
@@ -47,7 +47,7 @@ export class Objects {
   private async show(name: string): Promise<void> {
     this.asked = name;
     const shape = await get<ObjectShape>(`objects/${encodeURIComponent(name)}`).catch((error: unknown) => {
-      if (this.asked === name) this.list.value = figures.shown;
+      if (this.asked === name) this.asked = this.list.value = figures.shown;
       throw error;
     });
     if (this.asked !== name) return;
