@@ -1,7 +1,6 @@
-"""The thesis's arrays against golden.json, read from the printed figures and appendices.
+"""The thesis's arrays and windows against golden.json, read from printed figures and appendices.
 
-Not here: figure 5.8 (its content is not in the text, nothing to compare with); table 5.2 and
-the milestones of figure 5.10 (code conversions: the decoder's).
+Not here: figure 5.8 (its content is not in the text, nothing to compare with).
 """
 
 import hashlib
@@ -13,6 +12,8 @@ import numpy as np
 import pytest
 from reference.polynomials import on_file, powmod, windows_are_unique
 
+from decoder import decode_exact, decode_likelihood
+from decoder.milestones import optimal_distance
 from generator.array import array_from, profile
 from generator.array.factor import prime_factors
 from generator.array.field import field_of_order
@@ -24,6 +25,7 @@ FIXTURES = Path(__file__).parents[2] / "fixtures"
 GOLDEN = json.loads((FIXTURES / "golden.json").read_text())
 MEASURED = json.loads((FIXTURES / "array_profiles.json").read_text())
 THESIS = GOLDEN["prba_63x65"]
+METHODS = ("table", "serial", "milestones", "logarithm")
 
 
 def whole(array):
@@ -60,7 +62,6 @@ def test_table_5_3(entry):
 def test_table_5_3_is_complete_and_its_fields_hold():
     printed = {(p.order, p.degree) for p in known_polynomials() if p.source == "table 5.3"}
     assert printed == {(e["q"], e["n"]) for e in GOLDEN["table_5_3"]}
-    assert GOLDEN["table_5_3_field_relations_ok"] == {"4": True, "8": True, "9": True}
     # A^k = digits, highest power of A first, as printed under the table
     relations = {
         4: {2: "11", 3: "01"},
@@ -118,9 +119,16 @@ def test_figure_5_10():
     entry = GOLDEN["fig_5_10"]
     sequence = Sequence(field_of_order(4), entry["poly"], entry["init"])
     assert sequence.period == entry["true_length"] == 1023
-    digits = "".join(map(str, sequence.symbols(range(1023))))
+    terms = sequence.symbols(range(1023))
+    digits = "".join(map(str, terms))
     assert digits == entry["sequence"]
     assert hashlib.sha256(digits.encode()).hexdigest() == entry["sha256_digits"]
+    array = array_from({"family": "prmvs", "order": 4, "degree": 5, "polynomial": "x^5+x+A"})
+    ring = np.append(terms, terms[:4])
+    windows = np.lib.stride_tricks.sliding_window_view(ring, 5)[:, None, :]
+    for method in METHODS:
+        assert decode_exact(array, windows, method).indices.tolist() == list(range(1023))
+    assert array.rows == 1
 
 
 def test_figure_5_7():
@@ -144,7 +152,13 @@ def test_figure_5_11():
     found = [
         [i, j] for i in range(15) for j in range(15) if (torus[i : i + 4, j : j + 2] == shown).all()
     ]
-    assert found == entry["window_decodes_to"]
+    assert found == entry["window_decodes_to"] == [[5, 7]]
+    decoded = [decode_exact(array, shown, method)[0] for method in METHODS]
+    decoded.append(decode_likelihood(array, shown, error=1e-3)[0])
+    assert {(one.row, one.column) for one in decoded} == {(5, 7)}
+    few = np.where(np.eye(2, dtype=bool)[[0, 1, 0, 0]], shown, -1)  # four, not p + q - 1 = 5
+    assert np.count_nonzero(few >= 0) == 4
+    assert decode_exact(array, few)[0].t == 5 * 15 + 7
 
 
 def test_figure_6_9():
@@ -171,13 +185,21 @@ def test_product_window_needs_one_symbol_in_every_row_and_column():
 def test_recognition_figures_6_17_to_6_19():
     array = profile("thesis").array()
     assert array.window == (6, 2)
-    for entry in THESIS["golden_windows"]:
+    entries = THESIS["golden_windows"]
+    windows = [[list(map(int, line)) for line in entry["window"]] for entry in entries]
+    for entry, window in zip(entries, windows, strict=True):
         row, column = entry["row"], entry["col"]
         assert (entry["Y_PRBA"], entry["X_PRBA"]) == (row, column)
         seen = array.symbols(row + np.arange(6)[:, None], column + np.arange(2))
-        assert ["".join(map(str, line)) for line in seen] == entry["window"]
+        assert seen.tolist() == window
+        for method in METHODS:
+            found = decode_exact(array, window, method)[0]
+            assert (found.row, found.column, found.t, found.reason) == (row, column, entry["t"], "")
         assert array.index(row, column) == entry["t"]
         assert array.cell(entry["t"]) == (row, column)
+    likely = decode_likelihood(array, windows, error=1e-6, blank=0)
+    assert [(one.column, one.row) for one in likely] == [(61, 1), (9, 25), (25, 5)]
+    assert max(one.doubt for one in likely) < 2e-5
 
 
 def test_the_whole_63x65_array():
@@ -186,15 +208,14 @@ def test_the_whole_63x65_array():
     assert list(array.sequence.polynomial) == THESIS["poly"]
     assert list(array.sequence.initial) == THESIS["init"]
     assert "".join(map(str, grid[0])) == THESIS["row0"]
-    assert (
-        hashlib.sha256("".join(map(str, grid.ravel())).encode()).hexdigest()
-        == (THESIS["sha256_rowmajor"])
-    )
+    digest = hashlib.sha256("".join(map(str, grid.ravel())).encode()).hexdigest()
+    assert digest == THESIS["sha256_rowmajor"]
     s = array.sequence.symbols(range(4095))
     assert all(s[t] == s[t - 5] ^ s[t - 8] ^ s[t - 9] ^ s[t - 12] for t in range(12, 4095))
 
 
 def test_appendix_5_remainder_is_no_window():
+    """The thesis takes (1, 0, 1) for t^2 + 1 and finds 6; the index of the window is 2."""
     entry = GOLDEN["appendix5_example"]
     field, h = field_of_order(2), tuple(entry["h"])
     sequence = Sequence(field, h, entry["sequence"][:3])
@@ -206,6 +227,9 @@ def test_appendix_5_remainder_is_no_window():
     element = sequence.element(2)
     window = sequence.functionals(sequence.element([0, 1, 2]))[:, 0] @ element % 2
     assert window.tolist() == r
+    definition = {"family": "prbs", "polynomial": [1, 1, 0, 1], "initial": [0, 0, 1], "degree": 3}
+    assert decode_exact(array_from(definition), [[1, 0, 1]])[0].t == entry["thesis_i"] == 2
+    assert entry["exponent_of_r"] == 6
 
 
 @pytest.mark.parametrize(
@@ -288,3 +312,15 @@ def test_profiles(name, size, window, alphabet, pitch_mm, distance_of_window):
     assert (chosen.alphabet, chosen.pitch_mm) == (alphabet, pitch_mm)
     assert windows_are_unique(array, window)
     assert distance(array, *window) == distance_of_window
+
+
+def test_optimal_distance_costs_least_and_the_printed_formula_does_not():
+    """Figure 5.4, table 5.2."""
+    for k1, k4 in ((1, 4), (4, 1), (1, 1)):
+        costs = [k1 * (2**16 - 1) / t + k4 * t for t in range(1, 2**16 - 1)]
+        assert optimal_distance(2**16 - 1, k1, k4) == 1 + int(np.argmin(costs))
+        periods = [2**n - 1 for n in (8, 16, 24, 32)]
+        milestones = [round(N / optimal_distance(N, k1, k4)) for N in periods]
+        assert GOLDEN["table_5_2"]["rows"].get(f"{k1}/{k4}", milestones) == milestones
+    assert 1 / 512 * 2**8 - 1 < 0  # as printed: no distance at all where milestones are cheap
+    assert optimal_distance(2**8 - 1, 1, 512) == 1

@@ -14,7 +14,7 @@ from generator.export.bambu import PLATES_MAX, plate_origins_mm, project_3mf, pr
 from generator.export.threemf import SlicerSettings, print_files
 from generator.pipeline import encode
 from generator.printers import printer_named
-from generator.spec.read import read_specs
+from generator.spec.read import read_specs, tree_from
 
 
 @pytest.fixture(scope="module")
@@ -74,9 +74,8 @@ def test_plates_stand_in_a_grid_whose_next_row_is_in_front():
 def test_presets_are_named_as_the_slicer_names_them(name, said, panels):
     known = printer_named(name)
     settings = SlicerSettings(known, supports=True, symbols_apart=False)
-    project = read_project(
-        project_3mf("Cube", print_files("C", panels[:1], known.bed_mm, settings))
-    )
+    plates = print_files("C", panels[:1], known.bed_mm, settings)
+    project = read_project(project_3mf("Cube", plates))
     found = project.settings
     assert (project.plates[0][0].filaments, project.plates[0][0].supports) == ((1, 1), True)
     assert found["enable_support"] == "1"
@@ -99,15 +98,14 @@ def test_resin_is_refused_and_many_plates_are_several_projects(panels):
     assert PLATES_MAX == 36
 
 
-@pytest.mark.parametrize(("printer", "asked"), [
-    ("{like: bambu-a1}", True),
-    ("ender-3", False),
-    ("{like: bambu-a1, bed: 9 cm x 9 cm}", False),  # another machine
-])  # fmt: skip
-def test_owners_of_such_a_printer_get_a_project_unasked(printer, asked, tmp_path):
-    spec = tmp_path / "a.yaml"
-    spec.write_text(f"name: A\nshape: {{cube: 30 mm}}\nprint: {{printer: {printer}}}\n")
-    assert ("bambu" in read_specs([spec])[0].formats) == asked
+def test_owners_of_such_a_printer_get_a_project_unasked():
+    for printer, asked in (
+        ({"like": "bambu-a1"}, True),
+        ("ender-3", False),
+        ({"like": "bambu-a1", "bed": "9 cm x 9 cm"}, False),  # another machine
+    ):
+        spec = {"name": "A", "shape": {"cube": 30}, "print": {"printer": printer}}
+        assert ("bambu" in read_specs([tree_from(spec)])[0].formats) == asked
 
 
 SET = """name: lab

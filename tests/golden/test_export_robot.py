@@ -5,14 +5,16 @@ corners and edges of the kernel's solids; MJCF by MuJoCo, URDF by yourdfpy, USD 
 by the rules of its specification.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
+import trimesh
+from build123d import GeomType, Solid
+from pxr import Gf, Usd, UsdGeom, UsdPhysics, UsdValidation
 from reference.kernel import inertia_of, solid_of
 from reference.sdformat import faults
 
@@ -24,11 +26,9 @@ from generator.export.robot import usd, xml_files
 from generator.pipeline import encode
 from generator.spec import SpecError, read_specs
 
-ROOT = Path(__file__).parents[2]
-FIXTURES = ROOT / "fixtures"
+SHAPES = Path(__file__).parents[2] / "fixtures" / "shapes"
 ROBOT = ("mjcf", "urdf", "sdf", "usd")
-BRACKET = f"shape: {{file: {FIXTURES / 'shapes' / 'l_bracket.stl'}}}\n"
-BRACKET += "print: {parts: whole, down: none}\n"
+BRACKET = f"shape: {{file: {SHAPES}/l_bracket.stl}}\nprint: {{parts: whole, down: none}}\n"
 COARSE = "name: Part\nprofile: one-touch\nsymbols: {pitch: 9 mm}\n"  # few symbols: fast
 TEXTS = {
     "panels": COARSE + "shape: {box: 45 x 35 x 30 mm}\n",
@@ -41,8 +41,8 @@ def make(folder: Path, text: str, formats=ROBOT, **options):
     (folder / "spec.yaml").write_text(text)
     url = f"sqlite:///{folder / 'lab.db'}"
     specs = read_specs([folder / "spec.yaml"])
-    made = encode(specs, folder=folder / "out", database=url, formats=formats, **options)
-    return made, url
+    encode(specs, folder=folder / "out", database=url, formats=formats, **options)
+    return url
 
 
 @pytest.fixture(scope="module", params=TEXTS)
@@ -50,7 +50,7 @@ def part(request, tmp_path_factory):
     """An object with its files and what is registered of it."""
     folder = tmp_path_factory.mktemp(request.param)
     round_one = request.param == "round"  # `--verify` takes ten times as long as all else
-    _, url = make(folder, TEXTS[request.param], (*ROBOT, "step"), verify=round_one)
+    url = make(folder, TEXTS[request.param], (*ROBOT, "step"), verify=round_one)
     with read_transaction(open_database(url, writable=False)) as connection:
         known = read_object(connection, "Part")
     faces = {face.name: face.T_object_face for face in known.faces if "." not in face.name}
@@ -72,7 +72,8 @@ def read_models(part):
         yield suffix, read(named, part.folder / f"Part{suffix}")
 
 
-def test_mass_centre_and_inertia_are_the_kernels(part):
+def test_mass_centre_and_inertia_are_the_kernels_and_frames_those_of_the_database(part):
+    assert part.faces
     volume, centre, inertia = inertia_of(part.solids)
     density = 2000.0 if part.kind == "whole" else 1240.0
     facets = 2e-3 if part.kind == "round" else 0.0  #: what triangles cut off a true cylinder
@@ -82,11 +83,6 @@ def test_mass_centre_and_inertia_are_the_kernels(part):
         expected = density * inertia * 1e-15
         within = (5e-7 + facets) * expected.max()
         assert np.abs(read.inertia_kg_m2 - expected).max() < within, suffix
-
-
-def test_frames_of_faces_are_those_of_the_database(part):
-    assert part.faces
-    for suffix, read in read_models(part):
         assert set(read.frames) == set(part.faces)
         for name, T in part.faces.items():
             expected = T.copy()
@@ -96,8 +92,6 @@ def test_frames_of_faces_are_those_of_the_database(part):
 
 def test_frames_lie_in_planes_of_the_kernel(part):
     """The frame's z is the outward normal of a plane of a solid that holds its origin."""
-    from build123d import GeomType, Solid
-
     planes = []
     for shape, T in part.solids:
         for face in Solid(shape).faces().filter_by(GeomType.PLANE):
@@ -110,8 +104,6 @@ def test_frames_lie_in_planes_of_the_kernel(part):
 
 
 def test_what_simulators_feel_is_one_closed_mesh_of_what_is_printed(part):
-    import trimesh
-
     mesh = trimesh.load(part.folder / "Part-touch.obj", process=False)
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
@@ -122,8 +114,6 @@ def test_what_simulators_feel_is_one_closed_mesh_of_what_is_printed(part):
 
 
 def test_convex_pieces_reach_to_the_tops_of_the_symbols(part):
-    import trimesh
-
     files = sorted(part.folder.glob("Part-collision-*.obj"))
     pieces = [trimesh.load(file, force="mesh") for file in files]
     assert len(files) == (6 if part.kind == "whole" else 1)  # a bracket with a pocket at its end
@@ -149,8 +139,6 @@ def test_convex_pieces_reach_to_the_tops_of_the_symbols(part):
 
 def test_dropped_on_a_table_it_comes_to_rest_on_its_symbols(part):
     """The lowest face hangs over the table by 1 mm, less what MuJoCo's soft contact takes."""
-    import mujoco
-
     spec = mujoco.MjSpec.from_file(str(part.folder / "Part.xml"))
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2, 2, 0.1])
     spec.body("Part").pos, spec.body("Part").quat = [0, 0, 0.004], [1, 0.01, 0.006, 0]
@@ -169,9 +157,6 @@ def test_dropped_on_a_table_it_comes_to_rest_on_its_symbols(part):
 
 def test_a_notch_is_open_and_what_is_in_it_can_be_felt(part):
     """MuJoCo finds the touch mesh in contact, by its hull, and lets it bear nothing."""
-    import mujoco
-    import trimesh
-
     if part.kind != "whole":
         return
     pieces = [trimesh.load(file, force="mesh") for file in part.folder.glob("*-collision-*.obj")]
@@ -200,19 +185,18 @@ def test_sdf_keeps_to_its_specification(part):
     assert faults((part.folder / "Part.sdf").read_bytes()) == []
 
 
-def test_usd_passes_the_validators_of_openusd(part):
-    from pxr import Usd, UsdValidation
+@pytest.fixture
+def stage(part):
+    return Usd.Stage.Open(str(part.folder / "Part.usdc"))
 
-    stage = Usd.Stage.Open(str(part.folder / "Part.usdc"))
+
+def test_usd_passes_the_validators_of_openusd(stage):
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     assert len(validators) > 20
     assert not UsdValidation.ValidationContext(validators).Validate(stage)
 
 
-def test_usd_is_a_rigid_body_whose_colliders_are_guides(part):
-    from pxr import Usd, UsdGeom, UsdPhysics
-
-    stage = Usd.Stage.Open(str(part.folder / "Part.usdc"))
+def test_usd_is_a_rigid_body_whose_colliders_are_guides(stage):
     root = stage.GetDefaultPrim()
     assert root.HasAPI(UsdPhysics.RigidBodyAPI)
     assert (UsdGeom.GetStageMetersPerUnit(stage), UsdGeom.GetStageUpAxis(stage)) == (1.0, "Z")
@@ -234,12 +218,8 @@ def test_usd_is_a_rigid_body_whose_colliders_are_guides(part):
         assert UsdGeom.Imageable(prim).ComputePurpose() == "guide"
 
 
-def test_usd_is_felt_where_tactile_sensors_of_isaac_look(part):
+def test_usd_is_felt_where_tactile_sensors_of_isaac_look(part, stage):
     """TacSL: the mesh with approximation sdf, in the body's frame; FlexiTac: the first mesh."""
-    import trimesh
-    from pxr import Gf, Usd, UsdGeom
-
-    stage = Usd.Stage.Open(str(part.folder / "Part.usdc"))
     root = stage.GetDefaultPrim()
     first = next(prim for prim in Usd.PrimRange(root) if prim.IsA(UsdGeom.Mesh))
     assert first.GetPath() == "/Part/collision/touch"
