@@ -1,13 +1,17 @@
-"""The door for files of others: what is no regular file, too large or damaged ends at once."""
+"""Files of others: no regular file, too large, damaged; what is kept in the user's cache folder."""
 
 import io
 import os
 import socket
+import stat
 import zipfile
+from contextlib import chdir
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
 
+from encoded_objects.base.cache import cache_folder, cached_bytes, content_key
 from encoded_objects.base.errors import EncodedObjectsError
 from encoded_objects.base.foreign import (
     foreign_bytes,
@@ -31,17 +35,10 @@ from recognizer.sensor.file import read_state
 def odd(tmp_path):
     """Return what may stand where a file should be, by its name in messages."""
     os.mkfifo(tmp_path / "pipe")
-    bound = socket.socket(socket.AF_UNIX)
-    before = os.getcwd()
-    os.chdir(tmp_path)  # the name of a socket is short
-    bound.bind("socket")
-    os.chdir(before)
-    bound.close()
-    return {
-        "a device": "/dev/zero",
-        "a named pipe": tmp_path / "pipe",
-        "a socket": tmp_path / "socket",
-    }
+    with chdir(tmp_path), socket.socket(socket.AF_UNIX) as bound:  # a socket's name is short
+        bound.bind("socket")
+    pipe, bound = tmp_path / "pipe", tmp_path / "socket"
+    return {"a device": "/dev/zero", "a named pipe": pipe, "a socket": bound}
 
 
 def linked(tmp_path, target, name):
@@ -130,10 +127,8 @@ def test_a_member_unpacks_to_what_is_allowed():
 
 def test_an_archive_that_claims_much_is_refused_before_a_value_is_read(tmp_path):
     for shape in ((2**40, 16, 16), (10**6, 16, 16)):
-        head = io.BytesIO()
-        np.lib.format.write_array_header_1_0(
-            head, {"descr": "<u2", "fortran_order": False, "shape": shape}
-        )
+        head, said = io.BytesIO(), {"descr": "<u2", "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(head, said)
         with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
             archive.writestr("frames.npy", head.getvalue())
         with pytest.raises(EncodedObjectsError, match="damaged"):
@@ -146,7 +141,7 @@ def test_an_archive_that_claims_much_is_refused_before_a_value_is_read(tmp_path)
         import_array(tmp_path / "b.npz", tmp_path / "out.h5")
 
 
-def test_a_process_of_its_own_has_limits(tmp_path):
+def test_a_process_of_its_own_has_limits(tmp_path, monkeypatch):
     (tmp_path / "greedy.py").write_text(
         "import sys\n"
         "what = sys.argv[1]\n"
@@ -156,19 +151,80 @@ def test_a_process_of_its_own_has_limits(tmp_path):
         "while what in ('time', 'ended'): pass\n"
         "print('done')\n"
     )
-    sound, asked = [], []
+    asked = []
 
     def limited(what):
         limits = {"memory_bytes": 1 << 29, "cpu_s": 1, "written_bytes": 1_000_000}
         ending = (lambda: len(asked.append(1) or asked) > 5) if what == "ended" else lambda: False
         return run_limited("greedy", [what], ending=ending, **limits)
 
-    with pytest.MonkeyPatch.context() as patched:
-        patched.syspath_prepend(tmp_path)
-        patched.chdir(tmp_path)
-        for what in ("memory", "files", "room", "time", "ended"):
-            code, printed = limited(what)
-            assert code != 0, what
-            assert printed == b"", what
-        sound = limited("nothing")
-    assert sound == (0, b"done\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    for what in ("memory", "files", "room", "time", "ended"):
+        code, printed = limited(what)
+        assert code != 0, what
+        assert printed == b"", what
+    assert limited("nothing") == (0, b"done\n")
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+def never():
+    raise AssertionError("made again")
+
+
+@pytest.mark.parametrize("damaged", [None, b"", b"abc", b"\0\0\0\0content"])
+def test_made_once_and_again_where_it_is_deleted_or_damaged(damaged):
+    assert cached_bytes("kind", "key", lambda: b"content") == b"content"
+    assert cached_bytes("kind", "key", never) == b"content"
+    file = cache_folder("kind") / "key"
+    assert stat.S_IMODE(file.stat().st_mode) & 0o077 == 0  # its owner's alone
+    file.unlink() if damaged is None else file.write_bytes(damaged)
+    assert cached_bytes("kind", "key", lambda: b"content") == b"content"
+    assert cached_bytes("kind", "key", never) == b"content"
+
+
+def test_what_was_not_used_for_longest_goes():
+    for age, key in ((3, "old"), (2, "used"), (1, "new")):
+        cached_bytes("kind", key, lambda: bytes(100), largest=320)
+        file = cache_folder("kind") / key
+        os.utime(file, (file.stat().st_mtime - 100 * age,) * 2)
+    cached_bytes("kind", "old", never)  # used now
+    cached_bytes("kind", "newest", lambda: bytes(100), largest=320)
+    assert {file.name for file in cache_folder("kind").iterdir()} == {"old", "new", "newest"}
+
+
+def test_nothing_is_kept_where_nothing_can_be_written_or_there_is_no_home(monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", os.devnull)
+    assert cached_bytes("kind", "key", lambda: b"1") == b"1"
+    assert cached_bytes("kind", "key", lambda: b"2") == b"2"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr("pathlib.Path.home", lambda: (_ for _ in ()).throw(RuntimeError))
+    assert cached_bytes("kind", "key", lambda: b"3") == b"3"
+
+
+def _use(number):
+    for k in range(number, number + 40):
+        content = bytes([k % 5]) * 50_000
+        if cached_bytes("kind", f"{k % 5}", content.__bytes__, largest=120_000) != content:
+            return False
+    return True
+
+
+def test_processes_side_by_side():
+    with get_context("fork").Pool(4) as pool:
+        assert all(pool.map(_use, range(8)))
+    assert not list(cache_folder("kind").glob(".*"))
+
+
+def test_key_tells_values_and_code_apart(tmp_path):
+    code = tmp_path / "code.py"
+    code.write_text("a = 1")
+    keys = [content_key((1.0, "a"), [code]), content_key((1.5, "a"), [code]), content_key((1.0,))]
+    code.write_text("a = 2")
+    keys.append(content_key((1.0, "a"), [code]))
+    assert len(set(keys)) == 4
+    assert content_key((1.0, "a"), [code]) == keys[-1]
