@@ -1,4 +1,4 @@
-"""What a spec means: values, defaults, units, sets, places and the hash of the meaning."""
+"""What a spec means: values, defaults, units, sets, places, printers, the hash of the meaning."""
 
 import json
 import math
@@ -14,6 +14,7 @@ from generator.alphabet.known import ALPHABETS
 from generator.alphabet.printable import check_printable
 from generator.array.profiles import PROFILES
 from generator.errors import DatabaseError, LayoutError, ShapeError
+from generator.pipeline.plan import plan_object
 from generator.spec import SpecError, read_specs
 from generator.spec.option import database_option, format_option
 from generator.spec.problem import SPEC, error_location, mark_of
@@ -283,8 +284,51 @@ def test_words_of_people():
         database_option("postgresql:/name")
 
 
-@pytest.mark.parametrize("block", ["print: {printer: ", "symbols: {alphabet: "])
-def test_a_file_of_settings_that_names_itself_is_refused(block):
-    Path("own.yaml").write_text("file: own.yaml\n")
-    with pytest.raises(SpecError, match=r"own\.yaml:1:7: error: this file names another one"):
-        spec(f"{CUBE}{block}{{file: own.yaml}}}}\n")
+def printed(printer):
+    return spec(f"{CUBE}print: {{printer: {printer}}}\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "bed", "nozzle", "layer", "stroke"),
+    [
+        ("{like: ender-3, layer: 0.15 mm, bed: 300 x 310 mm}", (300, 310), 0.4, 0.15, 0.8),
+        ("{bed: [10 in, 200 mm], stroke: 0.9 mm}", (254, 200), 0.4, 0.2, 0.9),
+        ("{like: ender-3, nozzle: 0.25 mm}", (220, 220), 0.25, 0.1, 0.5),
+        ("mine.yaml", (300, 300), 0.4, 0.12, 0.8),
+    ],
+)
+def test_a_spec_names_or_describes_its_printer(text, bed, nozzle, layer, stroke):
+    Path("mine.yaml").write_text("like: voron-300\nlayer: 0.12 mm\n")
+    printer = printed(text).printer
+    assert (printer.bed_mm, printer.nozzle_mm, printer.layer_mm) == (bed, nozzle, layer)
+    assert printer.stroke_min_mm == stroke
+
+
+def test_own_printers_count_by_their_values_known_ones_by_their_names():
+    def meaning(printer):
+        return printed(printer).meaning["printer"]
+
+    assert meaning("fdm-0.4") == meaning("{like: fdm-0.4}") == "fdm-0.4"
+    assert meaning("{layer: 0.15 mm}") == meaning("{layer: 0.15}") != meaning("{layer: 0.16}")
+
+
+@pytest.mark.parametrize(
+    ("printer", "wall", "height"),
+    [("fdm-0.4", 3.0, 1.0), ("{layer: 0.3 mm}", 3.0, 0.9), ("{layer: 0.28 mm}", 3.08, 1.12),
+     ("resin", 3.0, 1.0), ("{layer: 0.3 mm, nozzle: 1.0 mm, stroke: 1.9 mm}", 3.9, 0.9)],
+)  # fmt: skip
+def test_walls_and_symbols_are_whole_layers(printer, wall, height):
+    spec = printed(printer)
+    assert (spec.wall_mm, spec.style.height_mm) == (wall, height)
+    assert spec.wall_mm >= 2 * spec.printer.stroke_min_mm
+    layers = (spec.wall_mm - spec.printer.first_layer_mm) / spec.printer.layer_mm
+    assert layers == pytest.approx(round(layers))
+
+
+def test_layers_that_do_not_divide_what_was_asked_for_are_told():
+    (note,) = plan_object(printed("{layer: 0.3 mm}, wall: 3.5 mm")).notes
+    assert note == (
+        "walls of 3.5 mm print 3.6 mm, symbols of 0.9 mm print 0.9 mm high at layers of 0.3 mm: "
+        "wall 3.6 mm and height 0.9 mm are whole layers"
+    )
+    assert plan_object(printed("resin, wall: 3.5 mm")).notes == ()

@@ -18,6 +18,8 @@ CUBE = "name: Cube\nshape: {cube: 60 mm}\n"
 def _in_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "part.stl").write_text("solid")
+    (tmp_path / "mine.yaml").write_text("layr: 0.12 mm\n")
+    (tmp_path / "own.yaml").write_text("file: own.yaml\n")
 
 
 def refusal(*paths, text=None, database=None):
