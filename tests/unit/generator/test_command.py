@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import os
 import shutil
 import signal
 import sqlite3
@@ -159,15 +158,8 @@ def test_an_object_of_a_pitch_that_no_face_bears_is_called_damaged(cube, capsys)
 
 
 @pytest.mark.parametrize(("answer", "left"), [("n", 1), ("y", 0)])
-def test_a_person_is_asked_before_cells_are_freed(cube, answer, left, capsys):
-    ours, theirs = os.openpty()
-    os.write(ours, answer.encode() + b"\n")
-    done = subprocess.run(
-        [sys.executable, "-c", ENTRY, "retire", "Cube", "--free"],
-        stdin=theirs, capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
-    os.close(ours)
-    os.close(theirs)
+def test_a_person_is_asked_before_cells_are_freed(cube, answer, left, answered, capsys):
+    done = answered(answer, "retire", "Cube", "--free")
     assert "will be taken for other objects" in done.stderr
     assert done.returncode == left
     assert len(said(capsys, "list")["objects"]) == left

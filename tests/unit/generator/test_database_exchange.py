@@ -24,7 +24,6 @@ from generator.polyhedron.shapes import cube, tetrahedron
 
 FIRST = Path(__file__).parents[3] / "fixtures" / "database" / "v1.db"
 SOLIDS = {"Cube": cube(30.0), "Tetra": tetrahedron(40.0), "Other": tetrahedron(50.0)}
-ENGINES = ("sqlite", "postgresql")
 
 
 def make(url, name, *, profile="one-touch", solid=None, **spec):
@@ -57,8 +56,7 @@ def held(url, name):
 def sound(url):
     """Check that the bits of taken cells are those of the cells, and none is held twice."""
     with read_transaction(open_database(url, writable=False)) as connection:
-        numbers = {entry.array_id for entry in list_objects(connection)}
-        for number in numbers:
+        for number in {entry.array_id for entry in list_objects(connection)}:
             cells = held_cells(connection, number)[:, :2]
             assert np.array_equal(np.stack(occupied_cells(connection, number), axis=1), cells)
             assert len(np.unique(cells, axis=0)) == len(cells)

@@ -5,7 +5,6 @@ import re
 import shutil
 import signal
 import sqlite3
-import tempfile
 import time
 from contextlib import closing
 from pathlib import Path
@@ -124,24 +123,6 @@ def test_a_file_that_is_no_whole_database_is_left_alone(tmp_path, content):
     before = path.read_bytes()
     assert re.search("damaged|not a database|another program", refused(path))
     assert path.read_bytes() == before
-
-
-@pytest.fixture
-def unprivileged():
-    """A folder of its own, seen as a person who is not root: root may write anywhere."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        folder.chmod(0o755)
-        root = os.geteuid() == 0
-        if root:
-            os.chown(folder, 65534, 65534)
-            os.seteuid(65534)
-        try:
-            yield folder
-        finally:
-            if root:
-                os.seteuid(0)
-            folder.chmod(0o755)
 
 
 @pytest.fixture(scope="module")

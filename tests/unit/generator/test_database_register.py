@@ -2,10 +2,8 @@
 
 import math
 import os
-import resource
 import socket
 import sqlite3
-import threading
 from contextlib import closing
 from dataclasses import replace
 
@@ -21,7 +19,7 @@ from generator.array.definition import array_from
 from generator.array.profiles import PROFILES
 from generator.database import tables
 from generator.database.as_built import AsBuilt, read_as_built, write_as_built
-from generator.database.cells import find_array, held_cells, mark_cells, occupied_cells
+from generator.database.cells import mark_cells, occupied_cells
 from generator.database.open import open_database
 from generator.database.read import find_object, list_objects
 from generator.database.register import ObjectRecord, register, remove_object
@@ -80,11 +78,6 @@ def cube_engine(engine):
     return engine
 
 
-def test_the_same_spec_on_other_cells_is_refused(cube_engine):
-    with pytest.raises(DatabaseError, match="on other cells"):
-        register_one(cube_engine, cube_on(0, layout=layout_from(1)))
-
-
 def test_an_error_of_the_caller_undoes_everything(engine):
     def interrupted():
         with write_transaction(engine) as connection:
@@ -97,25 +90,26 @@ def test_an_error_of_the_caller_undoes_everything(engine):
         assert find_object(connection, "Cube") is None
 
 
-def test_objects_with_other_windows_stand_on_the_same_cells(engine):
-    """A window changes no symbol, so it must not open the array a second time."""
-    definition = ARRAY.definition()
-    other = array_from(definition | {"window": [4, 3]})
-    assert other.definition() != definition
-    register_one(engine, cube_on(0))
+def test_a_spec_keeps_its_cells_and_objects_with_other_windows_stand_on_the_same_ones(cube_engine):
+    with pytest.raises(DatabaseError, match="on other cells"):
+        register_one(cube_engine, cube_on(0, layout=layout_from(1)))
+    # a window changes no symbol, so it must not open the array a second time
+    other = array_from(ARRAY.definition() | {"window": [4, 3]})
+    assert other.definition() != ARRAY.definition()
     with pytest.raises(DatabaseError, match="another object holds"):
-        register_one(engine, cube_on(0, "Other", array=other))
+        register_one(cube_engine, cube_on(0, "Other", array=other))
 
 
 def test_impossible_registrations_are_refused_before_anything_is_written(engine):
-    with pytest.raises(ValueError, match="beyond the array"):
-        register_one(engine, cube_on(63 * 65 - 300))
     nowhere = layout_from(0)
     nowhere.faces[2].centres_mm[5, 1] = math.nan
-    with pytest.raises(ValueError, match="no place"):
-        register_one(engine, cube_on(0, layout=nowhere))
-    with pytest.raises(ValueError, match="mm"):
-        register_one(engine, cube_on(0, style=SymbolStyle(pitch_mm=6.0)))
+    for wrong, said in (
+        (cube_on(63 * 65 - 300), "beyond the array"),
+        (cube_on(0, layout=nowhere), "no place"),
+        (cube_on(0, style=SymbolStyle(pitch_mm=6.0)), "mm"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            register_one(engine, wrong)
 
 
 def test_face_types():
@@ -221,44 +215,7 @@ def test_prints_that_cannot_be_are_refused(cube_engine):
             write_as_built(connection, replace(MEASURED, **changes))
 
 
-# Writers that meet: who loses places anew, a bounded number of times, and says so in the end
-
-
-def placed(connection, name):
-    """Return an object on the first cells that are free."""
-    taken = occupied_cells(connection, find_array(connection, ARRAY))
-    return cube_on(len(taken[0]), name)
-
-
-def test_the_loser_of_a_race_places_anew(lab_url):
-    """Both choose their cells before their turn: the same ones."""
-    engine = open_database(lab_url)
-    both_placed = threading.Barrier(2, timeout=30)
-    tries = {"a": 0, "b": 0}
-
-    def write(name):
-        with read_transaction(open_database(lab_url)) as connection:
-            early = placed(connection, name)
-        both_placed.wait()
-
-        def work(connection):
-            tries[name] += 1
-            mine = early if tries[name] == 1 else placed(connection, name)
-            return register(connection, mine)
-
-        retry_on_conflict(engine, work)
-
-    writers = [threading.Thread(target=write, args=(name,)) for name in tries]
-    for writer in writers:
-        writer.start()
-    for writer in writers:
-        writer.join(60)
-    assert sorted(tries.values()) == [1, 2]
-    with read_transaction(engine) as connection:
-        entries = list_objects(connection)
-        cells = held_cells(connection, 1)
-    assert [entry.name for entry in entries] == ["a", "b"]
-    assert len(np.unique(cells[:, :2], axis=0)) == sum(entry.symbols for entry in entries) > 40
+# Writers that meet: who loses tries again, a bounded number of times, and says so in the end
 
 
 def test_a_lost_race_leaves_nothing_and_who_always_loses_says_why(cube_engine):
@@ -321,15 +278,10 @@ def test_work_that_a_server_does_not_complete_is_no_damage(new_database):
         retry_on_conflict(engine, work)
 
 
-def test_no_room_for_a_database_is_no_damage(tmp_path):
-    engine = open_database(str(tmp_path / "lab.db"))
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, hard))
-    try:
-        with pytest.raises(DatabaseError, match=r"cannot be read or written|no space") as caught:
-            retry_on_conflict(engine, lambda at: register(at, cube_on(0)))
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+def test_no_room_for_a_database_is_no_damage(tmp_path, room_for):
+    engine, said = open_database(str(tmp_path / "lab.db")), "cannot be read or written|no space"
+    with room_for(8192), pytest.raises(DatabaseError, match=said) as caught:
+        retry_on_conflict(engine, lambda at: register(at, cube_on(0)))
     assert "space" in caught.value.fix
     with read_transaction(engine) as connection:
         assert list_objects(connection) == ()

@@ -1,11 +1,14 @@
-"""What files hold as numbers, packages as zipfile reads them, plates, and triangles that cross.
+"""What files hold as numbers, packages, plates, triangles that cross; all files or none.
 
 Pairs of triangles cut, touch or overlap, and do the same after turning and scaling.
 """
 
-from __future__ import annotations
-
+import hashlib
 import io
+import signal
+import subprocess
+import sys
+import time
 import zipfile
 from itertools import combinations, permutations
 
@@ -14,8 +17,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from generator.errors import WriteError
+from generator.errors import GeneratorError, WriteError
 from generator.export import threemf as package_module
+from generator.export.atomic import Staging
 from generator.export.bed import arrange_plates
 from generator.export.check import cut_triangles, perhaps_folded, triangles_cross
 from generator.export.fixed_text import decimal_numbers, decimal_width, number_lines
@@ -237,3 +241,96 @@ def test_folded_neighbours_are_found():
     for corner, folded in ((3, [0, 1]), (4, []), (5, [0, 1])):
         found = perhaps_folded(points, np.array([[0, 1, 2], [1, 0, corner]]))
         assert found.tolist() == folded
+
+
+def hidden(folder):
+    return [path.name for path in folder.glob(".encode-object-*")]
+
+
+def test_commit_moves_all_files_and_leaves_nothing_hidden(tmp_path):
+    (tmp_path / "a.stl").write_bytes(b"old")
+    with Staging(tmp_path) as staging:
+        first = staging.write("a.stl", b"new")
+        staging.write("b.step", (piece for piece in (b"one", memoryview(b"two"))), digest=True)
+        assert (tmp_path / "a.stl").read_bytes() == b"old"
+        assert not (tmp_path / "b.step").exists()
+        committed = staging.commit()
+    assert (tmp_path / "a.stl").read_bytes() == b"new"
+    assert (tmp_path / "b.step").read_bytes() == b"onetwo"
+    assert committed[0] == first
+    assert [one.sha256 for one in committed] == ["", hashlib.sha256(b"onetwo").hexdigest()]
+    assert committed[1].size == 6
+    assert hidden(tmp_path) == []
+
+
+def test_an_error_leaves_no_file_and_no_folder(tmp_path):
+    def pieces():
+        yield b"abc"
+        raise KeyError
+
+    with pytest.raises(KeyError), Staging(tmp_path / "out" / "cube") as staging:
+        staging.write("a.stl", pieces())
+    assert list(tmp_path.iterdir()) == []
+
+
+_WRITER = """
+import sys, time
+from generator.export.atomic import Staging
+with Staging(sys.argv[1]) as staging:
+    staging.write("a.stl", b"x" * 100000)
+    print("written", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_leftovers_of_a_killed_process_are_removed_and_those_of_a_living_one_kept(tmp_path):
+    with subprocess.Popen(
+        [sys.executable, "-c", _WRITER, str(tmp_path)], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "written\n"
+        left = hidden(tmp_path)
+        assert len(left) == 1
+        with Staging(tmp_path) as staging:
+            assert left[0] in hidden(tmp_path)  # its owner is at work
+            staging.write("b.stl", b"b")
+            staging.commit()
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    assert hidden(tmp_path) == left
+    assert not (tmp_path / "a.stl").exists()
+    deadline = time.monotonic() + 10
+    while hidden(tmp_path) and time.monotonic() < deadline:
+        with Staging(tmp_path):
+            pass
+    assert [path.name for path in tmp_path.iterdir()] == ["b.stl"]
+
+
+def test_names_that_cannot_be_written(tmp_path):
+    (tmp_path / "a.stl").mkdir()
+    for name, said, fix in (("a.stl", "Is a directory", ""), ("a" * 300, "too long", "shorter")):
+        with pytest.raises(GeneratorError, match=said) as caught, Staging(tmp_path) as staging:
+            staging.write(name, b"")
+        assert caught.value.place == str(tmp_path / name)
+        assert fix in caught.value.fix
+        assert [path.name for path in tmp_path.iterdir()] == ["a.stl"]
+    with pytest.raises(GeneratorError, match="too long") as caught, Staging(tmp_path / ("a" * 300)):
+        pass
+    assert caught.value.fix == "choose a folder of a shorter name with -o"
+
+
+def test_no_room_for_the_file(tmp_path, room_for):
+    refused = pytest.raises(GeneratorError, match="cannot write the file")
+    with room_for(1000), refused as caught, Staging(tmp_path) as staging:
+        staging.write("a.stl", (b"x" * 600 for _ in range(20)))
+    assert caught.value.place.endswith("a.stl")
+    assert "-o" in caught.value.fix
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_may_not_be_written(unprivileged):
+    unprivileged.chmod(0o555)
+    refused = pytest.raises(GeneratorError, match="Permission denied")
+    with refused as caught, Staging(unprivileged):
+        pass
+    assert caught.value.place == str(unprivileged)
+    assert "may write" in caught.value.fix
