@@ -1,7 +1,5 @@
 """Solids: closed forms, winged edges and their checks, frames, flattening, covered faces."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 
@@ -16,7 +14,6 @@ from generator.polyhedron import (
     Face,
     Polyhedron,
     dihedral,
-    face_area,
     face_frame,
     face_normal,
     flatten,
@@ -27,40 +24,6 @@ from generator.polyhedron.flatten import flatten_faces
 from generator.polyhedron.front import covered_parts
 from generator.polyhedron.shapes import cone, cylinder
 from generator.polyhedron.winged import winged_edges
-
-R2, R3, R5 = math.sqrt(2), math.sqrt(3), math.sqrt(5)
-HEXAGON = 1.5 * R3 * 40**2
-PYRAMID_SIDE = 0.5 * 60 * math.hypot(50, 30)
-
-# name, arguments, faces, volume mm^3, area mm^2, cosine of the angle at every edge
-CLOSED_FORMS = [
-    ("cube", {"side": 60}, 6, 60**3, 6 * 60**2, 0),
-    ("box", {"size": (80, 80, 120)}, 6, 768000, 51200, 0),
-    ("triangular_prism", {"side": 80, "height": 120}, 5,
-     R3 / 4 * 80**2 * 120, R3 / 2 * 80**2 + 3 * 80 * 120, None),
-    ("tetrahedron", {"side": 120}, 4, 120**3 / (6 * R2), R3 * 120**2, 1 / 3),
-    ("octahedron", {"side": 60}, 8, R2 / 3 * 60**3, 2 * R3 * 60**2, -1 / 3),
-    ("dodecahedron", {"side": 40}, 12,
-     (15 + 7 * R5) / 4 * 40**3, 3 * math.sqrt(25 + 10 * R5) * 40**2, -1 / R5),
-    ("prism", {"sides": 6, "side": 40, "height": 60}, 8,
-     HEXAGON * 60, 2 * HEXAGON + 6 * 40 * 60, None),
-    ("prism", {"sides": 6, "radius": 40, "height": 60}, 8,
-     HEXAGON * 60, 2 * HEXAGON + 6 * 40 * 60, None),
-    ("pyramid", {"sides": 4, "side": 60, "height": 50}, 5,
-     60**2 * 50 / 3, 60**2 + 4 * PYRAMID_SIDE, None),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("case", CLOSED_FORMS, ids=lambda case: f"{case[0]}-{case[1]}")
-def test_closed_forms(case):
-    name, arguments, faces, mm3, mm2, cosine = case
-    solid = SHAPES[name](**arguments)
-    assert (solid.kind, len(solid.faces), solid.notes) == (name, faces, ())
-    assert (solid.euler_characteristic, solid.genus) == (2, 0)
-    assert volume(solid) == pytest.approx(mm3, rel=1e-13)
-    assert sum(face_area(solid, k) for k in range(faces)) == pytest.approx(mm2, rel=1e-13)
-    for edge in range(len(solid.edges)) if cosine is not None else ():
-        assert dihedral(solid, edge) == pytest.approx(math.acos(cosine), abs=2e-14)
 
 
 def test_faces_of_a_cube_lie_where_the_documentation_says():
