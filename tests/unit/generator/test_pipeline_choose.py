@@ -1,12 +1,11 @@
 """`profile: auto`, and what is told of each face."""
 
-from __future__ import annotations
-
 import shutil
 from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from reference.cells import listed
 
 from generator.database.open import existing_database, open_if_there
 from generator.database.register import retire
@@ -26,14 +25,13 @@ def specs(folder, text):
     return read_specs([file])
 
 
-def dry(folder, text, **options):
-    url = f"sqlite:///{folder / 'lab.db'}"
-    options = {"dry_run": True} | options
-    return encode(specs(folder, text), database=url, folder=folder / "out", **options)
+def dry(folder, text, *, dry_run=True, **options):
+    here = {"database": f"sqlite:///{folder / 'lab.db'}", "folder": folder / "out"}
+    return encode(specs(folder, text), dry_run=dry_run, **here, **options)
 
 
-def made(folder, text, **options):
-    return dry(folder, text, **({"dry_run": False, "formats": ()} | options))
+def made(folder, text, *, formats=(), **options):
+    return dry(folder, text, dry_run=False, formats=formats, **options)
 
 
 def choice(folder, text):
@@ -137,10 +135,7 @@ def test_printed_parts_of_a_replaced_object_are_not_read_as_the_new_one(tmp_path
     def cells_and_warnings(make, side, printer, *formats):
         text = f"name: A\nshape: {{cube: {side} mm}}\nprint: {{printer: {printer}}}\n"
         (one,) = make(tmp_path, text, replace=True, formats=formats).objects
-        cells = {
-            cell for face in one.layout.faces
-            for cell in zip(face.rows.tolist(), face.columns.tolist(), strict=True)
-        }  # fmt: skip
+        cells = {cell for face in one.layout.faces for cell in listed((face.rows, face.columns))}
         return cells, " ".join(one.warnings)
 
     first, said = cells_and_warnings(made, 60, "fdm-0.4", "step", "stl")
@@ -213,13 +208,15 @@ def test_what_cannot_be_made_is_refused_where_it_is_asked_for(tmp_path, settings
         dry(tmp_path, f"name: A\nshape: {{{settings}")
 
 
-def test_panels_that_leave_a_sharp_edge_open_say_so(tmp_path):
+def test_a_sharp_edge_that_stays_open_and_a_part_larger_than_the_bed_are_told(tmp_path):
     points = "[[0,0,0],[100,0,0],[100,0,20],[0,40,0],[100,40,0],[100,40,20]]"
     faces = "[[0,1,2],[3,5,4],[0,3,4,1],[1,4,5,2],[0,2,5,3]]"
     text = f"name: A\nshape:\n  polyhedron: {{vertices: {points}, faces: {faces}}}\n"
     for settings, said in (("", True), ("print: {parts: whole}\n", False)):
         (one,) = dry(tmp_path, text + settings).objects
         assert any("stays open: F3 and F5 (28 mm)" in note for note in one.warnings) == said
+    (one,) = dry(tmp_path, "name: A\nshape: {tag: 400 x 20 mm}\n").objects
+    assert "larger than the bed of fdm-0.4, 250 x 210 mm: A; take a larger printer" in one.warnings
 
 
 def test_a_retired_name_is_refused_by_a_dry_run_too(tmp_path):
@@ -229,9 +226,3 @@ def test_a_retired_name_is_refused_by_a_dry_run_too(tmp_path):
         retire(connection, "A")
     with pytest.raises(DatabaseError, match="was retired"):
         dry(tmp_path, text.format(35), replace=True)
-
-
-def test_a_part_larger_than_the_bed_is_told_before_it_is_made(tmp_path):
-    (one,) = dry(tmp_path, "name: A\nshape: {tag: 400 x 20 mm}\n").objects
-    said = "larger than the bed of fdm-0.4, 250 x 210 mm: A; take a larger printer"
-    assert said in one.warnings

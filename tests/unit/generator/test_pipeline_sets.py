@@ -1,27 +1,35 @@
-"""Sets: in parallel, resumable, with plates, overview and packing list."""
-
-from __future__ import annotations
+"""Sets: in parallel, resumable, on no cell twice; what is said of faces and of supports."""
 
 import hashlib
 import pickle
+import re
 import shutil
+import zipfile
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from random_shapes import extruded
+from reference.cells import listed
 
 from encoded_objects.base.document import Problem
+from generator.command.made_report import next_step, rate_lines
 from generator.database.open import open_database
 from generator.database.read import read_layout
 from generator.database.transaction import read_transaction
-from generator.errors import DatabaseError, WriteError
+from generator.errors import DatabaseError, PrintError, WriteError
+from generator.layout.recognition_rate import LOW
 from generator.pipeline import encode
+from generator.pipeline.faces import face_reports, whole_rate
 from generator.pipeline.files import parts_of
 from generator.pipeline.make import MakeJob, make_at, make_under_lock
 from generator.pipeline.parallel import Task, Workers
-from generator.pipeline.place import place_object
+from generator.pipeline.place import NO_CELLS, lay_out_object, place_object
 from generator.pipeline.plan import plan_object
 from generator.pipeline.progress import no_progress
+from generator.printed.slicer import PlateCost, read_cost
 from generator.spec import SpecError, read_specs
+from generator.spec.read import tree_from
 
 SET = """\
 output: {formats: [stl]}
@@ -93,15 +101,12 @@ def test_a_changed_spec_in_a_set_is_refused_and_the_rest_stays(there):
     assert [made.reused for made in replaced.objects] == [False, True, True]
 
 
-def cells_held(engine):
-    """Every cell of A and B, as the database has them."""
+def check_cells(engine, symbols):
+    """Check that A and B hold so many cells, none of them twice."""
     with read_transaction(engine) as connection:
-        return [
-            cell
-            for name in "AB"
-            for face in read_layout(connection, name).faces
-            for cell in zip(face.rows.tolist(), face.columns.tolist(), strict=True)
-        ]
+        faces = [face for name in "AB" for face in read_layout(connection, name).faces]
+    cells = [cell for face in faces for cell in listed((face.rows, face.columns))]
+    assert len(set(cells)) == len(cells) == symbols
 
 
 def two_jobs(folder):
@@ -118,27 +123,24 @@ def test_an_object_whose_cells_another_writer_took_is_placed_again(tmp_path):
     second = make_at(engine, jobs[1], chosen[1])  # both chose the same corner
     assert first.layout is chosen[0].layout
     assert second.layout is not chosen[1].layout
-    cells = cells_held(engine)
-    assert len(set(cells)) == len(cells) == first.symbols + second.symbols
+    check_cells(engine, first.symbols + second.symbols)
     again = make_at(engine, jobs[0], chosen[0])  # another writer made it meanwhile
     assert (again.reused, again.symbols) == (True, first.symbols)
 
 
 def test_a_dry_build_counts_while_the_array_is_empty(tmp_path):
     engine, jobs = two_jobs(tmp_path)
-    dry = []
-    for job in jobs:
-        placed = place_object(None, job.plan, replace=False)
-        dry.append(replace(placed, built=parts_of(job.plan, placed.layout)))
-    first = make_under_lock(engine, jobs[0], dry_build=dry[0])
-    second = make_under_lock(engine, jobs[1], dry_build=dry[1])
-    again = make_under_lock(engine, jobs[0], dry_build=dry[0])
+    dry = [place_object(None, job.plan, replace=False) for job in jobs]
+    dry = [
+        replace(one, built=parts_of(job.plan, one.layout))
+        for job, one in zip(jobs, dry, strict=True)
+    ]
+    first, second, again = (make_under_lock(engine, jobs[k], dry_build=dry[k]) for k in (0, 1, 0))
     assert first.layout is dry[0].layout
     assert second.layout is not dry[1].layout  # the first one's cells were free then
     assert again.layout is not dry[0].layout  # registered: its own cells
     assert again.reused
-    cells = cells_held(engine)
-    assert len(set(cells)) == len(cells) == first.symbols + second.symbols
+    check_cells(engine, first.symbols + second.symbols)
 
 
 def test_errors_come_back_from_other_processes():
@@ -149,18 +151,12 @@ def test_errors_come_back_from_other_processes():
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
 
 
-@pytest.mark.parametrize(
-    "second",
-    ["{name: B, shape: {box: [60, 60, 5]}}", "{name: B, shape: {cube: 60}, copies: 12}"],
-    ids=["cannot be made", "no room"],
-)
-def test_a_refused_set_leaves_no_database(tmp_path, second):
-    with pytest.raises(SpecError):
-        run(
-            tmp_path,
-            f"objects:\n- {{name: A, shape: {{cube: 60}}}}\n- {second}\nprofile: one-touch\n",
-        )
-    assert [file.name for file in tmp_path.iterdir()] == ["lab-set.yaml"]
+def test_a_refused_set_leaves_no_database(tmp_path):
+    text = "profile: one-touch\nobjects:\n- {name: A, shape: {cube: 60}}\n- {name: B, shape: %s}\n"
+    for cannot_be_made_or_has_no_room in ("{box: [60, 60, 5]}", "{cube: 60}, copies: 12"):
+        with pytest.raises(SpecError):
+            run(tmp_path, text % cannot_be_made_or_has_no_room)
+        assert [file.name for file in tmp_path.iterdir()] == ["lab-set.yaml"]
 
 
 def test_what_cannot_be_written_leaves_no_database_that_is_new(tmp_path):
@@ -173,3 +169,94 @@ def test_what_cannot_be_written_leaves_no_database_that_is_new(tmp_path):
     with pytest.raises(WriteError):
         run(tmp_path)
     assert (tmp_path / "lab.db").exists()
+
+
+def reported(shape, profile="one-touch"):
+    """Return what is said of an object on an empty array: faces by name, and the lines."""
+    spec = {"name": "A", "shape": shape, "profile": profile}
+    plan = plan_object(*read_specs([tree_from(spec)]))
+    layout = lay_out_object(plan, NO_CELLS)
+    faces = face_reports(plan, layout)
+    return {one.name: one for one in faces}, rate_lines(faces, whole_rate(plan, layout, faces))
+
+
+def bracket(width, height, t):
+    """Return an L of two plates along y, `t` mm thick and deep."""
+    outline = np.array([(0, 0), (width, 0), (width, t), (t, t), (t, height), (0, height)], float)
+    solid = extruded([outline], t, pose=np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]))
+    faces = [list(face.loops[0]) for face in solid.faces]
+    return {"polyhedron": {"vertices": solid.vertices.tolist(), "faces": faces}}
+
+
+def test_a_bracket_of_narrow_legs_is_not_readable_and_says_so():
+    faces, lines = reported(bracket(70, 60, 12))
+    assert faces["F3"].place == "the 12 x 70 mm face at z = 0"
+    assert faces["F6"].place == "the 12 x 48 mm face at x = 12"
+    for name in ("F1", "F3", "F5", "F6", "F8"):
+        assert faces[name].promise.one_row
+        assert faces[name].promise.at_once < 0.25
+    assert faces["F5"].promise.meets == ("F6",)  # the base and the wall on it
+    assert faces["F6"].promise.meets == ("F5",)
+    assert (faces["F4"].symbols, faces["F4"].promise.at_once) == (0, 0.0)
+    said = "F4, the 12 x 12 mm face at x = 70 (and F7, as narrow): not readable: it is blank"
+    assert said in "\n".join(lines)
+    assert "not readable by single touches: one row of symbols" in "\n".join(lines)
+    assert "of touches anywhere on the part" in lines[0]
+
+
+def test_a_face_beside_a_wall_says_what_the_sensor_meets():
+    faces, lines = reported(bracket(75, 80, 25), "auto")
+    (line,) = [one for one in lines if one.startswith("  F5, ")]
+    assert "the sensor meets F6 at " in line
+    low = faces["F5"].promise
+    assert low.blocked > 0.1
+    assert low.at_once < 1 - low.blocked
+
+
+def test_what_would_help_does_help():
+    def narrow_face(width):
+        faces, _ = reported({"box": [80, 40, width]})
+        return next(f for f in faces.values() if sorted(f.size_mm) == pytest.approx([width, 80]))
+
+    face = narrow_face(14)
+    assert face.promise.at_once < LOW
+    again = narrow_face(float(face.promise.remedy.split(" mm wide instead of 14")[0]))
+    assert again.promise.at_once > LOW - 0.03
+    assert again.promise.remedy == ""
+
+
+def test_what_a_slicer_reckons():
+    time = "; estimated printing time (normal mode) = 1d 2h 36m 45s\n"
+    assert read_cost("; total filament used [g] = 22.41\n" + time) == PlateCost(1597, 22.41)
+    assert str(PlateCost(157, 22.41)) == "2 h 37 min, 22 g"
+    with pytest.raises(PrintError, match="no time"):
+        read_cost("; nothing\n")
+
+
+@pytest.mark.parametrize(
+    ("shape", "how", "said"),
+    [
+        ({"cube": 40}, {"parts": "whole"}, "no supports"),
+        ({"dodecahedron": 25}, {"parts": "whole", "printer": {"overhang": 10}},
+         "supports needed under F"),
+        ({"box": "40 x 40 x 30 mm"}, {"parts": "panels"}, "no supports"),
+    ],
+)  # fmt: skip
+def test_sheet_advice_and_slicer_project_agree_on_supports(tmp_path, shape, how, said):
+    specs = read_specs([tree_from({"name": "A", "shape": shape, "print": how})])
+    url = f"sqlite:///{tmp_path}/l.db"
+    made = encode(specs, folder=tmp_path, database=url, formats=("3mf",), jobs=1)
+    sheet = (tmp_path / "A-build.html").read_text()
+    assert said in sheet
+    assert said in next_step(made)
+    assert re.findall(r"(?:src|href)=\"(?!#|data:)([^\"]*)", sheet) == []  # no network
+    wanted = "0" if said.startswith("no") else "1"
+    for project in tmp_path.glob("*-prusaslicer.3mf"):
+        with zipfile.ZipFile(project) as package:
+            settings = package.read("Metadata/Slic3r_PE.config").decode()
+            of_object = package.read("Metadata/Slic3r_PE_model.config").decode()
+        assert f"; support_material = {wanted}\n" in settings
+        assert set(re.findall(r'support_material" value="(.)"', of_object)) == {wanted}
+    if shape == {"cube": 40}:
+        way = r"F1 down, no supports needed, \d+ symbols stand out sideways; with  parts: .*"
+        assert re.fullmatch(way, made.objects[0].lying)

@@ -4,8 +4,6 @@ What faults do to touches of a print is in the corpus `counts`, and on a whole p
 `tests/loop/test_printed_panel.py`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """G-code of four slicers, coordinates of every kind, arcs, and what is wrong with a file."""
 
-from __future__ import annotations
-
 import io
 import math
 import zipfile
@@ -25,25 +23,17 @@ def widths(path):
     return path.volume_mm3[laid] / path.length_mm[laid] / h + h * (1 - math.pi / 4)
 
 
-@pytest.mark.parametrize(
-    ("name", "roles"),
-    [
-        ("cura", {"outer wall", "solid"}),
-        ("bambu", {"outer wall", "top"}),
-        ("orca", {"outer wall", "top"}),
-    ],
-)
-def test_every_dialect_gives_the_same_square_and_half_circle(name, roles):
+@pytest.mark.parametrize(("name", "over"), [("cura", "solid"), ("bambu", "top"), ("orca", "top")])
+def test_every_dialect_gives_the_same_square_and_half_circle(name, over):
     path = read_gcode(FILES / f"{name}.gcode")
     laid = path.of_part
     assert path.dialect == name
-    assert {ROLES[role] for role in path.role[laid]} == roles
+    assert {ROLES[role] for role in path.role[laid]} == {"outer wall", over}
     assert path.height_mm[laid] == pytest.approx(0.2)
     square = laid & (path.end_mm[:, 2] < 0.3)
     half = laid & ~square
-    assert path.end_mm[square] == pytest.approx(
-        np.array([[110, 100, 0.2], [110, 110, 0.2], [100, 110, 0.2], [100, 100, 0.2]])
-    )
+    corners = [[110, 100, 0.2], [110, 110, 0.2], [100, 110, 0.2], [100, 100, 0.2]]
+    assert path.end_mm[square] == pytest.approx(np.array(corners))
     assert path.length_mm[half].sum() == pytest.approx(5 * math.pi, abs=0.02)
     assert np.hypot(*(path.end_mm[half, :2] - 105).T) == pytest.approx(5.0, abs=1e-3)
     assert path.volume_mm3[square].sum() == pytest.approx(40 * SECTION, rel=1e-3)

@@ -1,7 +1,5 @@
 """Printed surfaces in files, and symbols on them: as designed, moved, worn, swapped, gone."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -90,11 +88,10 @@ def test_a_key_follows_from_what_decides_the_surface_alone(monkeypatch):
     known = surface_keys(job, plan)
     assert surface_keys(replace(job, file=Path("elsewhere.stl"), name="Other"), plan) == known
     moved = replace(face.embossing, T_part_facet=np.eye(4))
+    fine, plans = "fdm-0.4-0.2", [("fdm-0.4-0.3", "usual", 3)]
+    plans += [(fine, "bad", 3), (fine, "usual,flow=1.03", 3), (fine, "usual", 4)]
     others = [
-        surface_keys(job, print_plan("fdm-0.4-0.3", "usual", 3)),
-        surface_keys(job, print_plan("fdm-0.4-0.2", "bad", 3)),
-        surface_keys(job, print_plan("fdm-0.4-0.2", "usual,flow=1.03", 3)),
-        surface_keys(job, print_plan("fdm-0.4-0.2", "usual", 4)),
+        *(surface_keys(job, print_plan(*one)) for one in plans),
         surface_keys(replace(job, sha256="cd" * 32), plan),
         surface_keys(replace(job, supports=True), plan),
         surface_keys(replace(job, faces=(replace(face, embossing=moved),)), plan),
