@@ -2,6 +2,7 @@
 
 import re
 import secrets
+from functools import partial
 from itertools import combinations
 from math import gcd
 from pathlib import Path
@@ -33,14 +34,11 @@ from generator.errors import ArrayError, LabKeyError
 
 KEY = "0123-4567-89AB-CDER"
 KEYS = [lab_key_of(np.random.default_rng(seed).bytes(16)) for seed in range(20)]
-
-
 ORDER_32 = Profile(
     "order-32", {"family": "prmva", "order": 32, "degree": 3, "rows": 151, "columns": 217}, (3, 1),
     "own", 5.0, keyed=True,
 )  # fmt: skip
 SMALLEST = (profile("large"), profile("tactel-8"), profile("tactel-16"), ORDER_32)
-by_order = pytest.mark.parametrize("smallest", SMALLEST, ids=lambda one: one.name)
 
 
 @pytest.mark.parametrize("smallest", [profile("one-touch"), *SMALLEST], ids=lambda one: one.name)
@@ -59,9 +57,8 @@ def test_keys_give_arrays_of_their_own(smallest):
     assert worst <= rival_shares(published, sets).poses[0] + 0.06
 
 
-@by_order
-def test_larger_sizes_have_keys_too(smallest):
-    size = smallest
+@pytest.mark.parametrize("size", SMALLEST, ids=lambda one: one.name)
+def test_larger_sizes_have_keys_too(size):
     for _ in range(3):
         size = next_larger(size)
         array = size.array_of_lab(KEYS[0])
@@ -101,11 +98,8 @@ def test_decimation_gives_every_primitive_polynomial(order, degree, number):
     assert going_on.symbols(range(len(terms))).tolist() == terms
 
 
-def small(**options):
-    return FoldedArray(Sequence(field_of_order(4), (2, 1, 1)), 3, 5, **options)
-
-
 def test_a_permutation_changes_symbols_and_no_rank():
+    small = partial(FoldedArray, Sequence(field_of_order(4), (2, 1, 1)), 3, 5)
     plain, changed = small(), small(permutation=(2, 0, 1, 3), first=(1, 4))
     rows, columns = np.indices((3, 5))
     terms, shown = plain.symbols(rows, columns), changed.symbols(rows, columns)
@@ -114,8 +108,7 @@ def test_a_permutation_changes_symbols_and_no_rank():
     assert changed.terms_of([-1, 2]).tolist() == [-1, 0]
     assert changed.rank([0, 0], [0, 1]) == plain.rank([0, 0], [0, 1])
     assert (plain.first, changed.first) == ((0, 0), (1, 4))
-    assert "permutation" not in plain.definition()
-    assert "first" not in plain.definition()
+    assert not {"permutation", "first"} & set(plain.definition())
     assert array_key(changed) == array_key(small(permutation=(2, 0, 1, 3)))  # not by `first`
     assert array_key(changed) != array_key(plain)
     for wrong in ((0, 1, 2, 2), (1, 2, 3, 4)):
@@ -158,7 +151,6 @@ def test_every_wrong_character_and_every_exchange_is_found():
             read_lab_key(typed)
 
 
-SENSOR = (12.7, 12.7)
 SMALL = [(2, 15, 17), (3, 5, 16), (4, 7, 9), (5, 4, 31), (8, 7, 9), (16, 15, 17), (32, 31, 33)]
 
 
@@ -186,13 +178,12 @@ def test_rivals_are_those_found_by_comparing_all_places(order, height, width):
 
 def test_the_guide_says_how_many_rivals_the_profiles_have():
     text = (Path(__file__).parents[3] / "docs" / "folds.md").read_text()
-    sets = visible_sets(7.0, SENSOR, 2.52)
+    sets = visible_sets(7.0, (12.7, 12.7), 2.52)
     for name in ("one-touch", "large"):
         array = profile(name).array()
         (row,) = re.findall(rf"\| {array.rows}x{array.columns} `{name}`.*? \| (.*?) \|", text)
         poses, rivals = row.rstrip(")").split(" (")
         shares = rival_shares(array, sets)
-        assert [float(share) for share in poses.split(" / ")] == pytest.approx(
-            [100 * share for share in shares.poses], abs=0.51
-        )
+        wanted = pytest.approx([100 * share for share in shares.poses], abs=0.51)
+        assert [float(share) for share in poses.split(" / ")] == wanted
         assert float(rivals) == pytest.approx(shares.rivals[0], abs=0.01)

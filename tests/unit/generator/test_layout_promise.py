@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import shapely
+from random_shapes import extruded
 
 from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet.outline import SymbolStyle
@@ -19,7 +20,7 @@ from generator.layout.sensor_view import (
     face_views,
     round_views,
 )
-from generator.polyhedron import face_polygon, polyhedron, shapes
+from generator.polyhedron import face_polygon, shapes
 from generator.polyhedron.development import development
 from generator.polyhedron.frame import face_frame, face_normal
 
@@ -83,15 +84,6 @@ def test_a_type_of_your_own_is_taken_for_the_one_most_like_it():
     assert answered_share(same) is None
 
 
-def profile_solid(outline, depth=60.0):
-    """A solid of this outline (x, z) along y."""
-    n = len(outline)
-    vertices = [[x, y, z] for y in (0, depth) for x, z in outline]
-    faces = [list(range(n)), list(range(2 * n - 1, n - 1, -1))]
-    faces += [[k, k + n, (k + 1) % n + n, (k + 1) % n] for k in range(n)]
-    return polyhedron("profile", vertices, faces)
-
-
 STAIRS = [(0, 0), (120, 0), (120, 20), (80, 20), (80, 35), (40, 35), (40, 50), (0, 50)]
 RAMP = [(0, 0), (110, 0), (110, 50), (60, 20), (0, 20)]
 LOW = [(0, 0), (90, 0), (90, 20), (45, 20), (45, 20.9), (0, 20.9)]  # a step lower than a symbol
@@ -110,7 +102,8 @@ def above(corners, height):
 
 @pytest.mark.parametrize("outline", [STAIRS, RAMP, LOW])
 def test_a_sensor_meets_what_rises_inside_its_rectangle(outline):
-    solid, height = profile_solid(outline), 1.0
+    along_y = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # outlines are (x, z)
+    solid, height = extruded([np.array(outline, float)], 60.0, pose=along_y), 1.0
     for number in range(len(solid.faces)):
         loops, frame = face_polygon(solid, number), face_frame(solid, number)
         views = face_views(loops, lattice(loops[0]), 7.0, VIEW, 60)

@@ -1,7 +1,5 @@
 """Panels: mitres, insets, texts on backs; no overlap, the gap wherever they meet, whole symbols."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

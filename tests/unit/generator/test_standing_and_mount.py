@@ -1,20 +1,19 @@
 """What a part stands on, and by what it is held: blank faces, tags, holes."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from random_shapes import extruded
 
 from encoded_objects import encode
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
 from generator.errors import DatabaseError
-from generator.polyhedron import SHAPES, polyhedron, volume
+from generator.polyhedron import SHAPES, volume
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.mount import FLANGES, SCREWS, Mount, with_mount
 from generator.polyhedron.read import read_shape
@@ -45,16 +44,13 @@ def bearing(folder):
     return {known.polyhedron.faces[face].name for face in on}
 
 
-def extruded(outline, depth=30.0):
-    """Return a prism along y over an outline (x, z), clockwise as seen from -y."""
-    n = len(outline)
-    points = [(x, y, z) for y in (0.0, depth) for x, z in outline]
-    sides = [(i, (i + 1) % n, (i + 1) % n + n, i + n) for i in range(n)]
-    front, back = tuple(range(n))[::-1], tuple(range(n, 2 * n))
-    return polyhedron("polyhedron", points, [*sides, front, back])
+TEE = [(10, 0), (10, 20), (30, 20), (30, 30), (-20, 30), (-20, 20), (0, 20), (0, 0)]
 
 
-TEE = [(0, 0), (0, 20), (-20, 20), (-20, 30), (30, 30), (30, 20), (10, 20), (10, 0)]
+def along_y(outline, depth=30.0):
+    """Return a prism along y over an outline (x, z), counter-clockwise as seen from -y."""
+    pose = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    return extruded([np.array(outline, float)], depth, pose=pose)
 
 
 def stance(solid):
@@ -71,17 +67,17 @@ def test_the_models_own_way_up_is_kept_where_little_hangs_over():
 
 
 def test_a_solid_that_would_hang_over_or_fall_is_turned():
-    solid = extruded(TEE)
+    solid = along_y(TEE)
     found = stance(solid)
     assert (found.as_modelled, found.overhang_mm2) == (False, 0.0)
     up = solid.vertices @ found.R_bed_object[2]
     assert up[list(solid.faces[found.face].loops[0])] == pytest.approx(up.min())
     assert np.linalg.det(found.R_bed_object) == pytest.approx(1.0)
     # nothing stands on faces that others reach below
-    assert all(stance_on(solid, ceiling, SINE) is None for ceiling in (1, 5))
+    assert all(stance_on(solid, ceiling, SINE) is None for ceiling in (3, 7))
     assert not stance(SHAPES["octahedron"](60)).as_modelled  # it stood on a corner
     assert stance(SHAPES["box"]((10.0, 40.0, 200.0))).contact_mm2 == pytest.approx(40 * 200)
-    leaning = extruded([(0, 0), (60, 80), (70, 80), (10, 0)])
+    leaning = along_y([(10, 0), (70, 80), (60, 80), (0, 0)])
     assert not stance_on(leaning, stance(leaning).face, SINE).height_mm > 70
 
 
@@ -182,7 +178,7 @@ def test_holes_take_what_they_should_of_the_solid():
     assert [s.kind for s in socket.surfaces] == ["cylinder", "cylinder", "cone"]
     down = np.array([0.0, 0.0, -1.0])
     assert not bridges(socket, down)  # a tip needs none, nor do ledges; ceilings of pockets do
-    assert not bridges(extruded(TEE, 8.0), down)
+    assert not bridges(along_y(TEE, 8.0), down)
     plate = with_mount(tag((60.0, 60.0), 4.0), Mount("magnets", (8.0, 2.0)), 1)
     assert len(bridges(plate, down)) == 4
 
