@@ -7,6 +7,7 @@ import signal
 import sqlite3
 import time
 from contextlib import closing
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -199,23 +200,19 @@ def test_an_older_database_that_may_not_be_written_says_what_to_do(unprivileged)
     assert path.read_bytes() == (EARLIER / "v1.db").read_bytes()
 
 
-def forked(action):
-    """Run an action in a process of its own, forked from this one; return its number."""
-    child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            action()
-            code = 0
-        finally:
-            os._exit(code)
-    return child
+def forked(action, times=1):
+    """Run an action in processes of their own, forked from this one at once; their exit codes."""
+    children = [get_context("fork").Process(target=action) for _ in range(times)]
+    for child in children:
+        child.start()
+    for child in children:
+        child.join()
+    return [child.exitcode for child in children]
 
 
 def test_many_may_make_a_database_at_once(tmp_path):
     path = str(tmp_path / "lab.db")
-    makers = [forked(lambda: open_database(path)) for _ in range(3)]
-    assert [os.waitpid(maker, 0)[1] for maker in makers] == [0, 0, 0]
+    assert forked(lambda: open_database(path), times=3) == [0, 0, 0]
     with read_transaction(open_database(path, writable=False)) as connection:
         assert len(connection.execute(select(meta)).all()) == 3
 
@@ -336,8 +333,7 @@ def test_a_migration_that_ends_early_changes_nothing(first_version, monkeypatch,
     with monkeypatch.context() as patched:
         patched.setattr(v3, "upgrade", ending)
         if end == "kill":
-            _, status = os.waitpid(forked(lambda: open_database(first_version)), 0)
-            assert os.WTERMSIG(status) == signal.SIGKILL
+            assert forked(lambda: open_database(first_version)) == [-signal.SIGKILL]
         else:
             with pytest.raises(KeyboardInterrupt):
                 open_database(first_version)
@@ -371,8 +367,7 @@ def test_many_may_open_an_older_database_at_once(first_version, monkeypatch):
         os.write(note, b"1")
 
     monkeypatch.setattr(v3, "upgrade", noting)
-    several = [forked(lambda: open_database(first_version)) for _ in range(3)]
-    assert [os.waitpid(child, 0)[1] for child in several] == [0, 0, 0]
+    assert forked(lambda: open_database(first_version), times=3) == [0, 0, 0]
     os.close(note)
     assert os.read(upgraded, 100) == b"1"
     os.close(upgraded)
