@@ -250,7 +250,7 @@ def test_another_file_than_was_meant_is_refused(tmp_path, monkeypatch):
 
     monkeypatch.setattr(xml_files, "write_mjcf", wrong)
     with pytest.raises(SolidError, match=r"'Part.xml' has a mass of 1\.\d+ kg where 0\."):
-        make(tmp_path, TEXTS["panels"], verify=True)
+        make(tmp_path, TEXTS["panels"], ("mjcf",), verify=True)
     assert not (tmp_path / "out").exists()
 
 

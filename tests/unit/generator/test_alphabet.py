@@ -109,7 +109,6 @@ DENSE = alphabet_named("dense-4")
         (SymbolStyle(stroke_mm=1.2), "."),
         (SymbolStyle(pitch_mm=8.0, stroke_mm=2.0, chamfer_mm=0.9), "chamfer"),
         (SymbolStyle(chamfer_mm=1e-9), "chamfer 1e-09 mm"),
-        (SymbolStyle(chamfer_mm=1.0), "a chamfer of 1 mm leaves"),
         (SymbolStyle(stroke_mm=math.nan), "stroke nan"),
     ],
 )
@@ -121,6 +120,11 @@ def test_what_cannot_be_printed_is_refused_with_ways_out_that_work(style, words)
         number = math.radians(float(value)) if name == "draft" else float(value)
         unit = "rad" if name == "draft" else "mm"
         outlines(DENSE, replace(style, **{f"{name}_{unit}": number}))
+
+
+def test_a_chamfer_as_wide_as_the_stroke_is_refused():
+    with pytest.raises(AlphabetError, match="a chamfer of 1 mm leaves"):
+        check_printable(DENSE, SymbolStyle(chamfer_mm=1.0), PRINTERS["fdm-0.4"])
 
 
 def test_rings_tell_crossings_and_points_inside():

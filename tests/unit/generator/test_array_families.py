@@ -7,22 +7,14 @@ import numpy as np
 import pytest
 from reference.polynomials import windows_are_unique
 
-from generator.array import (
-    FoldedArray,
-    Sequence,
-    array_from,
-    factor,
-    next_larger,
-    polynomial,
-    profile,
-)
+from generator.array import Sequence, array_from, factor, next_larger, polynomial, profile
 from generator.array.field import (
     MINIMAL_POLYNOMIALS,
     field_of_order,
     format_polynomial,
     parse_polynomial,
 )
-from generator.array.fold import folds, usual_fold
+from generator.array.fold import FoldedArray, folds, usual_fold
 from generator.array.polynomial import is_primitive, primitive_polynomial
 from generator.array.residue import Residues
 from generator.array.window import least_weight_by_dual, minimum_distance
