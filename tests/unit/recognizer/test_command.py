@@ -74,7 +74,7 @@ def asked(ask, lab, monkeypatch):
 def test_reading_loads_no_library_that_it_does_not_need(lab, images):
     words = [str(recorded(lab / "light.h5", images[:1])), "--database", str(lab / "lab.db")]
     assert run(words) == 0  # templates may have to be worked out
-    names = "matplotlib skimage scipy skfem serial build123d manifold3d".split()
+    names = ["matplotlib", "skimage", "scipy", "skfem", "serial", "build123d", "manifold3d"]
     script = f"from recognizer.command import run; assert run({words}) == 0; import sys\n"
     script += f"print([name for name in {names} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
