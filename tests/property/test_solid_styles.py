@@ -136,14 +136,12 @@ def solids():
 def test_parts_are_closed_planar_and_of_their_volume(solid, name, turned, chamfer, seed):
     alphabet = ALPHABETS[name]
     pitch = 9.0
-    style = SymbolStyle(
-        pitch, 0.8, round(alphabet.stroke_ratio * pitch, 2), math.radians(8), chamfer
-    )
+    stroke = round(alphabet.stroke_ratio * pitch, 2)
+    style = SymbolStyle(pitch, 0.8, stroke, math.radians(8), chamfer)
     tiers, half = outlines(alphabet, style), footprint_half_mm(alphabet, style)
     chance = np.random.default_rng(seed)
-    layout = filled(
-        solid, pitch, half + 6.5, turned=turned, order=alphabet.order, chance=chance, share=0.8
-    )
+    shown = {"order": alphabet.order, "chance": chance, "share": 0.8}
+    layout = filled(solid, pitch, half + 6.5, turned=turned, **shown)
     parts = [emboss_whole(solid, layout, tiers, "body")]
     refused = refusal(panels, solid, layout, tiers, 2.0, PRINTERS["fdm-0.4"])
     if refused is None:
@@ -179,8 +177,7 @@ def test_inset_edges_stay_parallel_at_their_distance(polar, insets):
     normal = np.stack([-edge[:, 1], edge[:, 0]], axis=1) / np.hypot(*edge.T)[:, None]
     for corner in (moved, np.roll(moved, -1, axis=0)):
         reach = np.abs(corner - ring).max() + 1.0
-        assert ((corner - ring) * normal).sum(axis=1) == pytest.approx(
-            each, abs=1e-12 * reach * 1e3
-        )
+        away = ((corner - ring) * normal).sum(axis=1)
+        assert away == pytest.approx(each, abs=1e-12 * reach * 1e3)
     if each.min() >= 0:
         assert points_inside(moved, [ring]).all() or distance(moved, [ring]).min() < 1e-9

@@ -50,10 +50,8 @@ def reader(url):
 
 @pytest.mark.parametrize("number", range(4))
 def test_the_first_touch_is_the_one_that_is_made_alone(url, reader, number):
-    one, alone = (
-        trial(replace(PLAN, database=url, policy=policy), number, reader)
-        for policy in (NEXT, "one")
-    )
+    plan = replace(PLAN, database=url)
+    one, alone = (trial(replace(plan, policy=how), number, reader) for how in (NEXT, "one"))
     assert (one.x_mm, one.y_mm, one.force_n) == (alone.x_mm, alone.y_mm, alone.force_n)
     assert (one.touches == 1) == (alone.verdict == "right")
 
@@ -142,10 +140,8 @@ def test_a_worn_face_has_lost_the_same_symbols_elsewhere(url, reader):
     first = draw_touch(plan, 1, reader)
     again = draw_again(plan, first, first.touch, reader, np.random.default_rng(0))
     points = np.random.default_rng(1).uniform(0, 60, (400, 2))
-    assert np.array_equal(
-        again.contact.scene.surface.heights_mm(points),
-        first.contact.scene.surface.heights_mm(points),
-    )
+    heights = [one.contact.scene.surface.heights_mm(points) for one in (again, first)]
+    assert np.array_equal(*heights)
     assert (np.abs(again.counts.astype(int) - first.counts) < 40).all()  # the noise is another
 
 

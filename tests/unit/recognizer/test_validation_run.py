@@ -153,9 +153,8 @@ def known(work, reader):
     touch = draw_touch(work.plan(series_of(work.campaign)[1], 0), 0, reader)
     prepared = reader.prepared[0]
     names = [prepared.embossed.face(n).face for n in range(6)]
-    place, pose = true_lattice(
-        prepared.embossed, names.index(touch.contact.scene.face), touch.touch
-    )
+    face = names.index(touch.contact.scene.face)
+    place, pose = true_lattice(prepared.embossed, face, touch.touch)
     image = reader.image(reader.signal(touch.counts), prepared)
     return image, np.append(pose, np.zeros(4)), labels_at(prepared.embossed, [place])
 
@@ -191,9 +190,8 @@ def test_variances_of_a_tactel_by_hand():
     found = errors.variance(np.array([100.0]), np.array([[30.0, 40.0]]), np.array([200.0]))
     assert found == pytest.approx([2**2 + 10**2 + 10**2 + 5**2])
     square = ReadingErrors(noise=2.0, gain=0.1, exponent=2.0)  # readings are squares of forces
-    assert square.variance(np.array([10.0]), np.zeros((1, 2)), np.zeros(1)) == pytest.approx(
-        [(2 / 20) ** 2 + 0.5**2]
-    )
+    found = square.variance(np.array([10.0]), np.zeros((1, 2)), np.zeros(1))
+    assert found == pytest.approx([(2 / 20) ** 2 + 0.5**2])
 
 
 def test_a_line_counts_what_can_be_named_and_what_is_answered():
