@@ -7,8 +7,6 @@ What a command sees of the machine is fixed: width, colour, language, time zone,
 folder.
 """
 
-from __future__ import annotations
-
 import atexit
 import importlib
 import io

@@ -5,8 +5,6 @@ frames tells their shape, their largest count and their sum, too, so that a diff
 than that there is one. Reports of runs are not drawn: they follow from the rows.
 """
 
-from __future__ import annotations
-
 import atexit
 import hashlib
 import math

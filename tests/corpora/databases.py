@@ -9,8 +9,6 @@ Entries hold a table each: columns, rows in the order of their values, times and
 tool replaced by words. Of more than 24 rows the number, a hash and the first three are kept.
 """
 
-from __future__ import annotations
-
 import gzip
 import hashlib
 import json

@@ -6,8 +6,6 @@ File -> frames as SHA-256 of each array, attributes, and what the commands say: 
 again.
 """
 
-from __future__ import annotations
-
 import gzip
 import hashlib
 import shutil

@@ -6,8 +6,6 @@ another, so that later ones meet the files of earlier ones. Folders, times of da
 durations are replaced by words; numbers in JSON are compared as numbers.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import shlex

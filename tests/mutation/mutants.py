@@ -7,8 +7,6 @@ messages of errors, decorators, docstrings, and what only makes the program stop
 (`strict=True` of zip).
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

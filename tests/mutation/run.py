@@ -12,8 +12,6 @@ libraries are loaded already, in one thread, and nothing on the disk is touched 
 `.mutation/`, where the results stand.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import contextlib

@@ -1,7 +1,5 @@
 """The manipulator: link table against the thesis's matrix, branches, singularities, covariance."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

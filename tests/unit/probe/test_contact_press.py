@@ -1,7 +1,5 @@
 """The ladder behind one function: its picks and footprint; gels."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Sensor types: shipped ones, files with their errors, which one images are of."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

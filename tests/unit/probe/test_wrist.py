@@ -1,7 +1,5 @@
 """Distances -> tilt and back: the thesis's equations, their limits, errors, end stops, springs."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
