@@ -95,26 +95,6 @@ def tilted(*pose, off=0.0):
     return wrist_pose(Wrist(), np.add(distances_at(Wrist(), *pose), (0, 0, off, 0)))
 
 
-@pytest.mark.parametrize(
-    ("call", "match"),
-    [
-        *((lambda ab=ab, ad=ad: Wrist(ab_mm=ab, ad_mm=ad), "above 0 mm")
-          for ab, ad in ((0, 60), (60, -1), (math.nan, 60), (math.inf, 60))),
-        (lambda: tilted(5, 0.05, 0.05, off=0.2), r"0\.05 mm off a plane; check the transducers"),
-        (lambda: wrist_pose(Wrist(), [1, 2, 3]), "give AA', BB', CC', DD'"),
-        (lambda: wrist_pose(Wrist(), [1, 2, 3, math.nan]), "give AA', BB', CC', DD'"),
-        (lambda: tilted(-0.1, 0, 0), r"z of the wrist is -0\.1 mm, the end stops are at 0 and 10"),
-        (lambda: tilted(11, 0, 0), "z of the wrist is 11 mm"),
-        (lambda: tilted(5, 0, 10.2 * DEG), r"theta_y of the wrist is 10\.2 degrees, .* -10 and 10"),
-        (lambda: stiffness(Wrist(gamma_rad=60 * DEG)), "makes a moment about y"),
-    ],
-)  # fmt: skip
-def test_what_is_no_wrist_or_pose_is_refused(call, match):
-    with pytest.raises(PoseError, match=match):
-        call()
-    assert tilted(10, 0, 0).z_mm == pytest.approx(10)  # an end stop
-
-
 def test_counts_are_distances_to_half_a_count():
     wrist = Wrist()
     d = distances_at(wrist, 4.2, 6 * DEG, -10 * DEG)
@@ -203,20 +183,30 @@ def leaning(axis):
         (lambda: joint_speeds(ARM, np.zeros(5), [1, 2, 3]), "give 3 speeds"),
         (lambda: joint_speeds(ARM, np.zeros(5), [math.nan] * 6), "give 3 speeds"),
         (lambda: sensor_pose(ARM, np.zeros(5), [1e-3], Wrist(), LEVEL), "standard deviations"),
+        *((lambda ab=ab, ad=ad: Wrist(ab_mm=ab, ad_mm=ad), "above 0 mm")
+          for ab, ad in ((0, 60), (60, -1), (math.nan, 60), (math.inf, 60))),
+        (lambda: tilted(5, 0.05, 0.05, off=0.2), r"0\.05 mm off a plane; check the transducers"),
+        (lambda: wrist_pose(Wrist(), [1, 2, 3]), "give AA', BB', CC', DD'"),
+        (lambda: wrist_pose(Wrist(), [1, 2, 3, math.nan]), "give AA', BB', CC', DD'"),
+        (lambda: tilted(-0.1, 0, 0), r"z of the wrist is -0\.1 mm, the end stops are at 0 and 10"),
+        (lambda: tilted(11, 0, 0), "z of the wrist is 11 mm"),
+        (lambda: tilted(5, 0, 10.2 * DEG), r"theta_y of the wrist is 10\.2 degrees, .* -10 and 10"),
+        (lambda: stiffness(Wrist(gamma_rad=60 * DEG)), "makes a moment about y"),
     ],
-)
-def test_what_is_no_pose_is_refused(call, cause):
+)  # fmt: skip
+def test_what_is_no_wrist_or_pose_is_refused(call, cause):
     with pytest.raises(PoseError, match=cause):
         call()
     assert inverse(ARM, leaning("y"))
+    assert tilted(10, 0, 0).z_mm == pytest.approx(10)  # an end stop
 
 
 def test_over_the_base_axis():
     """Shoulder singularity: with a vertical approach the first angle is free."""
-    tilted = Rotation.from_euler("ZY", [40, 30], degrees=True).as_matrix() @ DOWN
+    lean = Rotation.from_euler("ZY", [40, 30], degrees=True).as_matrix() @ DOWN
     c, s = math.cos(40 * DEG), math.sin(40 * DEG)
     poses = [at(0, 0, 600), at(1e-13, -1e-13, 600), at(0, 0, 600, np.eye(3))]
-    poses += [at(r * c, r * s, 600, tilted) for r in (0, 1e-12, 1e-9, 1e-6, 1e-3, 1)]
+    poses += [at(r * c, r * s, 600, lean) for r in (0, 1e-12, 1e-9, 1e-6, 1e-3, 1)]
     for pose in poses:
         for q in inverse(ARM, pose):
             assert forward(ARM, q) == pytest.approx(pose, abs=1e-9)
