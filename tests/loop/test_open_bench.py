@@ -1,7 +1,5 @@
 """`open-bench` as an operator meets it: a server, a probe on a serial line, a real browser."""
 
-from __future__ import annotations
-
 import re
 import time
 
