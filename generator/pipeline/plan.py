@@ -361,7 +361,10 @@ def _notes(
                 f"{printer.layer_mm:g} mm: {better} {whole:g} mm are whole layers"
             )
     if (like := like_measured(spec.sensor)) != spec.sensor.name:
-        yield f"promises for {spec.sensor.name} are those of {like}: not measured"
+        yield (
+            f"promises for {spec.sensor.name} are those of {like}, not measured: validate-set on "
+            "this database measures what is answered"
+        )
 
 
 def _sharp_edges(polyhedron: Polyhedron, spec: ObjectSpec) -> dict[str, float]:

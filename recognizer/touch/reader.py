@@ -24,6 +24,8 @@ from recognizer.touch.source import source_of
 if TYPE_CHECKING:
     from probe.calibration import Calibration
 
+_LARGE = 1e100  #: no reading; squares of smaller ones, and of more than one part of it, are numbers
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Reader(PreparedLab):
@@ -120,6 +122,8 @@ class Reader(PreparedLab):
         shape, sensor = (self.sensor.rows, self.sensor.columns), self.sensor
         try:
             image = counts.counts if isinstance(counts, Frame) else counts
+            if np.iscomplexobj(image) or np.iscomplexobj(trust):
+                raise TypeError("complex numbers")
             values = np.asarray(image, np.float64)
             known = None if trust is None else np.asarray(trust, np.float64)
         except (TypeError, ValueError) as error:
@@ -135,12 +139,13 @@ class Reader(PreparedLab):
                 fix="give its --sensor-type; in Python Reader(lab, sensor_type_named(...))",
                 place=sensor.name,
             )
-        if not np.isfinite(values).all():
+        if not (np.abs(values) < _LARGE).all():
             raise TouchError(
-                "readings that are NaN or infinite",
+                f"readings that are NaN or of {_LARGE:.0e} and more",
                 fix="set them to 0, and trust to 0 there",
                 place=sensor.name,
             )
+        values = np.where(np.abs(values) < 1 / _LARGE, 0.0, values)
         newtons = calibration is not None
         if calibration is not None:
             from probe.calibration.apply import calibrate_image

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 import time
 from collections.abc import Collection, Iterable, Mapping
@@ -35,6 +34,7 @@ from recognizer.validation.statistics import clopper_pearson
 SPECS = Path("docs/validation")
 SUMMARY = "million.json"  #: of the worlds that are finished
 COUNTS = ("touches", "on_faces", "right", "wrong")
+FIGURES = {"rms_mm": 4, "worst_mm": 3, "inside": 4, "normalised": 3}  #: of right answers, digits
 GROUPS = ("kind", "level")
 #: What is kept of a wrong answer.
 WRONG = ("number", "kind", "level", "object", "face", "x_mm", "y_mm", "theta_deg", "force_n",
@@ -132,24 +132,32 @@ def touch(name: str, asked: argparse.Namespace) -> None:
                "--study", 0, "--resume", *workers, "-o", folder)  # fmt: skip
 
 
-def counts_of(rows: Iterable[runner.Row]) -> dict[str, int]:
-    """Return how many touches there are, on registered faces, and answered right and wrong."""
+def figures_of(rows: Iterable[runner.Row]) -> dict[str, Any]:
+    """Return how many touches there are, on registered faces, and answered; how true answers are.
+
+    `inside` the 95 % ellipsoids, and `normalised`: squared error over variance, 1 where these are
+    true.
+    """
     found = list(rows)
     verdicts = [row["verdict"] for row in found]
-    return {"touches": len(found), "on_faces": sum(row["object"] != "" for row in found),
-            **{name: verdicts.count(name) for name in ("right", "wrong")}}  # fmt: skip
+    line: dict[str, Any] = {
+        "touches": len(found), "on_faces": sum(row["object"] != "" for row in found),
+        **{name: verdicts.count(name) for name in ("right", "wrong")},
+    }  # fmt: skip
+    if line["right"]:
+        outcome = runner.outcome(found)
+        line |= {name: round(outcome[name], digits) for name, digits in FIGURES.items()}
+    return line
 
 
 def line_of(rows: list[runner.Row]) -> dict[str, Any]:
     """Return what became of the touches of a world."""
-    found = runner.outcome(rows)
-    line: dict[str, Any] = counts_of(rows)
+    line = figures_of(rows)
     for group in GROUPS:
         names = sorted({row[group] for row in rows})
-        line[group] = {name: counts_of(row for row in rows if row[group] == name) for name in names}
-    for name, digits in (("rms_mm", 4), ("worst_mm", 3), ("inside", 4)):
-        if not math.isnan(found[name]):
-            line[name] = round(found[name], digits)
+        line[group] = {
+            name: figures_of(row for row in rows if row[group] == name) for name in names
+        }
     wrong = [row for row in rows if row["verdict"] == "wrong"]
     if wrong:
         line["wrong_answers"] = [{name: row[name] for name in WRONG} for row in wrong]
@@ -157,24 +165,26 @@ def line_of(rows: list[runner.Row]) -> dict[str, Any]:
 
 
 def all_of(lines: Collection[dict[str, Any]]) -> dict[str, Any]:
-    """Return what became of the touches of all worlds."""
+    """Return what became of the touches of several worlds."""
     line = {key: sum(one[key] for one in lines) for key in COUNTS}
-    if line["right"]:
-        share = [one["right"] / line["right"] for one in lines]
-        several = list(zip(share, lines, strict=True))
-        line["rms_mm"] = round(sum(s * one.get("rms_mm", 0) ** 2 for s, one in several) ** 0.5, 4)
-        line["worst_mm"] = max(one.get("worst_mm", 0) for one in lines)
-        line["inside"] = round(sum(s * one.get("inside", 0) for s, one in several), 4)
+    answered = [one for one in lines if one["right"]]
+    if answered:
+        share = [one["right"] / line["right"] for one in answered]
+        several = list(zip(share, answered, strict=True))
+        line["rms_mm"] = round(sum(s * one["rms_mm"] ** 2 for s, one in several) ** 0.5, 4)
+        line["worst_mm"] = max(one["worst_mm"] for one in answered)
+        for name in ("inside", "normalised"):
+            line[name] = round(sum(s * one[name] for s, one in several), 4)
     return line
 
 
 def table(lines: Mapping[str, dict[str, Any]]) -> None:
     """Print what became of all touches, by world, kind and level, as Markdown."""
-    heads = ("touches", "on faces", "right", "wrong", "95 % of wrong")
-    runner.table(("world", *heads, "rms mm", "inside"))
+    heads = ("touches", "on faces", "right", "wrong", "95 % of wrong", "rms mm", "inside",
+             "error over variance")  # fmt: skip
+    runner.table(("world", *heads))
     for name, line in {**lines, "all": all_of(lines.values())}.items():
-        inside = f"{100 * line['inside']:.0f} %" if "inside" in line else ""
-        runner.row(name, *_cells(line), str(line.get("rms_mm", "")), inside)
+        runner.row(name, *_cells(line))
     for group in GROUPS:
         print()
         runner.table((group, *heads))
@@ -184,9 +194,13 @@ def table(lines: Mapping[str, dict[str, Any]]) -> None:
 
 
 def _cells(line: Mapping[str, Any]) -> list[str]:
-    """Return the counts, and the exact interval of the share that is wrong."""
+    """Return the counts, the exact interval of the share that is wrong, and the figures."""
     low, high = clopper_pearson(line["wrong"], line["touches"])
-    return [*(f"{line[key]:,}" for key in COUNTS), f"{100 * low:.2g}-{100 * high:.2g} %"]
+    cells = [*(f"{line[key]:,}" for key in COUNTS), f"{100 * low:.2g}-{100 * high:.2g} %"]
+    if not line["right"]:
+        return [*cells, "", "", ""]
+    true = f"{100 * line['inside']:.0f} %", f"{line['normalised']:.2f}"
+    return [*cells, f"{line['rms_mm']:.3f}", *true]
 
 
 def run(asked: argparse.Namespace, finished: dict[str, dict[str, Any]]) -> None:

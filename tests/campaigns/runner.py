@@ -8,8 +8,6 @@ A script imports it by `import runner`, one of `tests/bench` after
 `sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))`.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -172,8 +170,9 @@ def outcome(trials: Iterable[Any]) -> Row:
     """Return what became of touches: rows of `trials.parquet`, or `recognizer.validation` trials.
 
     `touches`, `right`, `wrong`, `rejected`; of the right ones root mean squares `rms_mm` and
-    `rms_deg`, `worst_mm`, and the share `inside` the 95 % ellipsoid of the covariance (nan of
-    none); `reasons` of the rejected ones.
+    `rms_deg`, `worst_mm`, the share `inside` the 95 % ellipsoid of the covariance, and the mean
+    squared error over variance, `normalised`, 1 where the covariance is true (nan of none);
+    `reasons` of the rejected ones.
     """
     import numpy as np
 
@@ -194,5 +193,6 @@ def outcome(trials: Iterable[Any]) -> Row:
         "rms_deg": np.nan if none else float(np.sqrt(np.mean(deg**2))),
         "worst_mm": np.nan if none else float(mm.max()),
         "inside": np.nan if none else float(np.mean(chi2 < INSIDE_CHI2)),
+        "normalised": np.nan if none else float(np.mean(chi2) / 3),
         "reasons": dict(Counter(filter(None, (value(one, "reason") for one in found)))),
     }

@@ -32,10 +32,8 @@ from recognizer.touch.recognition import (
 
 @pytest.fixture(scope="module")
 def url(make_lab):
-    folder = make_lab(
-        "{name: Cube, shape: {cube: 60 mm}}", "{name: Tetra, shape: {tetrahedron: 80 mm}}"
-    )
-    return f"sqlite:///{folder / 'lab.db'}"
+    specs = "{name: Cube, shape: {cube: 60 mm}}", "{name: Tetra, shape: {tetrahedron: 80 mm}}"
+    return f"sqlite:///{make_lab(*specs) / 'lab.db'}"
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +94,9 @@ def test_a_calibration_that_is_not_beside_the_recording_is_said(reader, counts, 
     [
         (np.zeros((8, 16)), r"shape \(8, 16\), of a sensor with 16 rows, 16 columns"),
         (np.zeros(256), "shape"),
-        (np.full((16, 16), np.nan), "NaN or infinite"),
+        (np.full((16, 16), np.nan), "NaN or of 1e"),
+        (np.full((16, 16), -1e200), "NaN or of 1e"),
+        (np.ones((16, 16), complex), "no matrix of numbers"),
         ("abc", "no matrix of numbers"),
         ([[1, 2], [3]], "no matrix of numbers"),
     ],
@@ -109,6 +109,7 @@ def test_what_is_no_image_of_the_sensor_is_refused(reader, image, said):
 def test_a_frame_is_read_by_its_counts(reader, counts):
     frame = frame_from(counts, t_ns=0, seq=0)
     assert str(reader.read(frame)) == str(reader.read(frame.counts))
+    assert "no contact" in str(reader.read(counts * 1e-160))  # whose squares are 0
 
 
 def test_trust_must_fit_and_bad_tactels_are_not_believed(reader, counts):
