@@ -45,9 +45,8 @@ class SmallLab:
         """What lattice cells (i, j) show if (0, 0) lies at a place of a face; `order`: none."""
         found = []
         for i, j in cells:
-            owner, label = self.held.get(
-                ((row - j) % self.rows, (column + i) % self.columns), (None, None)
-            )
+            at = (row - j) % self.rows, (column + i) % self.columns
+            owner, label = self.held.get(at, (None, None))
             found.append(label if owner == face else self.order)
         return found
 
@@ -105,9 +104,8 @@ def sure_of(labels, order=4, least=-12.0):
 @pytest.fixture
 def small():
     """What the lab and its fits are built with."""
-    return SimpleNamespace(
-        Lab=SmallLab, two_faces=two_faces, fit_of=fit_of, sure_of=sure_of, known_face=known_face
-    )
+    built = {one.__name__: one for one in (two_faces, fit_of, sure_of, known_face)}
+    return SimpleNamespace(Lab=SmallLab, **built)
 
 
 @pytest.fixture(scope="session")

@@ -92,9 +92,8 @@ def test_how_sure_it_is_comes_from_the_spread_of_the_touches(said):
         felt = [felt_on(truth, TOP, rng.normal(0, 2e-3, 4), np.eye(4) * said) for _ in range(30)]
         found = estimate_print(felt)
         away = np.array([found.scale_x - 0.98, found.scale_y - 0.99, found.skew_rad - 0.004])
-        chi2.append(
-            away @ np.linalg.solve(found.covariance[:3, :3] - np.diag(np.square(ALWAYS[:3])), away)
-        )
+        spread = found.covariance[:3, :3] - np.diag(np.square(ALWAYS[:3]))
+        chi2.append(away @ np.linalg.solve(spread, away))
     assert 2.4 < np.mean(chi2) < 4.2  # three degrees of freedom
 
 

@@ -77,11 +77,8 @@ def test_weak_is_told_in_newtons_where_they_are_known(reader):
 @pytest.fixture(scope="module")
 def keyed(make_lab):
     """A lab whose symbols are known, so that places can be named where the readings are even."""
-    folder = make_lab(
-        "{name: Cube, shape: {cube: 40 mm}, symbols: {alphabet: dense-4}}",
-        lab_key="0123-4567-89AB-CDER",
-    )
-    return f"{folder}/lab.db"
+    spec = "{name: Cube, shape: {cube: 40 mm}, symbols: {alphabet: dense-4}}"
+    return f"{make_lab(spec, lab_key='0123-4567-89AB-CDER')}/lab.db"
 
 
 def test_symbols_along_the_rows_are_read_however_few_gaps_they_show(keyed):

@@ -26,9 +26,8 @@ def asked(normal, *, hardens, form=(0.0, 0.0, 0.0, 0.0), away=None, noise=USUAL)
     pose = np.zeros((count, 7))
     pose[:, :3] = 5.0, -9.0, 1.0  # of no importance
     pose[:, 3:] = form
-    image = SimpleNamespace(
-        pressing=SimpleNamespace(hardens=hardens), shape=SHAPE, options=ReaderOptions()
-    )
+    pressing = SimpleNamespace(hardens=hardens)
+    image = SimpleNamespace(pressing=pressing, shape=SHAPE, options=ReaderOptions())
     left = np.zeros((count, SHAPE[0] * SHAPE[1])) if away is None else away
     return covariances(image, SimpleNamespace(pose=pose, normal=normal), left, noise)
 

@@ -32,10 +32,8 @@ from recognizer.touch.recognition import (
 
 @pytest.fixture(scope="module")
 def url(make_lab):
-    folder = make_lab(
-        "{name: Cube, shape: {cube: 60 mm}}", "{name: Tetra, shape: {tetrahedron: 80 mm}}"
-    )
-    return f"sqlite:///{folder / 'lab.db'}"
+    specs = "{name: Cube, shape: {cube: 60 mm}}", "{name: Tetra, shape: {tetrahedron: 80 mm}}"
+    return f"sqlite:///{make_lab(*specs) / 'lab.db'}"
 
 
 @pytest.fixture(scope="module")

@@ -83,10 +83,8 @@ def test_magnification_is_the_thesis_convolution():
     assert fine.values == pytest.approx(wanted[:61, :61], abs=1e-12)
 
 
-def style(alphabet, pitch=12.0):
-    return SymbolStyle(
-        pitch_mm=pitch, height_mm=1.0, stroke_mm=alphabet.stroke_ratio * pitch, draft_rad=0.17
-    )
+def style(alphabet):
+    return SymbolStyle(PITCH, 1.0, stroke_mm=alphabet.stroke_ratio * PITCH, draft_rad=0.17)
 
 
 def drawn(alphabet, placed, size_mm=50.0, pitch=12.0, half_mm=None):

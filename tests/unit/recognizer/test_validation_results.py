@@ -168,9 +168,8 @@ def test_touches_of_a_version_that_counted_less_are_read_and_others_refused(tmp_
     [(0, 49, None, 0), (0, 49, 98.0, 0), (0, 49, 98.5, 1), (1, 50, 10.0, 1)],
 )
 def test_fail_under(wrong, fair_right, fail_under, code):
-    found = ValidationResult(
-        100, 98 - wrong, wrong, 2, 0.1, 0.1, 1.0, 50, fair_right, (), Path("x")
-    )
+    counts = 100, 98 - wrong, wrong, 2
+    found = ValidationResult(*counts, 0.1, 0.1, 1.0, 50, fair_right, (), Path("x"))
     assert found.exit_code(fail_under) == code
 
 
@@ -196,9 +195,8 @@ def test_names_of_crowded_points_do_not_overlap():
     figure = Figure(figsize=(5.5, 4.0), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
-    points = [
-        (float(x), float(y), f"more of {k}") for k, (x, y) in enumerate(rng.normal(0, 1, (14, 2)))
-    ]
+    places = rng.normal(0, 1, (14, 2)).tolist()
+    points = [(x, y, f"more of {k}") for k, (x, y) in enumerate(places)]
     points += [(0.0, 0.0, "one"), (0.0, 0.0, "its double"), (np.nan, 1.0, "no number")]
     axes.plot(*zip(*[point[:2] for point in points], strict=True), "o")
     axes.margins(0.3)
