@@ -266,11 +266,9 @@ def main() -> None:
     heads = ("pitch", "reach", "stroke", *(f"{size} letters" for size in asked.letters))
     runner.table((*heads, *(f"{printer} makes" for printer in PRINTED)))
     for pitch, reach, stroke in product(asked.pitch, asked.reach, asked.stroke):
-        kept = [
-            one
-            for one in every
-            if not asked.printer or prints([one[0]], pitch, reach, stroke, asked.printer)
-        ]
+        kept = every
+        if asked.printer:
+            kept = [one for one in every if prints([one[0]], pitch, reach, stroke, asked.printer)]
         letters, shapes = zip(*kept, strict=True)
         apart, ink = distances(letters, sensor, pitch, reach, stroke)
         apart[[[one == other for other in shapes] for one in shapes]] = 0.0
