@@ -12,19 +12,13 @@ from generator.alphabet import alphabet_named
 from probe.command import run as probe_sensor
 from recognizer.command import run as recognize_object
 
-CLOTH = """name: cloth
-rows: 14
-columns: 20
-pitch: 1.5 mm
-row_pitch: 2.1 mm
-overlay: {tip: 1.2 mm}
-"""
+CLOTH = "name: cloth\nrows: 14\ncolumns: 20\npitch: 1.5 mm\nrow_pitch: 2.1 mm\n"
 
 
 @pytest.mark.parametrize("name", [*shipped_names(), "cloth.yaml"])
 def test_a_type_reads_its_symbols(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "cloth.yaml").write_text(CLOTH)
+    (tmp_path / "cloth.yaml").write_text(CLOTH + "overlay: {tip: 1.2 mm}\n")
     sensor = sensor_type_named(name)
     spec = {"name": "Box", "shape": {"box": ["90 mm", "80 mm", "70 mm"]}, "sensor_type": name}
     encode(spec | {"print": {"printer": "resin"}}, database="lab.db", formats=())
