@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from generator.array.contract import touches_needed
+from generator.errors import SolidError
 from generator.layout.placement import Layout
 from generator.layout.recognition_rate import PartRate
 from generator.pipeline.faces import FaceReport, whole_rate
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import face_vector
 from generator.polyhedron.standing import DOWN, FLAT, LEVEL, Stance, bridges
+from generator.solid.plate import plain_panels
 
 if TYPE_CHECKING:
     from generator.export.check import FitReport
@@ -144,6 +146,16 @@ class Overhangs:
     faces: tuple[str, ...] = ()  #: that hang over: a slicer must make supports under them
 
 
+def _panels_fit(plan: ObjectPlan) -> bool:
+    """Whether an object can be made of panels as thick as its spec says."""
+    try:
+        spec = plan.spec
+        plain_panels(plan.polyhedron, spec.wall_mm, plan.printer, spec.gap_mm, spec.name)
+    except SolidError:
+        return False
+    return True
+
+
 def overhangs(plan: ObjectPlan, layout: Layout) -> Overhangs:
     """Return how the parts lie, and what hangs over of a whole body."""
     if plan.spec.parts == "panels":
@@ -183,5 +195,5 @@ def overhangs(plan: ObjectPlan, layout: Layout) -> Overhangs:
     if upright:  # their lower sides hang over by their height
         needed += f", {upright} symbols stand out sideways"
     flat = not (polyhedron.surfaces or polyhedron.blank) and (over or upright)
-    better = "; with  parts: panels  nothing hangs over" if flat else ""
+    better = "; with  parts: panels  nothing hangs over" if flat and _panels_fit(plan) else ""
     return Overhangs(f"{lies}, {needed}{better}", over)

@@ -7,12 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from encoded_objects.base.errors import without_password
 from encoded_objects.base.output import three_digits
 from encoded_objects.base.sensor_type import force_share
+from generator.database.open import normal_url
 from generator.export.bed import Plate
 from generator.export.drawing import (
     Assembly,
@@ -31,6 +35,7 @@ from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import face_vector, points_inside
 from generator.polyhedron import face_polygon
 from generator.polyhedron.assembly import AssemblyStep, assembly_order, distinct_faces
+from generator.polyhedron.mount import fasteners
 from generator.printers import Printer
 from generator.solid import Part, box, volume
 
@@ -58,7 +63,7 @@ _MIXED = (
 )
 _CHECK = (
     "Hold the sensor flat on the part, {force:.2g} N or more. recognize-object --port URL --follow "
-    "--database lab.db answers, or open-bench; probe-sensor list gives the URL of the probe."
+    "--database {database} answers, or open-bench; probe-sensor list gives the URL of the probe."
 )
 Rows = Sequence[tuple[str, ...]]
 
@@ -105,11 +110,22 @@ def build_sheet(
         ]
     if checks := _checks(plan, layout):
         title = f"Check by {'three touches' if len(checks) == 3 else 'touch'}"
-        text = _CHECK.format(force=LIGHT_N * force_share(plan.spec.sensor)) + _MIXED * panelled
+        force = LIGHT_N * force_share(plan.spec.sensor)
+        text = _CHECK.format(force=force, database=_database(plan)) + _MIXED * panelled
         if promise is not None:
-            text += f" {percent(promise.at_once)} of touches anywhere are answered at once."
+            side, where = 1.0, "anywhere"
+            if promise.one_side:
+                side, where = promise.encoded, "on its encoded side"
+            text += f" {percent(promise.at_once / side)} of touches {where} are answered at once."
         sections.append(Section(title, text, ("", "touch", "must answer"), checks))
     return sheet_html(f"{plan.spec.name}: build sheet", sections)
+
+
+def _database(plan: ObjectPlan) -> str:
+    """Return the database as a command line names it: a file without its folder."""
+    url = normal_url(plan.spec.database)
+    on_disk = url.get_backend_name() == "sqlite"
+    return quote(Path(url.database or "").name if on_disk else without_password(plan.spec.database))
 
 
 def layers_text(printer: Printer) -> str:
@@ -170,6 +186,8 @@ def _facts(
         if any(_mark(part).startswith(code) for part in parts):
             marks = f"backs say {code}, which stands for {spec.name} on small parts, and the face"
         rows.append(("marks", marks))
+    if spec.mount is not None:
+        buy += fasteners(spec.mount)
     rows.append(("to buy", "; ".join(buy)))
     if cost:
         rows.append(("printing", f"{cost} ({source}, 15 % infill)"))

@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import os
+import re
+from pathlib import Path
+
+import yaml
+
 from encoded_objects.base.document import Problem, suggest
 from generator.spec.problem import SpecError
 from generator.spec.shape import EXAMPLES, OTHER_NAMES
@@ -14,7 +21,7 @@ _POLYHEDRON = """shape:
     faces: [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]"""
 
 _TEMPLATE = """\
-# {name}: make it with  encode-object {file}
+# {title}: make it with  encode-object {file}
 # A line that starts with # is off: delete the # to use it. The values shown are those
 # that hold without it. Lengths: 40, 40 mm, 4 cm, 1.6 in. Angles: 10 deg, 0.17 rad.
 version: 1
@@ -54,27 +61,45 @@ name: {name}
 """
 
 
-def starter(shape: str, file: str = "") -> str:
+def starter(shape: str, file: str = "", model: str = "part.step") -> str:
     """Return a commented spec for one of the shapes of `EXAMPLES`; it can be made as it is.
+
+    `model` is the file of a shape that is read from one.
 
     >>> starter("cube").splitlines()[5]
     'shape: {cube: 60 mm}'
     """
-    name = "Part" if shape == "file" else shape.replace("_", " ").capitalize()
+    named = shape.replace("_", " ") if shape != "file" else Path(model).stem
+    name = named[:1].upper() + named[1:]
     folder = name.lower().replace(" ", "-")
     line = _POLYHEDRON if shape == "polyhedron" else f"shape: {EXAMPLES[shape]}"
     if shape == "file":
+        line = f"shape: {{file: {_scalar(model)}}}"
         line += "    # .step, .stl or .obj, relative to this file"
         line += "\n# shape: {file: part.stl, scale: 25.4}    # a model in inches"
     file = file or f"{folder}.yaml"
-    return _TEMPLATE.format(name=name, file=file, shape=line, folder=folder)
+    return _TEMPLATE.format(title=name, name=_scalar(name), file=file, shape=line, folder=folder)
 
 
-def starter_named(shape: str, file: str = "") -> tuple[str, str]:
-    """Return the shape's own name and its spec for `file`; raises `SpecError` for no shape."""
+def _scalar(text: str) -> str:
+    """Return a text as YAML has it: plain where that is read as the same text."""
+    plain = re.fullmatch(r"[\w./ -]+", text) and yaml.safe_load(text) == text
+    return text if plain else json.dumps(text, ensure_ascii=False)
+
+
+def starter_named(shape: str, file: Path | None = None) -> tuple[str, str]:
+    """Return the name of a shape, or of what a model file has, and a spec for `file`.
+
+    Raises `SpecError` for what is neither.
+    """
+    from generator.polyhedron.read import MESHES, STEP
+
+    name = file.name if file else ""
+    if Path(shape).suffix.lower() in (*STEP, *MESHES):
+        return "file", starter("file", name, os.path.relpath(shape, file.parent if file else "."))
     word = shape.lower().replace("-", "_").replace(" ", "_")
     kind = OTHER_NAMES.get(word, word)
     if kind not in EXAMPLES:
         fix = suggest(word, EXAMPLES, f"choose one of {', '.join(EXAMPLES)}")
         raise SpecError([Problem(f"unknown shape '{shape}'", fix)])
-    return kind, starter(kind, file)
+    return kind, starter(kind, name)
