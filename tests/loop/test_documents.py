@@ -85,6 +85,7 @@ def said_by():
 SAID = {
     "decode_windows": r"row 1, column 61 \(t = 2206\)\n.*\n2206\n.*Cube/F1\n",
     "encode_set": r"Cube:.*\nBox-1:.*\nBox-2:(?s:.*)\n\d+ of 262143 cells in use\n(?s:.*)",
+    "hand_eye": r"(1[6-9]|20) of 20 .*\n0\.[01]\d mm across, -?0\.\d+ mm along, 0\.[01]\d deg.*\n",
     "mujoco_press": r"Cube/F6 at \(.*\n",
     "follow_port": r"(?s:.*)Cube/F1(?s:.*)",
     "own_sensor_data": r"mine\.h5: 2 frames.*\n.*Cube/F4.*\n.*Cube/F4.*\n",
