@@ -4,8 +4,6 @@ For the campaign `held.py` and the tests of how the server ends. All is on loopb
 number and time.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

@@ -4,8 +4,6 @@ Chromium draws in software. `wait_for_function` would need `eval`, which the pag
 is waited for is asked again and again.
 """
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """HDF5 files that mean harm: they lead to other files, or claim more than they hold."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

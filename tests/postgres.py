@@ -7,8 +7,6 @@ Prints its URL, serves until its standard input ends, then removes everything. D
 Without `--durable` nothing is forced to the disk, which tests do not need.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import pwd

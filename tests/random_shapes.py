@@ -5,8 +5,6 @@ Non-convex: extruded stars, some with a hole, straight or tapered, steps, and bl
 boss or a pocket, whose faces have holes. SciPy is loaded when a hull is made.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence

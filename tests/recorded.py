@@ -1,7 +1,5 @@
 """Frames and recordings for tests."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -12,8 +12,6 @@ Advisories are asked of OSV (https://osv.dev) in one request, and kept with thei
 there are any, 2 where nothing can be asked and nothing is kept.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import re

@@ -12,8 +12,6 @@ the set and peers. `docs/benchmarks.json` keeps the records of
 releases, the page and its picture show the last two.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform

@@ -23,8 +23,6 @@ asking fewer than 217 points on a tip costs; beside it, how far the image lies f
 of an elastomer as stiff.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import statistics

@@ -11,8 +11,6 @@ this process; the taken cells alone; object and face of a 3 x 4 window, on an op
 with opening it.
 """
 
-from __future__ import annotations
-
 import itertools
 import sys
 import time

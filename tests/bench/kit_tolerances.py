@@ -9,8 +9,6 @@ sensor that presses is off in one dimension more than a typical one (level `typi
 and turn of right answers, and errors inside the answer's own 95 % ellipsoid. `probe-kit` prints it.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import tempfile

@@ -9,8 +9,6 @@ picture is stale that shows an answer, a lit face or a pose while the touch at h
 every picture that the browser paints is looked at.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
 import random

@@ -9,8 +9,6 @@ faces, typical. Process time, median; memory is the peak of a process of its own
 take 8 GB.
 """
 
-from __future__ import annotations
-
 import math
 import multiprocessing
 import resource

@@ -14,8 +14,6 @@ a share of that of dense-4 at the type's usual pitch, which sets nozzles of .4 a
 their strokes. `--draw FILE.svg` draws the sets that ship, and searches for nothing.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import combinations, pairwise, product

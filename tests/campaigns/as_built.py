@@ -10,8 +10,6 @@ both at least 9 mm from the edges. The true place is counted from the middle of 
 (docs/printed.md).
 """
 
-from __future__ import annotations
-
 import math
 import shutil
 import tempfile

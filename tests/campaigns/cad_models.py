@@ -10,8 +10,6 @@ Exit code 1 when a model crashes, runs out of time, fails verification, or is re
 cause, place and way out.
 """
 
-from __future__ import annotations
-
 import fnmatch
 import gzip
 import io

@@ -9,8 +9,6 @@ Nothing in them is of the lab, so every answer is wrong. `--frames` are those of
 its length; `--most` files. docs/benchmark.md names sets.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections import Counter
 from dataclasses import replace

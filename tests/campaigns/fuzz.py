@@ -10,8 +10,6 @@ campaign goes on where it was, and what was found: each fault with the numbers o
 `--show KIND NUMBER` runs again in the foreground. Exit code 1 if there is any fault.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -8,8 +8,6 @@ SIGINT: seconds to end, exit code, processes and files that are left. Exit code 
 takes longer than `ENDED_S`, ends with another code than 0, or leaves something.
 """
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

@@ -8,8 +8,6 @@ knows the object with all its rows or not at all; one more run makes the same by
 code 1 otherwise. Writers, and runs of `validate-set`, that are killed: `tests/loop`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import random
 import signal

@@ -8,8 +8,6 @@ among them), from a click to the zip, and of the command; MB and files of the zi
 a file differs.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tempfile

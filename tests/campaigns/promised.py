@@ -16,8 +16,6 @@ sensor types, worlds of `million.py`, against what `--sensor-type` promises; wit
 each type's share of the usual sensor's answers (`answers_of_types.json`).
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import itertools

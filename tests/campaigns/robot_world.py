@@ -13,8 +13,6 @@ each is touched so often again, anywhere on its face, and the poses are fused. I
 sensor model on the written faces; `docs/examples/mujoco_arm.py` has MuJoCo's.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from functools import cache

@@ -8,8 +8,6 @@ A script imports it by `import runner`, one of `tests/bench` after
 `sys.path.insert(0, str(Path(__file__).parents[1] / "campaigns"))`.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

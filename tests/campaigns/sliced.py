@@ -12,8 +12,6 @@ that the command does not announce or none where it does, or layers of resin hol
 volume too much or too little.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import re

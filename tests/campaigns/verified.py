@@ -13,8 +13,6 @@ and centroid in its own axes. Exit code 1 when a file fails, or a refusal lacks 
 out.
 """
 
-from __future__ import annotations
-
 import json
 import resource
 import subprocess

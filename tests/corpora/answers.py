@@ -8,8 +8,6 @@ Drawn once by `validate-set`, `simulate` and the levels of `docs/validation/READ
 to 920, on the forty objects (`forty`), the small ones (`small`) and labs of a part or two.
 """
 
-from __future__ import annotations
-
 import json
 import lzma
 from collections.abc import Iterator

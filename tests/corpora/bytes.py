@@ -16,8 +16,6 @@ options are those that they change. `--slice` and `--printed-check` need PrusaSl
 to the tests of `generator.printed`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -7,8 +7,6 @@ What a command sees of the machine is fixed: width, colour, language, time zone,
 folder.
 """
 
-from __future__ import annotations
-
 import atexit
 import importlib
 import io
@@ -19,7 +17,6 @@ import runpy
 import signal
 import subprocess
 import sys
-import tempfile
 import tomllib
 import traceback
 from collections.abc import Iterator
@@ -27,6 +24,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parents[2]
@@ -35,32 +33,13 @@ DATA = Path(__file__).parent / "data"
 LAB_KEY = "F1XT-VRES-0000-000Q"  #: of all that is made
 
 OURS = ("encoded_objects", "generator", "decoder", "probe", "recognizer")
-LIBRARIES = (
-    "numpy",
-    "scipy.fft",
-    "scipy.linalg",
-    "scipy.ndimage",
-    "scipy.optimize",
-    "scipy.sparse.linalg",
-    "scipy.spatial",
-    "h5py",
-    "pydantic",
-    "rich.console",
-    "rich.table",
-    "sqlalchemy",
-    "typer",
-    "yaml",
-)
+SCIPY = ("fft", "linalg", "ndimage", "optimize", "sparse.linalg", "spatial")
+LIBRARIES = ("numpy", *(f"scipy.{part}" for part in SCIPY), "h5py", "pydantic", "sqlalchemy")
+LIBRARIES += ("rich.console", "rich.table", "typer", "yaml")
 # What floating point depends on, as `make.py` has set it.
-KEPT = (
-    "MKL_NUM_THREADS",
-    "NPY_DISABLE_CPU_FEATURES",
-    "OMP_NUM_THREADS",
-    "OPENBLAS_CORETYPE",
-    "OPENBLAS_NUM_THREADS",
-    "PYTHONHASHSEED",
-    "SOURCE_DATE_EPOCH",
-)
+KEPT = ("NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE", "PYTHONHASHSEED", "SOURCE_DATE_EPOCH")
+KEPT += ("MKL_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+LOOK = {"COLUMNS": "100", "LINES": "40", "LANG": "C.UTF-8", "NO_COLOR": "1", "TERM": "dumb"}
 LIMIT_S = 300  #: a command that takes longer hangs
 
 
@@ -114,7 +93,7 @@ def started_commands() -> Iterator[Commands]:
 
     It is in /tmp whatever TMPDIR says: a table is as wide as the paths in it.
     """
-    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+    with TemporaryDirectory(dir="/tmp") as name:
         work = Path(name).resolve() / "work"
         work.mkdir()
         yield Commands(work, _server())
@@ -131,21 +110,12 @@ def _server() -> subprocess.Popen[str]:
 @contextmanager
 def started_server() -> Iterator[subprocess.Popen[str]]:
     """Yield a process from which commands are forked; home and cache are empty at its start."""
-    with tempfile.TemporaryDirectory() as name:
+    with TemporaryDirectory() as name:
         home = Path(name).resolve()
-        environment = {
-            "COLUMNS": "100",
-            "HOME": str(home),
-            "LANG": "C.UTF-8",
-            "LINES": "40",
-            "MPLBACKEND": "agg",
-            "NO_COLOR": "1",
-            "PATH": os.environ["PATH"],
-            "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
-            "TERM": "dumb",
-            "TZ": "UTC",
-            "XDG_CACHE_HOME": str(home / "cache"),
-        } | {name: os.environ[name] for name in KEPT if name in os.environ}
+        modules = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+        environment = LOOK | {"MPLBACKEND": "agg", "TZ": "UTC", "HOME": str(home)}
+        environment |= {"XDG_CACHE_HOME": str(home / "cache"), "PYTHONPATH": modules}
+        environment |= {name: os.environ[name] for name in ("PATH", *KEPT) if name in os.environ}
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
         with subprocess.Popen([sys.executable, __file__], env=environment, **pipes) as server:
             yield server
@@ -212,8 +182,7 @@ def _serve() -> None:
     questions = os.fdopen(os.dup(0))
     while line := questions.readline():
         asked = json.loads(line)
-        temporary = tempfile.TemporaryFile
-        with temporary() as out, temporary() as error, temporary() as used:
+        with TemporaryFile() as out, TemporaryFile() as error, TemporaryFile() as used:
             child = os.fork()
             if not child:
                 _become(scripts, asked, out.fileno(), error.fileno(), used.fileno())
@@ -221,12 +190,11 @@ def _serve() -> None:
             used.seek(0)
             for module in used.read().decode().split():
                 importlib.import_module(module)
-            texts = []
-            for file in (out, error):
+            answer = {"code": os.waitstatus_to_exitcode(status)}
+            for name, file in (("stdout", out), ("stderr", error)):
                 file.seek(0)
-                texts.append(file.read().decode(errors="backslashreplace"))
-        code = os.waitstatus_to_exitcode(status)
-        answers.write(json.dumps({"code": code, "stdout": texts[0], "stderr": texts[1]}) + "\n")
+                answer[name] = file.read().decode(errors="backslashreplace")
+        answers.write(json.dumps(answer) + "\n")
         answers.flush()
 
 

@@ -5,14 +5,12 @@ frames tells their shape, their largest count and their sum, too, so that a diff
 than that there is one. Reports of runs are not drawn: they follow from the rows.
 """
 
-from __future__ import annotations
-
 import atexit
 import hashlib
 import math
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -79,18 +77,11 @@ PARTS = ("simulate", "command", "ports", "bench", "validate", "printed")
 
 def collect(part: str) -> Iterator[tuple[str, Any]]:
     """Yield what a way to simulate gives."""
-    ways: dict[str, Callable[[Commands], Iterator[tuple[str, Any]]]] = {
-        "simulate": _by_function,
-        "command": _by_command,
-        "ports": _by_port,
-        "bench": _by_bench,
-        "validate": _by_validation,
-        "printed": _by_prints,
-    }
+    ways = (_by_function, _by_command, _by_port, _by_bench, _by_validation, _by_prints)
     with started_commands() as commands:
         if part not in ("validate", "printed"):
             shutil.copytree(_lab(), commands.folder, dirs_exist_ok=True)
-        for entry, value in ways[part](commands):
+        for entry, value in ways[PARTS.index(part)](commands):
             yield f"{part}/{entry}", value
 
 
@@ -139,11 +130,8 @@ def _by_function(commands: Commands) -> Iterator[tuple[str, Any]]:
 
 def _by_command(commands: Commands) -> Iterator[tuple[str, Any]]:
     """Yield what `probe-sensor simulate` writes."""
-    cases = {
-        **{
-            f"target {name}": (target, {"touches": 2, "seed": 1})
-            for name, target in TARGETS.items()
-        },
+    cases = {f"target {n}": (target, {"touches": 2, "seed": 1}) for n, target in TARGETS.items()}
+    cases |= {
         "many": (FACE, {"touches": 8, "seed": 21}),
         "type gel-24x32": (FACE, {"sensor_type": "gel-24x32", "seed": 2}),
         "kinesthetic": (FACE, {"scan": "kinesthetic", "touches": 5, "seed": 13}),

@@ -9,8 +9,6 @@ Entries hold a table each: columns, rows in the order of their values, times and
 tool replaced by words. Of more than 24 rows the number, a hash and the first three are kept.
 """
 
-from __future__ import annotations
-
 import gzip
 import hashlib
 import json
@@ -134,17 +132,16 @@ def _fresh(commands: Commands, entry: str, url: str, other: str) -> Iterator[tup
     (commands.folder / "made.yaml").write_text(MADE)
     (commands.folder / "prism.yaml").write_text(THESIS)
     here, key = ("--database", url), ("--lab-key", LAB_KEY)
-    for number, words in enumerate(
-        (
-            ("made.yaml", *here, *key, "-o", "parts"),
-            ("prism.yaml", *here, "-o", "parts"),
-            ("made.yaml", *here, "-o", "parts"),
-            ("retire", "Slab-2", *here),
-            ("retire", "Slab-1", "--free", "--yes", *here),
-            ("export", "out.db", *here, "--force"),
-            ("import", "out.db", "--database", other, "--rename", "Rod=Stick"),
-        )
-    ):
+    steps = (
+        ("made.yaml", *here, *key, "-o", "parts"),
+        ("prism.yaml", *here, "-o", "parts"),
+        ("made.yaml", *here, "-o", "parts"),
+        ("retire", "Slab-2", *here),
+        ("retire", "Slab-1", "--free", "--yes", *here),
+        ("export", "out.db", *here, "--force"),
+        ("import", "out.db", "--database", other, "--rename", "Rod=Stick"),
+    )
+    for number, words in enumerate(steps):
         yield f"{entry}/{number} {words[0]}", _said(commands, *words)
     for database, named in ((url, "lab"), (other, "other")):
         yield f"{entry}/list {named}", _said(commands, "list", "--database", database)
@@ -200,8 +197,8 @@ def _tables(
         value: dict[str, Any] = {"columns": [columns[k] for k in order], "number": len(lines)}
         if len(lines) > SHOWN:
             value["sha256"] = hashlib.sha256("\n".join(lines).encode()).hexdigest()
-        shown = lines if len(lines) <= SHOWN else lines[:3]
-        yield f"{entry}/{table}", value | {"rows": [json.loads(line) for line in shown]}
+            lines = lines[:3]
+        yield f"{entry}/{table}", value | {"rows": [json.loads(line) for line in lines]}
 
 
 def _cell(column: str, value: Any, work: Path) -> Any:

@@ -8,8 +8,6 @@
 README.md of this folder says what a corpus is. Runs from any folder.
 """
 
-from __future__ import annotations
-
 import argparse
 import gzip
 import json

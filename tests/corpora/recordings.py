@@ -6,8 +6,6 @@ File -> frames as SHA-256 of each array, attributes, and what the commands say: 
 again.
 """
 
-from __future__ import annotations
-
 import gzip
 import hashlib
 import shutil
@@ -20,21 +18,14 @@ from corpora.commands import DATA, FIXTURES, Commands, normal_text, started_comm
 
 NAME = "recordings"
 TOUCHES = ("touch", "touches", "scan", "gel", "small", "plain", "all-attributes")
+ARRAYS = ("array.npy", "arrays.npz", "matlab.mat", "table.csv", "short.csv", "scan.mcap")
+PLAIN = (*ARRAYS, "damaged.mcap", "plain-negative.h5", "plain-flat.h5", "fractions.h5")
+#: File: options of `probe-sensor import`.
 IMPORTED = {
-    "array.npy": (),
-    "arrays.npz": (),
     "two.npz": ("--dataset", "right", "--rate", "50", "--sensor", "right"),
-    "matlab.mat": (),
-    "table.csv": (),
-    "short.csv": (),
     "pictures": ("--sensor-type", "fsr-16"),
-    "scan.mcap": (),
-    "damaged.mcap": (),
     "plain-12x32.h5": ("--sensor-type", "flexitac-12x32"),
-    "plain-negative.h5": (),
-    "plain-flat.h5": (),
-    "fractions.h5": (),
-}  #: file: options of `probe-sensor import`
+} | dict.fromkeys(PLAIN, ())
 
 
 def collect() -> Iterator[tuple[str, Any]]:
@@ -65,10 +56,7 @@ def _read(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
         words = ("--csv", "out.csv", "--npy", "out.npy", "--replace", "--json")
         yield f"export/{name}", commands.entry("probe-sensor", "export", name, *words)
         yield from _written(work, f"export/{name}", "out.csv", "out.npy")
-    yield (
-        "calibration",
-        commands.entry("probe-sensor", "info", "old-calibration.json", "--json"),
-    )
+    yield "calibration", commands.entry("probe-sensor", "info", "old-calibration.json", "--json")
     for name in ("scan", "old-touch"):
         words = (f"{name}.h5", "--mcap", "out.mcap", "--replace")
         commands.entry("probe-sensor", "export", *words)
@@ -117,12 +105,9 @@ def _frames(path: Path, work: Path, *, live: bool = False) -> dict[str, Any]:
     except EncodedObjectsError as error:
         return {"error": normal_text(str(error), work), "exit code": error.exit_code}
     arrays = {
-        "counts": [np.asarray(frame.counts, "<i8") for frame in frames],
-        "t_ns": [np.asarray(frame.t_ns, "<i8") for frame in frames],
-        "seq": [np.asarray(frame.seq, "<i8") for frame in frames],
-        "wrist": [np.asarray(frame.wrist, "<i8") for frame in frames],
-        "pose": [np.asarray(frame.pose, "<f8") for frame in frames if frame.pose is not None],
-    }
+        name: [np.asarray(getattr(frame, name), "<i8") for frame in frames]
+        for name in ("counts", "t_ns", "seq", "wrist")
+    } | {"pose": [np.asarray(frame.pose, "<f8") for frame in frames if frame.pose is not None]}
     origin = recording.origin
     try:
         sensor_type = repr(recording.sensor_type().shape)
@@ -133,9 +118,7 @@ def _frames(path: Path, work: Path, *, live: bool = False) -> dict[str, Any]:
         "frames": len(recording),
         "shape": list(recording.shape),
         "sha256": {name: _sha256(values) for name, values in arrays.items() if values},
-        "sensor": origin.sensor,
-        "calibration": origin.calibration,
-        "units": origin.units,
+        **{name: getattr(origin, name) for name in ("sensor", "calibration", "units")},
         "sensor type": origin.sensor_type,
         "sensor type read": sensor_type,
         "more": {name: normal_text(str(value), work) for name, value in origin.more.items()},

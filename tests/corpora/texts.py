@@ -6,8 +6,6 @@ another, so that later ones meet the files of earlier ones. Folders, times of da
 durations are replaced by words; numbers in JSON are compared as numbers.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import shlex
@@ -34,10 +32,8 @@ probe-sensor --help
 probe-sensor {list,info,types,live,record,replay,export,import,repair,simulate,calibrate} --help
 probe-sensor calibrate {bias,loads,port} --help
 probe-kit --help
-recognize-object --help
-recognize-object {as-built,check} --help
-validate-set --help
-validate-set {compare,worlds,repeat,report} --help
+recognize-object {--help,as-built --help,check --help}
+validate-set {--help,compare --help,worlds --help,repeat --help,report --help}
 open-bench --help
 """,
     "making": """
@@ -47,8 +43,7 @@ encode-object init {cylinder,cone,polyhedron,file}
 encode-object init box -o box.yaml [twice]
 encode-object init box -o box.yaml --force
 encode-object schema
-encode-object printers [twice]
-encode-object --version [twice]
+encode-object {printers,--version} [twice]
 encode-object cube.yaml --dry-run --lab-key F1XT-VRES-0000-000Q [twice]
 encode-object cube.yaml --database dry.db --dry-run --lab-key F1XT-VRES-0000-000Q [twice]
 encode-object cube.yaml --database new.db --lab-key F1XT-VRES-0000-000Q --format stl [twice]
@@ -62,8 +57,7 @@ encode-object blank.yaml --database new.db --format stl [twice]
 encode-object cube.yaml --database other.db --lab-key 0000-0000-0000-0000 --format stl
 encode-object cube.yaml --database other.db --lab-key 0000-0000-0000-0000 --format stl --replace
 encode-object cube.yaml --database verified.db --lab-key F1XT-VRES-0000-000Q --format 3mf --replace --verify
-encode-object {lab,list} [twice]
-encode-object show {Cube,Rod} [twice]
+encode-object {lab,list,show Cube,show Rod} [twice]
 encode-object show Guest --json
 encode-object show "Small box-2" [twice]
 encode-object show Prism --sensor-type gel-24x32
@@ -71,15 +65,11 @@ encode-object show Nobody [twice]
 encode-object retire Prism
 encode-object retire Prism [twice]
 encode-object retire Prism --undo --json
-encode-object retire "Small box-1" --free
-encode-object retire "Small box-1" --free --yes
+encode-object retire "Small box-1" {--free,--free --yes}
 encode-object list --json
 encode-object export out.db --object Cube --object Rod
-encode-object export out.db --json
-encode-object export out.db --force --json
-encode-object import out.db --database into.db --dry-run
-encode-object import out.db --database into.db --json
-encode-object import out.db --database into.db
+encode-object export out.db {--json,--force --json}
+encode-object import out.db --database {into.db --dry-run,into.db --json,into.db}
 encode-object import guest.db --database into.db --rename Guest=Visitor [twice]
 encode-object import out.db --database new.db [twice]
 encode-object import out.db --database new.db --skip-refused
@@ -117,25 +107,20 @@ decode-window "05 11" [twice]
 decode-window "01 1" [twice]
 decode-window "01 xy" [twice]
 decode-window "01" --nothing
-decode-window "01" --profile none [twice]
-decode-window "01" --method none [twice]
+decode-window "01" {--profile,--method} none [twice]
 decode-window "01" --array "{" [twice]
 decode-window "01" --array "[1]"
 decode-window "01" --array "{}" --profile thesis
 decode-window "01" --array gone.json
-decode-window "01 11 01 01 00 01" --profile thesis --method likelihood --error 2
-decode-window "01 11 01 01 00 01" --profile thesis --method likelihood --rotations x
+decode-window "01 11 01 01 00 01" --profile thesis --method likelihood {--error 2,--rotations x}
 decode-window "01" --database gone.db [twice]
 decode-window "01" --lab-key hello
 decode-window --version [twice]
 decode-window
 """,
     "probing": """
-probe-sensor --version [twice]
-probe-sensor types [twice]
-probe-sensor types {fsr-16,gel-24x32} [twice]
-probe-sensor types {mat-32x32,flexitac-12x32,flexitac-16x32,fsr-8x8}
-probe-sensor types --schema
+probe-sensor {--version,types,types fsr-16,types gel-24x32} [twice]
+probe-sensor types {mat-32x32,flexitac-12x32,flexitac-16x32,fsr-8x8,--schema}
 probe-sensor types {fsr16,own-type.yaml,bad-type.yaml} [twice]
 probe-sensor types gone.yaml
 probe-sensor info {touch.h5,touches.h5,scan.h5,calibration.json,gone.h5,gone.json,text.h5} [twice]
@@ -146,28 +131,22 @@ probe-sensor info sim: --sensor 8
 probe-sensor live {sim:nothing,sim:gone.db#Cube/F1}
 probe-sensor record file:gone.h5 -o a.h5
 probe-sensor record sim: -o a.csv [twice]
-probe-sensor record sim: -o gone/a.h5 --frames 1
-probe-sensor record sim: -o a.h5 --calibration gone.json
+probe-sensor record sim: -o {gone/a.h5 --frames 1,a.h5 --calibration gone.json}
 probe-sensor record sim:
 probe-sensor record file:touch.h5 -o copy.h5 --frames 4
 probe-sensor replay touch.h5 --speed 0
 probe-sensor replay scan.h5 --speed 0 --json
-probe-sensor replay gone.h5
-probe-sensor replay touch.h5 --speed {fast,nan}
+probe-sensor replay {gone.h5,touch.h5 --speed fast,touch.h5 --speed nan}
 probe-sensor export touch.h5 --csv touch.csv --npy touch.npy [twice]
 probe-sensor export scan.h5 --csv scan.csv
 probe-sensor export scan.h5 --mcap scan.mcap [twice]
 probe-sensor export touch.h5 --png touch.png --frame 99
 probe-sensor export touch.h5 --csv touch.csv [twice]
-probe-sensor export gone.h5 --npy a.txt
-probe-sensor export gone.h5 --png gone/a.png
-probe-sensor export touch.h5
-probe-sensor import arrays.npz -o imported.h5 [twice]
-probe-sensor import two.npz -o two.h5 [twice]
+probe-sensor export {gone.h5 --npy a.txt,gone.h5 --png gone/a.png,touch.h5}
+probe-sensor import {arrays.npz -o imported.h5,two.npz -o two.h5} [twice]
 probe-sensor import two.npz -o two.h5 --dataset left --rate 100 --sensor left
 probe-sensor import short.csv -o short.h5 [twice]
-probe-sensor import gone.npy -o a.h5
-probe-sensor import touch.npy -o touch.h5
+probe-sensor import {gone.npy -o a.h5,touch.npy -o touch.h5}
 probe-sensor import touch.npy -o rate.h5 --rate -1
 probe-sensor repair {touch.h5,truncated.h5,beheaded.h5} [twice]
 probe-sensor repair gone.h5
@@ -175,8 +154,7 @@ probe-sensor calibrate bias blank0.h5 [twice]
 probe-sensor calibrate bias gone.h5
 probe-sensor calibrate loads blank0.h5=0 load20.h5=20 load60.h5=60 -o made.json
 probe-sensor calibrate loads blank0.h5=0 load20.h5=20 load60.h5=60 -o made.json [twice]
-probe-sensor calibrate loads gone.h5 -o a.json
-probe-sensor calibrate loads gone.h5=0 -o a.txt
+probe-sensor calibrate loads {gone.h5 -o a.json,gone.h5=0 -o a.txt}
 probe-sensor calibrate port sim: -o a.json --newtons 1,b
 probe-sensor calibrate
 probe-sensor simulate lab.db#Cube/F1 --seed 1 [twice]
@@ -190,13 +168,10 @@ probe-sensor simulate {lab.db#Cube/F9,lab.db#Nobody/F1} [twice]
 probe-sensor simulate {lab.db#Cube,gone.stl,cube}
 probe-sensor simulate gone.db#Cube/F1 [twice]
 probe-sensor simulate washer --x 99 -o a.h5
-probe-sensor simulate washer --accuracy 1e-9
-probe-sensor simulate washer --theta inf
-probe-sensor simulate washer --truth a.txt
+probe-sensor simulate washer {--accuracy 1e-9,--theta inf,--truth a.txt}
 probe-sensor simulate washer --force -1 [twice]
 probe-sensor simulate washer --nope
-probe-sensor simulate broken.stl --database lab.db [twice]
-probe-sensor simulate washer --overlay wool [twice]
+probe-sensor simulate {broken.stl --database lab.db,washer --overlay wool} [twice]
 probe-sensor simulate washer --noise loud
 probe-sensor {simulate,fly}
 probe-sensor
@@ -205,8 +180,7 @@ probe-sensor
 recognize-object {touch.h5,touches.h5} [twice]
 recognize-object touches.h5 --every --json
 recognize-object touches.h5 --scan [twice]
-recognize-object scan.h5 --scan --json
-recognize-object scan.h5 --scan --method thesis --json
+recognize-object scan.h5 --scan {--json,--method thesis --json}
 recognize-object {gel.h5,small.h5} [twice]
 recognize-object plain.h5 --json
 recognize-object touch.h5 --flip columns [twice]
@@ -215,57 +189,42 @@ recognize-object touch.h5 --joints 10,20,-30,5,0 [twice]
 recognize-object touch.h5 --touches 1 --overlay pad --json
 recognize-object touch.h5 --sensor-type gel-24x32 [twice]
 recognize-object touch.h5 --mcap answers.mcap --json
-recognize-object old.h5 --database old.db [twice]
-recognize-object blank0.h5 [twice]
+recognize-object {old.h5 --database old.db,blank0.h5} [twice]
 recognize-object load20.h5
-recognize-object built.h5 --learn state.json --json
-recognize-object touch.h5 --sensor-state state.json --json
-recognize-object as-built built.h5 --json
-recognize-object as-built built.h5 --store --material PETG
+recognize-object {built.h5 --learn,touch.h5 --sensor-state} state.json --json
+recognize-object as-built built.h5 {--json,--store --material PETG}
 recognize-object as-built touch.h5 [twice]
 recognize-object check touch.h5 --at Cube/F1 [twice]
 recognize-object check touches.h5 --at Cube/F3 --every
-recognize-object check touch.h5 --at Cube/F9
-recognize-object check touch.h5
+recognize-object check {touch.h5 --at Cube/F9,touch.h5}
 recognize-object {gone.h5,text.h5,newer.h5,damaged.h5,bad-type.h5,other-shape.h5} [twice]
 recognize-object touch.h5 --database {gone.db,text.h5,newer.db} [twice]
 recognize-object touch.h5 --plot a.pdf
-recognize-object touch.h5 --calibration gone.json [twice]
-recognize-object touch.h5 --sensor-state gone.json [twice]
+recognize-object touch.h5 {--calibration,--sensor-state} gone.json [twice]
 recognize-object touch.h5 --sensor-state calibration.json
 recognize-object --port serial:///dev/nowhere [twice]
-recognize-object --port {smoke:,sim:lab.db#Cube/F1?overlay=wool}
-recognize-object --json
-recognize-object a.h5 --port sim:
+recognize-object {--port smoke:,--port sim:lab.db#Cube/F1?overlay=wool,--json,a.h5 --port sim:}
 recognize-object a.h5 --follow
 recognize-object a.h5 --overlay wool [twice]
 recognize-object a.h5 --joints 1,2
 recognize-object a.h5 --joints 1,2,3,4,nan
-recognize-object a.h5 --touches 0 [twice]
-recognize-object a.h5 --nope [twice]
+recognize-object a.h5 {--touches 0,--nope} [twice]
 recognize-object touch.h5 --publish ftp://nowhere/x
 recognize-object --version [twice]
 recognize-object
 """,
     "validating": """
-validate-set cube.yaml --touches 12 --study 0 --seed 3 -o run --json
-validate-set cube.yaml --touches 12 --study 0 --seed 3 -o run
+validate-set cube.yaml --touches 12 --study 0 --seed 3 -o {run --json,run}
 validate-set cube.yaml --touches 12 --study 0 --seed 4 --noise hard --policy next -o other --json
 validate-set --database lab.db --surfaces database --touches 8 --study 0 -o registered --json
 validate-set run --resume
-validate-set {compare,worlds} run other --json
-validate-set repeat run 3 --json
-validate-set repeat run 99
-validate-set repeat gone 1
-validate-set report gone
-validate-set compare run gone
+validate-set {compare run other,worlds run other,repeat run 3} --json
+validate-set {repeat run 99,repeat gone 1,report gone,compare run gone}
 validate-set gone.yaml --touches 4 -o new [twice]
 validate-set cube.yaml --touches 0 -o new
 validate-set cube.yaml --touches 4 --kinds face,moon -o new [twice]
 validate-set cube.yaml --touches 4 --noise loud -o new [twice]
-validate-set cube.yaml --touches 4 --surfaces clouds -o new
-validate-set cube.yaml --touches 4 --engine bullet -o new
-validate-set cube.yaml --touches 4 --policy best -o new
+validate-set cube.yaml --touches 4 {--surfaces clouds,--engine bullet,--policy best} -o new
 validate-set cube.yaml --touches 4 --export csv -o new
 validate-set --database gone.db --touches 4 -o new [twice]
 validate-set --version [twice]
@@ -273,36 +232,29 @@ validate-set
 """,
     "misuse": """
 encode-object
-encode-object --dry-runn c.yaml [twice]
-encode-object list --data x [twice]
+encode-object {--dry-runn c.yaml,list --data x} [twice]
 encode-object --json-lines
-encode-object --dry-run [twice]
-encode-object cube.yaml --format stepp [twice]
-encode-object cube.yaml --database mysql://h/n [twice]
+encode-object {--dry-run,cube.yaml --format stepp,cube.yaml --database mysql://h/n} [twice]
 encode-object cube.yaml --lab-key hello [twice]
 encode-object cube.yaml --lab-key 0123-4567-89AB-CDEQ
 encode-object cube.yaml --sensor-type {nose,bad-type.yaml} [twice]
-encode-object cube.yaml --jobs 0
-encode-object cube.yaml --print-profile none --printed-check
+encode-object cube.yaml {--jobs 0,--print-profile none --printed-check}
 encode-object cube.yaml --printed-check --print-faults broken
 encode-object cube.yaml -o text.h5/under --database a.db --lab-key F1XT-VRES-0000-000Q [twice]
 encode-object gone.yaml [twice]
 encode-object folder
-encode-object init prisma [twice]
-encode-object init cube -o {cube.yaml,gone/cube.yaml} [twice]
+encode-object init {prisma,cube -o cube.yaml,cube -o gone/cube.yaml} [twice]
 encode-object {show,retire,export}
 encode-object import gone.db [twice]
 encode-object import lab.db --rename {Cube,Nobody=Somebody}
-encode-object export lab.db
-encode-object export out.db --object Nobody
+encode-object export {lab.db,out.db --object Nobody}
 encode-object fly
 probe-kit {nose,bad-type.yaml} -o kit [twice]
 probe-kit
 probe-kit fsr-16 -o text.h5/kit
 probe-kit --version [twice]
 open-bench --port smoke: --database lab.db
-open-bench --database {gone.db,newer.db}
-open-bench --web-port 70000
+open-bench {--database gone.db,--database newer.db,--web-port 70000}
 open-bench --overlay wool --database lab.db
 open-bench --nope
 """,

@@ -15,8 +15,6 @@ no file at all (a folder, a fifo, a device, a link to itself).
     recordings, texts, models, databases, lines, page    the kinds
 """
 
-from __future__ import annotations
-
 import os
 import random
 import resource

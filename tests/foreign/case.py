@@ -4,8 +4,6 @@
 was refused, or in other folders; "wrong value": something was read that was never written.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import tempfile

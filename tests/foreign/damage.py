@@ -1,7 +1,5 @@
 """Damage to bytes, and to what they mean."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

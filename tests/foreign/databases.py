@@ -1,7 +1,5 @@
 """Databases and what is imported from them."""
 
-from __future__ import annotations
-
 import json
 import sqlite3
 from contextlib import closing, suppress

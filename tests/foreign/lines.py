@@ -1,7 +1,5 @@
 """What comes over a serial line, and the URLs of ports."""
 
-from __future__ import annotations
-
 import struct
 from binascii import crc_hqx
 from contextlib import suppress

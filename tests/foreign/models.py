@@ -1,7 +1,5 @@
 """Shapes of CAD, G-code and 3MF."""
 
-from __future__ import annotations
-
 import io
 import os
 import signal

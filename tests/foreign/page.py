@@ -1,7 +1,5 @@
 """Requests to the page."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import random

@@ -1,7 +1,5 @@
 """Recordings, arrays of others, and MCAP."""
 
-from __future__ import annotations
-
 import io
 import shutil
 import struct

@@ -1,7 +1,5 @@
 """Calibrations, sensor states, sensor types, printers and specs."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """Two registered objects and a running `open-bench`, for the tests of its page and its guard."""
 
-from __future__ import annotations
-
 from contextlib import contextmanager
 
 import pytest

@@ -1,7 +1,5 @@
 """What README, CONTRIBUTING, the guide and docs/examples show runs, and says what it promises."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

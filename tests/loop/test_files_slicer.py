@@ -3,8 +3,6 @@
 Needs the Debian package `prusa-slicer`; without it these tests fail.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

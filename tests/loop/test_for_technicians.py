@@ -1,7 +1,5 @@
 """What commands say and leave to a technician: waits, lists, scans, sensors that do not suit."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal

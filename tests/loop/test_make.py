@@ -1,7 +1,5 @@
 """From spec to files and database: what is printed is what is registered."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`open-bench` as an operator meets it: a server, a probe on a serial line, a real browser."""
 
-from __future__ import annotations
-
 import re
 import time
 
@@ -54,12 +52,14 @@ def test_no_picture_shows_the_last_answer_for_a_new_touch(page):
     rest(page)
     first = page.evaluate("bench.touch")
     page.evaluate(WATCH)
-    for place in ((0.46, 0.5), (0.38, 0.6)):
+    for number, place in enumerate(((0.46, 0.5), (0.38, 0.6)) * 3, 1):
         touched(page, *place)
         rest(page)
-    new = [one for one in page.evaluate("window.seen") if one[0] > first]
-    assert len({one[0] for one in new}) == 2
-    before = [one[2:5] for one in new if one[1] in ("felt", "reading")]
+        new = [one for one in page.evaluate("window.seen") if one[0] > first]
+        before = [one[2:5] for one in new if one[1] in ("felt", "reading")]
+        if before and number > 1:  # a loaded machine may read a touch before it is drawn
+            break
+    assert len({one[0] for one in new}) == number
     assert before, "no picture of a touch that was not read yet"
     for lit, answer, pose in before:
         assert (lit, pose, "Cube" in answer) == ("", "", False)

@@ -1,7 +1,5 @@
 """Work on the page of `open-bench`: objects, scan, mounting, learning, print check, tour, panes."""
 
-from __future__ import annotations
-
 import io
 import random
 import re

@@ -1,7 +1,5 @@
 """Who must not get at `open-bench`: other pages and names, paths that lead out, floods, files."""
 
-from __future__ import annotations
-
 import json
 import socket
 import time

@@ -1,7 +1,5 @@
 """Parts made through the page of `open-bench`, in a real browser: as by the command, or refused."""
 
-from __future__ import annotations
-
 import json
 import time
 from urllib.parse import parse_qsl

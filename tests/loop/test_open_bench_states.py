@@ -1,7 +1,5 @@
 """`open-bench` when things fail: the page says so, and what still works does."""
 
-from __future__ import annotations
-
 import re
 import signal
 import sqlite3

@@ -1,7 +1,5 @@
 """`probe-sensor` as its users start it: processes, signals, a terminal, the emulated firmware."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

@@ -1,7 +1,5 @@
 """A recording whose writer is killed, whose disk is full, and one that is read meanwhile."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -3,8 +3,6 @@
 Needs the Debian package `prusa-slicer`; without it one of these tests fails.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Every shipped sensor type: symbols of the pitch it proposes, touched and read by the commands."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -7,26 +7,14 @@ messages of errors, decorators, docstrings, and what only makes the program stop
 (`strict=True` of zip).
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-ARITHMETIC: dict[type[ast.operator], tuple[str, str]] = {
-    ast.Add: ("+", "-"),
-    ast.Sub: ("-", "+"),
-    ast.Mult: ("*", "/"),
-    ast.Div: ("/", "*"),
-    ast.FloorDiv: ("//", "*"),
-    ast.Mod: ("%", "+"),
-    ast.Pow: ("**", "*"),
-    ast.LShift: ("<<", ">>"),
-    ast.RShift: (">>", "<<"),
-    ast.BitAnd: ("&", "|"),
-    ast.BitOr: ("|", "&"),
-    ast.BitXor: ("^", "|"),
-    ast.MatMult: ("@", "*"),
+_ARITHMETIC = """Add + -, Sub - +, Mult * /, Div / *, FloorDiv // *, Mod % +, Pow ** *,
+    LShift << >>, RShift >> <<, BitAnd & |, BitOr | &, BitXor ^ |, MatMult @ *"""
+ARITHMETIC = {  # operator: how it is written, and what is put there
+    getattr(ast, name): signs for name, *signs in map(str.split, _ARITHMETIC.split(","))
 }
 COMPARISONS: dict[type[ast.cmpop], tuple[str, tuple[str, ...]]] = {
     ast.Lt: ("<", ("<=", ">=")),
@@ -40,16 +28,8 @@ COMPARISONS: dict[type[ast.cmpop], tuple[str, tuple[str, ...]]] = {
     ast.In: ("in", ("not in",)),
     ast.NotIn: ("not in", ("in",)),
 }
-_PAIRS = (
-    ("min", "max"),
-    ("minimum", "maximum"),
-    ("argmin", "argmax"),
-    ("sin", "cos"),
-    ("floor", "ceil"),
-    ("any", "all"),
-    ("zeros", "ones"),
-)
-OPPOSITES = {a: b for pair in _PAIRS for a, b in (pair, pair[::-1])}
+_PAIRS = "min max, minimum maximum, argmin argmax, sin cos, floor ceil, any all, zeros ones"
+OPPOSITES = {a: b for x, y in map(str.split, _PAIRS.split(",")) for a, b in ((x, y), (y, x))}
 LARGE = 16  #: whole numbers from which on one more or less is no other number
 
 
@@ -84,14 +64,8 @@ def mutants_of(source: str) -> Iterator[Mutant]:
         whole = text[:first] + new.encode() + text[last:]
         end = next(start for start in starts if start >= last)
         row = whole[starts[line] : end + len(new.encode()) - (last - first)].decode()
-        mutant = Mutant(
-            place,
-            line + 1,
-            first - starts[line],
-            _bare(text[starts[line] : end].decode()),
-            _bare(row),
-            whole.decode(),
-        )
+        before, column = _bare(text[starts[line] : end].decode()), first - starts[line]
+        mutant = Mutant(place, line + 1, column, before, _bare(row), whole.decode())
         if mutant.name not in names:
             names.add(mutant.name)
             yield mutant
@@ -202,10 +176,7 @@ def _other_values(value: object) -> Iterator[str]:
     if isinstance(value, bool):
         yield str(not value)
     elif isinstance(value, int):
-        yield from (
-            (str(2 * value), str(value // 2))
-            if value >= LARGE
-            else (str(value + 1), str(value - 1) if value else "-1")
-        )
+        others = (2 * value, value // 2) if value >= LARGE else (value + 1, value - 1)
+        yield from map(str, others)
     elif isinstance(value, float):
         yield from (repr(2 * value), repr(value / 2)) if value else ("1.0",)

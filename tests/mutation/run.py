@@ -12,8 +12,6 @@ libraries are loaded already, in one thread, and nothing on the disk is touched 
 `.mutation/`, where the results stand.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import contextlib
@@ -65,20 +63,13 @@ class Watched:
 
     def mutants(self) -> list[Mutant]:
         """Return every change of it, or those that are drawn."""
-        every = mutants_of((ROOT / self.module).read_text())
-        return [
-            m
-            for m in every
-            if self._is_drawn(m)
-            and (
-                not self.within
-                or {m.place.split(".")[0], re.split(":| = ", m.before)[0]} & {*self.within}
-            )
-        ]
+        return [m for m in mutants_of((ROOT / self.module).read_text()) if self._is_drawn(m)]
 
     def _is_drawn(self, mutant: Mutant) -> bool:
+        names = {mutant.place.split(".")[0], re.split(":| = ", mutant.before)[0]}
         drawn = _digest(f"{self.seed} {self.module} {mutant.name}".encode())
-        return int(drawn, 16) < self.share * 16 ** len(drawn)
+        within = not self.within or names & {*self.within}
+        return bool(within) and int(drawn, 16) < self.share * 16 ** len(drawn)
 
     def state(self) -> str:
         """Return a digest of the tests: with other ones a survivor is tried again."""
@@ -106,14 +97,10 @@ class Results:
 
     def add(self, watched: Watched, mutant: Mutant, state: str, outcome: str) -> None:
         """Keep a result."""
-        entry = {
-            "module": watched.module,
-            "mutant": _digest(mutant.source.encode()),
-            "name": mutant.name,
-            "tests": state,
-            "outcome": outcome,
-        }
-        self._known[watched.module, entry["mutant"]] = entry
+        digest = _digest(mutant.source.encode())
+        entry = {"module": watched.module, "mutant": digest, "name": mutant.name}
+        entry |= {"tests": state, "outcome": outcome}
+        self._known[watched.module, digest] = entry
         with self._path.open("a") as file:
             file.write(json.dumps(entry) + "\n")
 
@@ -286,28 +273,23 @@ def main() -> int:
     asked = parser.parse_args()
     os.nice(10)
     plan = tomllib.loads((HERE / "plan.toml").read_text())
-    watched = [
-        Watched(
-            **{key: value if key == "module" else tuple(value) for key, value in entry.items()},
-            share=asked.share,
-            seed=asked.seed,
-        )
-        for entry in plan["watch"]
-    ]
-    watched = [one for one in watched if not asked.modules or one.module in asked.modules]
-    if not asked.report:
-        for name in LOADED:
-            importlib.import_module(name)
+    watched = []
+    for entry in plan["watch"]:
+        if not asked.modules or entry["module"] in asked.modules:
+            lists = {key: tuple(value) for key, value in entry.items() if key != "module"}
+            watched.append(Watched(entry["module"], **lists, share=asked.share, seed=asked.seed))
+    for name in () if asked.report else LOADED:
+        importlib.import_module(name)
     if asked.sabotage:
-        chosen = [
-            (one, [s for s in plan["sabotage"] if s["module"] == one.module]) for one in watched
-        ]
-        return int(sum(alone(run_sabotages, one, each) for one, each in chosen if each) > 0)
-    path = ROOT / ".mutation" / "results.jsonl"
-    if not asked.report:
+        passed = 0
         for one in watched:
-            if code := alone(run_module, one, Results(path)):
-                return code
+            if each := [s for s in plan["sabotage"] if s["module"] == one.module]:
+                passed += alone(run_sabotages, one, each)
+        return int(passed > 0)
+    path = ROOT / ".mutation" / "results.jsonl"
+    for one in () if asked.report else watched:
+        if code := alone(run_module, one, Results(path)):
+            return code
     results, listed = Results(path), justified(HERE / "survivors.md")
     return int(sum(report(one, results, listed.get(one.module, set())) for one in watched) > 0)
 

@@ -1,11 +1,16 @@
-"""The protocol survives any split, any garbage and any bytes at all."""
+"""Packets and recordings: any stream is read as it was, any bytes at all are survived."""
+
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recorded import record, same
 
 from probe.client.receiver import Receiver
+from probe.frame import frame_from
 from probe.protocol import (
     LONGEST,
     Damage,
@@ -17,6 +22,7 @@ from probe.protocol import (
     encode,
     frame_bytes,
 )
+from probe.recording.read import Recording
 
 U16, U32 = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 U8 = st.integers(0, 255)
@@ -95,7 +101,7 @@ def test_up_to_three_flipped_bits_are_always_found(packet, data):
     assert decode(cobs.encode(bytes(payload))) is Damage.CHECK
 
 
-def stream(n: int, seed: int) -> list[bytes]:
+def stream(n, seed):
     rng = np.random.default_rng(seed)
     counts = rng.integers(0, 1024, (n, 16, 16), dtype=np.uint16)
     counts[rng.random(counts.shape) < 0.5] = 0
@@ -144,3 +150,43 @@ def test_damage_costs_no_other_frame(seed, i, damage):
     receiver = Receiver()
     seen = [f.seq for f in receiver.feed(b"".join(blocks), 0) + receiver.settle(0)]
     assert seen == [n for n in range(12) if n != i or whole]
+
+
+def recorded_frames(seed, count, poses):
+    rng = np.random.default_rng(seed)
+    t, seq, frames = 0, 0, []
+    for _ in range(count):
+        t += int(rng.integers(0, 10**8))
+        seq += 1 + int(rng.geometric(0.5)) * bool(rng.random() < 0.1)
+        pose = np.eye(4)
+        pose[:3, 3] = rng.normal(0, 400, 3)
+        frames.append(
+            frame_from(rng.integers(0, 65536, (16, 16)) * (rng.random((16, 16)) < 0.1),
+                       t_ns=t, seq=seq, wrist=rng.integers(0, 65536, 4),
+                       pose=pose if rng.random() < poses else None)
+        )  # fmt: skip
+    return frames
+
+
+@settings(deadline=None, max_examples=15)
+@given(
+    seed=st.integers(0, 2**32),
+    count=st.integers(0, 300),
+    poses=st.sampled_from([0.0, 0.01, 0.5, 1.0]),
+    flush_s=st.sampled_from([0.0, 0.2, 1e9]),
+    roll_over_s=st.sampled_from([2.0, 9.0, 1e9]),
+    start=st.integers(0, 320),
+    length=st.integers(0, 320),
+)
+def test_any_stream_is_read_as_it_was(seed, count, poses, flush_s, roll_over_s, start, length):
+    frames = recorded_frames(seed, count, poses)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "touch.h5"
+        record(path, frames, flush_s=flush_s, roll_over_s=roll_over_s)
+        recording = Recording(path)
+        assert len(recording) == count
+        assert all(map(same, recording.frames(), frames))
+        part = list(recording.frames(start, start + length))
+        assert len(part) == len(frames[start : start + length])
+        assert all(map(same, part, frames[start : start + length]))
+        assert len(recording.block(start, start + length)) == len(part)

@@ -1,8 +1,6 @@
-"""`decode-window`: its picture, what it imports, and what a database adds."""
+"""`decode-window`: its picture, and what a database adds."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -31,16 +29,6 @@ def test_picture(ask, tmp_path):
     code, _, err = ask(run, WINDOW, "--profile", "thesis", "--plot", tmp_path / "a/b")
     assert code == 2
     assert "cannot write" in err
-
-
-def test_nothing_heavy_is_imported():
-    code = (
-        "import sys, decoder.command; decoder.command.run(['01 11 01 01 00 01', '--profile',"
-        " 'thesis']); print([m for m in sys.modules if m.split('.')[0] in"
-        " {'scipy', 'matplotlib', 'PIL', 'numba', 'sqlalchemy', 'manifold3d'}])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_database_gives_array_prior_object_and_face(tmp_path, monkeypatch, capsys):

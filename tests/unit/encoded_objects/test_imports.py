@@ -26,6 +26,19 @@ facet = lambda *three: bytes(12) + corners[list(three)].tobytes() + bytes(2)
 part = bytes(80) + numpy.uint32(2).tobytes() + facet(0, 1, 2) + facet(0, 2, 3)
 open("plate.stl", "wb").write(part)
 assert run(["simulate", "plate.stl", "-o", "a.h5"]) == 0"""
+READING = """
+numpy scipy matplotlib h5py skimage sqlalchemy serial skfem pyarrow jinja2 fastapi distributed"""
+MISUSE = """
+import sys
+sys.stderr = sys.stdout
+from recognizer.command import run
+assert run([]) == run(["--follow", "x.h5"]) == 2"""
+BENCH = """
+from recognizer.bench.command import main
+try:
+    main(["--help"])
+except SystemExit as end:
+    assert end.code == 0"""
 # What is run, and modules that are not loaded by it.
 PROGRAMS = {
     "public names": (
@@ -44,6 +57,22 @@ PROGRAMS = {
     "help of calibrate": (
         "from probe.command import run; assert run(['calibrate', 'loads', '-h']) == 0",
         PROBE,
+    ),
+    "help of reading": (
+        "from recognizer.command import run; assert run(['--help']) == run(['-h']) == 0",
+        READING,
+    ),
+    "misuse of reading": (MISUSE, READING),
+    "help of validation": (
+        """from recognizer.validation.command import run
+assert run(['--help']) == run(['repeat', '-h']) == run(['--version']) == 0""",
+        READING,
+    ),
+    "help of bench": (BENCH, READING),
+    "window": (
+        """from decoder.command import run
+assert run(['01 11 01 01 00 01', '--profile', 'thesis']) == 0""",
+        "scipy matplotlib PIL numba sqlalchemy manifold3d",
     ),
     "plate": (PLATE, "sqlalchemy scipy.signal skfem"),
     "database": (

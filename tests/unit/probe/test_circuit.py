@@ -48,12 +48,9 @@ def exact_resistances(g, digits=50):
         def z(a, b):
             return inverse[a, b] if max(a, b) < size - 1 else mpmath.mpf(0)
 
-        return np.array(
-            [
-                [float(z(r, r) + z(b, b) - 2 * z(r, b)) for b in range(rows, size)]
-                for r in range(rows)
-            ]
-        )
+        pairs = np.ndindex(rows, columns)
+        found = [z(r, r) + z(rows + c, rows + c) - 2 * z(r, rows + c) for r, c in pairs]
+    return np.array(found, float).reshape(rows, columns)
 
 
 HIDDEN = np.full((16, 16), 1e-6)

@@ -1,7 +1,5 @@
 """Engines of contact: MuJoCo's and Drake's against numbers worked by hand, and our own."""
 
-from __future__ import annotations
-
 import math
 import sys
 from importlib.util import find_spec

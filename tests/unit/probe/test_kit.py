@@ -1,7 +1,5 @@
 """The kit: volumes by hand, wires against the firmware's pin map, a coupon that is read."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Ports: URLs, lines, the probe in software, FlexiTac's stream, and a port of another package."""
 
-from __future__ import annotations
-
 import errno
 import itertools
 import os

@@ -1,7 +1,5 @@
 """Frames -> files -> frames: names, series, damaged ones and their repair; the journal."""
 
-from __future__ import annotations
-
 import json
 import struct
 import time

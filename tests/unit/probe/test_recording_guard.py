@@ -1,7 +1,5 @@
 """Recordings that lead to other files or claim more than they hold, and those that may be large."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Others' arrays and ROS messages become recordings, and ours messages: formats, axes, refusals."""
 
-from __future__ import annotations
-
 import json
 import os
 import zlib

@@ -1,7 +1,5 @@
 """Guarded approach, raster, poses over a surface, and the arm that is not where it believes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Surfaces: simple bodies, triangles, polygons, heights as a mesh, and symbols from strokes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

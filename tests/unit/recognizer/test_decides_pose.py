@@ -1,4 +1,4 @@
-"""Where the sensor stands: truths by complex numbers, and outlines measured by hand."""
+"""Where sensor and object stand: by complex numbers, by hand, and against drawn errors."""
 
 import cmath
 import math
@@ -6,8 +6,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from probe.arm import Arm, SensorPose
+from probe.errors import PoseError
+from probe.wrist import Wrist
 from recognizer.touch.pose import face_pose, inside_mm
+from recognizer.touch.recognition import Recognition, refusal
+from recognizer.touch.robot import (
+    MOVED_CHANCE,
+    ObjectPose,
+    Seating,
+    carried_pose,
+    fuse_poses,
+    object_pose,
+)
 
 PITCH, HEIGHT = 7.0, 1.2
 ROWS, COLUMNS = 8, 10  # a small torus, so that a wrong way round it shows
@@ -103,3 +116,151 @@ def test_how_far_a_point_lies_inside_an_outline(loops, points):
         outline = SimpleNamespace(polygon_mm=tuple(np.array(loop, float) for loop in way))
         found = [inside_mm(outline, x, y) for x, y, _ in points]
         assert found == pytest.approx([inside for *_, inside in points])
+
+
+JOINTS = np.radians([20.0, -40.0, 70.0, -25.0, 15.0])
+PLANAR = np.array([[0.02, 0.004, 1e-4], [0.004, 0.01, -5e-5], [1e-4, -5e-5, 4e-5]])
+
+
+def pose_of(rotvec, at):
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(rotvec).as_matrix()
+    T[:3, 3] = at
+    return T
+
+
+T_OBJECT_FACE = pose_of([0.3, 1.1, -0.4], [30.0, -20.0, 10.0])
+T_FACE_PROBE = pose_of([0.0, 0.0, 0.7], [22.0, 31.0, 1.0])
+
+
+EXACT = Seating(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def answer(T_face_probe=T_FACE_PROBE, inside_mm=20.0):
+    return Recognition(0, "Cube", "F1", (3, 4), T_face_probe, T_OBJECT_FACE @ T_face_probe,
+                       PLANAR, 30.0, None, "", inside_mm=inside_mm)  # fmt: skip
+
+
+def moved(T, error):
+    """A pose with an error of its origin and a small turn about it."""
+    turn = Rotation.from_rotvec(error[3:]) * Rotation.from_matrix(T[:3, :3])
+    return pose_of(turn.as_rotvec(), T[:3, 3] + error[:3])
+
+
+def error_between(T, true):
+    """Return the error of a pose's origin and the small turn about it: the inverse of `moved`."""
+    turn = Rotation.from_matrix(true[:3, :3] @ T[:3, :3].T)
+    return np.concatenate([true[:3, 3] - T[:3, 3], turn.as_rotvec()])
+
+
+def test_the_object_is_found_where_it_stands():
+    T_base_object = pose_of([0.1, 0.2, 1.3], [350.0, 80.0, 20.0])
+    T_base_sensor = T_base_object @ T_OBJECT_FACE @ T_FACE_PROBE
+    sensor = SensorPose(T_base_sensor, np.zeros((6, 6)))
+    placed = object_pose(answer(), sensor, EXACT)
+    assert placed.T_robot_object == pytest.approx(T_base_object, abs=1e-9)
+    sunk = object_pose(answer(), sensor, Seating(pressed_mm=0.4))
+    out = (T_base_object @ T_OBJECT_FACE)[:3, 2]
+    assert sunk.T_robot_object[:3, 3] == pytest.approx(T_base_object[:3, 3] + 0.4 * out, abs=1e-9)
+
+
+def test_a_sensor_that_hangs_over_the_border_sinks_and_tips():
+    seating = Seating(0.5, 0.4, 0.3, 0.01, 0.05, half_mm=10.0)
+    assert [seating.depth_mm(at) for at in (25.0, 10.0, 5.0, 0.0, -1.0)] == pytest.approx(
+        [0.5, 0.5, 0.7, 0.9, 0.9]
+    )
+    assert [seating.spread_rad(at) for at in (10.0, 2.5, 0.0)] == pytest.approx([0.01, 0.04, 0.05])
+    assert seating.spread_rad(None) == seating.spread_rad(0.0)  # of a round face nothing is known
+
+
+def test_the_covariance_is_that_of_drawn_errors():
+    rng = np.random.default_rng(2)
+    root = rng.normal(0, 1, (6, 6)) * np.repeat([0.2, 0.002], 3)[:, None]
+    sensor = SensorPose(pose_of([0.4, -2.2, 0.6], [300.0, 50.0, 90.0]), root @ root.T)
+    seating = Seating(pressed_mm=0.3, z_mm=0.4, tilt_rad=0.01)
+    sunk = pose_of([0.0, 0.0, 0.0], [0.0, 0.0, -seating.pressed_mm])
+    placed = object_pose(answer(), sensor, seating)
+    number = 800
+    errors = rng.multivariate_normal(np.zeros(6), sensor.covariance, number)
+    planar = rng.multivariate_normal(np.zeros(3), PLANAR, number)
+    drawn = np.empty((number, 6))
+    for k in range(number):
+        touch = np.zeros(6)
+        touch[[0, 1, 5]] = planar[k]
+        touch[2] = rng.normal(0, math.hypot(seating.z_mm, 0.01 * seating.half_mm / 2))
+        touch[3:5] = rng.normal(0, seating.tilt_rad, 2)
+        true = moved(sensor.T_base_sensor, errors[k]) @ np.linalg.inv(
+            T_OBJECT_FACE @ moved(T_FACE_PROBE @ sunk, touch)
+        )
+        drawn[k] = error_between(placed.T_robot_object, true)
+    whitened = np.linalg.solve(np.linalg.cholesky(placed.covariance), drawn.T)
+    assert np.cov(whitened) == pytest.approx(np.eye(6), abs=6 / math.sqrt(number))
+
+
+def test_what_is_not_known():
+    sensor = SensorPose(np.eye(4), np.zeros((6, 6)))
+    assert object_pose(refusal(0, "ambiguous"), sensor) is None
+    with pytest.raises(PoseError, match="end stops"):
+        carried_pose(Arm(), Wrist(), JOINTS, np.zeros(5), [0, 0, 0, 0])
+
+
+BASE = pose_of([0.2, -0.1, 0.9], [320.0, 40.0, 30.0])
+SPREAD = np.diag([0.2, 0.2, 0.4, 2e-3, 2e-3, 2e-3]) ** 2
+
+
+def drawn(rng, number, shift=None, after=0):
+    """Poses of an object that is shifted after some of them."""
+    poses = []
+    for k in range(number):
+        T = BASE if shift is None or k < after else moved(BASE, np.array(shift))
+        poses.append(ObjectPose(moved(T, rng.multivariate_normal(np.zeros(6), SPREAD)), SPREAD))
+    return poses
+
+
+def test_several_touches_tighten_and_hold():
+    """Errors drawn anew shrink by the root of the number; what is shared stays, and is honest."""
+    rng = np.random.default_rng(6)
+    roots = [rng.normal(0, 1, (6, 6)) * np.repeat([0.2, 0.002], 3)[:, None] for _ in range(9)]
+    own = [root @ root.T for root in roots]
+    shared = np.diag([0.0, 0.0, 0.16, 1e-4, 1e-4, 0.0])
+    inside, moved_ones, number = 0, 0, 300
+    for _ in range(number):
+        common = rng.multivariate_normal(np.zeros(6), shared)
+        poses = []
+        for covariance in own:
+            off = rng.multivariate_normal(np.zeros(6), covariance) + common
+            poses.append(ObjectPose(moved(BASE, -off), covariance + shared, shared))
+        fused = fuse_poses(poses)
+        moved_ones += fused.moved
+        left = error_between(fused.pose.T_robot_object, BASE)
+        inside += left @ np.linalg.solve(fused.pose.covariance, left) < 12.592
+    assert 0.92 < inside / number < 0.98
+    assert moved_ones <= 3
+    tight = np.linalg.inv(sum(np.linalg.inv(covariance) for covariance in own)) + shared
+    assert fused.pose.covariance == pytest.approx(tight, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("after", [1, 3, 5])
+def test_a_moved_object_is_noticed_and_since_when(after):
+    rng = np.random.default_rng(7)
+    shift = [2.0, -1.5, 0.0, 0.0, 0.0, 0.02]
+    for _ in range(20):
+        fused = fuse_poses(drawn(rng, 6, shift, after))
+        assert (fused.moved, fused.since) == (True, after)
+        again = fuse_poses(drawn(rng, 6, shift, after)[fused.since :])
+        assert (again.moved, again.since) == (False, 0)
+
+
+def test_an_object_that_lies_still_is_not_taken_for_moved():
+    rng = np.random.default_rng(8)
+    number = 400
+    alarms = sum(fuse_poses(drawn(rng, 2 + k % 4)).moved for k in range(number))
+    assert alarms <= 4  # MOVED_CHANCE of them, .4
+    assert MOVED_CHANCE == 1e-3
+
+
+@pytest.mark.parametrize(("by", "noticed"), [(0.99, False), (1.01, True)])
+def test_a_move_is_noticed_from_one_in_a_thousand_on(by, noticed):
+    step = by * math.sqrt(22.458 * 2 * SPREAD[0, 0])  # chi2 of six freedoms, both poses off
+    poses = [ObjectPose(T, SPREAD) for T in (BASE, moved(BASE, np.array([step, 0, 0, 0, 0, 0])))]
+    assert fuse_poses(poses).moved is noticed
