@@ -94,9 +94,6 @@ def encode(
         engine, plans, dry_build = plan_in_lab(
             specs, url, lab_key=lab_key, make=not dry_run, replace_changed=replace
         )
-        plans = tuple(
-            replace_fields(plan, spec=replace_fields(plan.spec, database=url)) for plan in plans
-        )  # build sheets name it
         for plan in plans:
             wanted = plan.spec.formats if formats is None else formats
             if "bambu" in wanted and not plan.printer.nozzle_mm:

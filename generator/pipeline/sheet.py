@@ -7,16 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from encoded_objects.base.errors import without_password
 from encoded_objects.base.output import three_digits
 from encoded_objects.base.sensor_type import force_share
-from generator.database.open import normal_url
 from generator.export.bed import Plate
 from generator.export.drawing import (
     Assembly,
@@ -63,7 +59,8 @@ _MIXED = (
 )
 _CHECK = (
     "Hold the sensor flat on the part, {force:.2g} N or more. recognize-object --port URL --follow "
-    "--database {database} answers, or open-bench; probe-sensor list gives the URL of the probe."
+    "--database lab.db answers, or open-bench; lab.db stands for the database that the part was "
+    "made with, and probe-sensor list gives the URL of the probe."
 )
 Rows = Sequence[tuple[str, ...]]
 
@@ -111,7 +108,7 @@ def build_sheet(
     if checks := _checks(plan, layout):
         title = f"Check by {'three touches' if len(checks) == 3 else 'touch'}"
         force = LIGHT_N * force_share(plan.spec.sensor)
-        text = _CHECK.format(force=force, database=_database(plan)) + _MIXED * panelled
+        text = _CHECK.format(force=force) + _MIXED * panelled
         if promise is not None:
             side, where = 1.0, "anywhere"
             if promise.one_side:
@@ -119,13 +116,6 @@ def build_sheet(
             text += f" {percent(promise.at_once / side)} of touches {where} are answered at once."
         sections.append(Section(title, text, ("", "touch", "must answer"), checks))
     return sheet_html(f"{plan.spec.name}: build sheet", sections)
-
-
-def _database(plan: ObjectPlan) -> str:
-    """Return the database as a command line names it: a file without its folder."""
-    url = normal_url(plan.spec.database)
-    on_disk = url.get_backend_name() == "sqlite"
-    return quote(Path(url.database or "").name if on_disk else without_password(plan.spec.database))
 
 
 def layers_text(printer: Printer) -> str:
