@@ -116,16 +116,13 @@ def test_unfolding_keeps_areas_and_never_overlaps(solid, cuts):
 @given(solids, st.sampled_from(["faces", "net"]), st.integers(0, 10**6))
 @settings(max_examples=7, deadline=None)
 def test_layouts_use_no_cell_twice_and_keep_clear_of_edges(solid, kind, seed):
-    random = np.random.default_rng(seed)
-    clearances = [
-        [random.uniform(0.3, 2.0, len(loop)) for loop in face.loops] for face in solid.faces
-    ]
-    occupied = random.integers(0, 63, 40), random.integers(0, 65, 40)
+    rng = np.random.default_rng(seed)
+    clearances = [[rng.uniform(0.3, 2.0, len(loop)) for loop in face.loops] for face in solid.faces]
+    occupied = rng.integers(0, 63, 40), rng.integers(0, 65, 40)
     pitch, half = 4.0, 1.5
     try:
-        layout = lay_out(
-            solid, ARRAY, pitch, half, clearances, occupied, kind, allow_blank_faces=True
-        )
+        laid = (solid, ARRAY, pitch, half, clearances, occupied, kind)
+        layout = lay_out(*laid, allow_blank_faces=True)
     except LayoutError as error:
         assert "full" in error.cause  # noqa: PT017
         assume(False)
@@ -141,9 +138,8 @@ def test_layouts_use_no_cell_twice_and_keep_clear_of_edges(solid, kind, seed):
             continue
         assert np.array_equal(face.labels, ARRAY.symbols(face.rows, face.columns))
         rotation = -face.placement.rotation_rad
-        check_clearance(
-            face_polygon(solid, face.face), clearances[face.face], face.centres_mm, rotation, half
-        )
+        here = face_polygon(solid, face.face), clearances[face.face]
+        check_clearance(*here, face.centres_mm, rotation, half)
         p, c, s = face.placement, np.cos(rotation), np.sin(rotation)
         x, y = face.centres_mm.T
         u, v = c * x + s * y + p.x_mm, c * y - s * x + p.y_mm
@@ -164,9 +160,7 @@ def test_layouts_use_no_cell_twice_and_keep_clear_of_edges(solid, kind, seed):
     st.sampled_from([(0,), (0, 2), (0, 1, 2, 3)]),
 )
 @settings(max_examples=60, deadline=None)
-def test_placing_uses_free_cells_once_and_only_refuses_what_fits_nowhere(
-    rows, columns, sizes, load, turns
-):
+def test_placing_uses_free_cells_once_and_refuses_the_rest(rows, columns, sizes, load, turns):
     random = np.random.default_rng(rows * 31 + columns)
     before = random.random((rows, columns)) < load
     size = SimpleNamespace(rows=rows, columns=columns, first=(0, 0))

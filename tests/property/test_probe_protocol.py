@@ -37,9 +37,8 @@ def frames(draw):
     top = draw(st.sampled_from((1, 256) if byte_wide else (1, 256, 257, 1024)))
     shape = draw(st.sampled_from([(16, 16), (12, 32), (32, 12), (1, 2), (8, 8), (255, 255)]))
     counts = rng.integers(0, top, shape, dtype=np.uint16)
-    return FramePacket(
-        draw(U16), draw(U32), counts, rng.integers(0, 1024, 4, dtype=np.uint16), byte_wide
-    )
+    wrist = rng.integers(0, 1024, 4, dtype=np.uint16)
+    return FramePacket(draw(U16), draw(U32), counts, wrist, byte_wide)
 
 
 IDENTS = st.builds(

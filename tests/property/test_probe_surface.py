@@ -35,17 +35,12 @@ def glyphs(draw):
 def test_outline_encloses_what_the_nib_covers(glyph, width):
     rings = outline(np.array(glyph, float), width)
     loops = [ring.moved(0.0) for ring in rings]
-    area = sum(
-        shapely.Polygon(loop).area * (1 if counter_clockwise(loop) else -1) for loop in loops
-    )
+    turns = [1 if shapely.LinearRing(loop).is_ccw else -1 for loop in loops]
+    area = sum(turn * shapely.Polygon(loop).area for turn, loop in zip(turns, loops, strict=True))
     body = nib_region(glyph, width)
     assert abs(area - body.area) < 1e-7
     for loop in loops:
         assert shapely.distance(body.boundary, shapely.points(loop)).max() < 1e-7
-
-
-def counter_clockwise(loop):
-    return shapely.LinearRing(loop).is_ccw
 
 
 @settings(max_examples=60, deadline=None)
@@ -62,10 +57,8 @@ def test_symbol_heights_are_those_of_its_triangles(glyph, width, draft, chamfer,
     seen = np.maximum(mesh(corners).heights_mm(points), 0.0)
     ours = symbols.heights_mm(np.zeros(400, int), x, y)
     # Where rings that grow have met, the sides overlap: the highest one counts in both.
-    edges = shapely.distance(
-        shapely.MultiLineString([[*t, t[0]] for t in corners[:, :, :2]]), shapely.points(points)
-    )
-    off = edges > 1e-6
+    edges = shapely.MultiLineString([[*t, t[0]] for t in corners[:, :, :2]])
+    off = shapely.distance(edges, shapely.points(points)) > 1e-6
     assert np.abs(seen - ours)[off].max(initial=0.0) < 1e-9
     assert ours.max() <= relief.height_mm
 
@@ -89,9 +82,8 @@ def test_lattice_gives_the_heights_of_every_symbol_by_itself(alphabet, turn, see
     for (row, column), label in zip(cells, labels, strict=True):
         x, y = (at - ((column + 0.5) * 4.0, -(row + 0.5) * 4.0)).T
         near = np.flatnonzero(np.maximum(np.abs(x), np.abs(y)) <= 2)
-        want[near] = np.maximum(
-            want[near], known.symbols.heights_mm(np.full(len(near), label), x[near], y[near])
-        )
+        own = known.symbols.heights_mm(np.full(len(near), label), x[near], y[near])
+        want[near] = np.maximum(want[near], own)
     assert np.abs(lattice.heights_mm(points) - want).max() < 1e-9
 
 
@@ -128,11 +120,10 @@ def test_a_triangulated_terrain_has_no_cracks_in_any_frame(seed, count, turn, si
     part = mesh(terrain[triangles], T)
     a, b, d = np.moveaxis(part.corners, 1, 0)
     share = random.random((len(a), 1))
+    hull = MultiPoint(part.corners[:, :, :2].reshape(-1, 2)).convex_hull.buffer(-1e-9 * size)
     for p, q in ((a, b), (b, d), (a, d)):
         on = p[:, :2] + share * (q - p)[:, :2]
-        inner = shapely.contains_xy(
-            MultiPoint(part.corners[:, :, :2].reshape(-1, 2)).convex_hull.buffer(-1e-9 * size), on
-        )
+        inner = shapely.contains_xy(hull, on)
         assert np.isfinite(part.heights_mm(on[inner])).all()
     points = random.uniform(2 * size, 5 * size, (300, 2))
     assert part.heights_mm(points).max() <= part.top_mm

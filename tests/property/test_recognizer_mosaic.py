@@ -58,10 +58,9 @@ def test_gain_and_offset_leave_the_correlation_as_it_is(seed, gain, offset):
 def test_the_order_of_touches_does_not_matter_to_the_canvas(seed, places):
     rng = np.random.default_rng(seed)
     sure = np.diag([1e-3, 1e-3, 1e-6])
-    some = [
-        (patch_of(SENSOR, signal_of(rng.uniform(0, 9, (16, 16)))), CanvasEntry(pose, sure, 1.0))
-        for pose in places
-    ]
+    patches = [patch_of(SENSOR, signal_of(rng.uniform(0, 9, (16, 16)))) for _ in places]
+    entries = [CanvasEntry(pose, sure, 1.0) for pose in places]
+    some = list(zip(patches, entries, strict=True))
     there, back = empty_canvas(SENSOR.pitch_mm), empty_canvas(SENSOR.pitch_mm)
     for one, other in zip(some, some[::-1], strict=True):
         there, back = add_to_canvas(there, *one), add_to_canvas(back, *other)

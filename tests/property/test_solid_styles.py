@@ -7,15 +7,23 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from reference.expanded_solid import assert_expanded
 from reference.laid_symbols import filled, is_closed, mesh_volume
 
 from generator.alphabet import ALPHABETS, SymbolStyle, check_printable, footprint_half_mm, outlines
 from generator.errors import AlphabetError, SolidError
-from generator.plane.polygon import distance, edges_cross, points_inside, signed_area
+from generator.plane.polygon import (
+    distance,
+    edges_cross,
+    face_vector,
+    points_inside,
+    signed_area,
+    signed_volume,
+)
 from generator.polyhedron.shapes import prism, pyramid
 from generator.printers import PRINTERS
 from generator.solid import emboss_whole, panels, prove_closed, triangles, volume
+from generator.solid.closed import edges_once
+from generator.solid.part import to_part, turn
 from generator.solid.plate import inset, regular
 
 ALPHABET = st.sampled_from(list(ALPHABETS.values()))
@@ -61,6 +69,55 @@ def test_a_style_gives_proper_outlines_or_says_what_to_change(alphabet, style, p
             assert distance(nodes, tiers.rings[-1]).min() >= style.stroke_mm / 2 * (1 - 1e-9)
 
 
+def expand_part(part):
+    """Return vertices (N, 3) mm, part frame, and the loops of every planar polygon.
+
+    The body's facets with the feet cut out come first; then per symbol its islands (facet inside
+    a hole of the foot), sides from the foot up, and the top.
+    """
+    points = [part.vertices]
+    count = len(part.vertices)
+    body = [list(facet.loops) for facet in part.facets]
+    found = []
+    for embossing in part.embossings:
+        R = turn(embossing.rotation_rad)
+        for centre, label in zip(embossing.centres_mm, embossing.labels.tolist(), strict=True):
+            tiers = embossing.tiers[label]
+            numbers = []
+            for z, rings in zip(tiers.z_mm, tiers.rings, strict=True):
+                numbers.append([])
+                for ring in rings:
+                    points.append(to_part(embossing, ring @ R.T + centre, z))
+                    numbers[-1].append(tuple(range(count, count + len(ring))))
+                    count += len(ring)
+            body[embossing.facet].append(numbers[0][0][::-1])
+            found += [[hole[::-1]] for hole in numbers[0][1:]]
+            for lower, upper in pairwise(numbers):
+                for a, b in zip(lower, upper, strict=True):
+                    ahead = [*range(1, len(a)), 0]
+                    found += [[(a[k], a[j], b[j], b[k])] for k, j in enumerate(ahead)]
+            found.append(numbers[-1])
+    return np.concatenate(points), body + found
+
+
+def assert_expanded(part):
+    """Check planarity to 1e-12, closure and volume of the expanded solid."""
+    vertices, polygons = expand_part(part)
+    size = float(np.ptp(vertices, axis=0).max())
+    loops = [loop for polygon in polygons for loop in polygon]
+    assert edges_once(
+        np.concatenate([np.array(loop) for loop in loops]),
+        np.concatenate([np.roll(loop, -1) for loop in loops]),
+    )
+    for polygon in polygons:
+        corners = [vertices[list(loop)] for loop in polygon]
+        normal = face_vector(corners)
+        points = np.concatenate(corners)
+        off = (points - points[0]) @ (normal / np.linalg.norm(normal))
+        assert np.abs(off).max() <= 1e-12 * size
+    assert signed_volume(vertices, polygons) == pytest.approx(volume(part), rel=1e-11)
+
+
 def solids():
     return st.one_of(
         st.builds(prism, st.integers(3, 7), st.floats(25, 60), radius=st.floats(25, 50)),
@@ -79,14 +136,12 @@ def solids():
 def test_parts_are_closed_planar_and_of_their_volume(solid, name, turned, chamfer, seed):
     alphabet = ALPHABETS[name]
     pitch = 9.0
-    style = SymbolStyle(
-        pitch, 0.8, round(alphabet.stroke_ratio * pitch, 2), math.radians(8), chamfer
-    )
+    stroke = round(alphabet.stroke_ratio * pitch, 2)
+    style = SymbolStyle(pitch, 0.8, stroke, math.radians(8), chamfer)
     tiers, half = outlines(alphabet, style), footprint_half_mm(alphabet, style)
     chance = np.random.default_rng(seed)
-    layout = filled(
-        solid, pitch, half + 6.5, turned=turned, order=alphabet.order, chance=chance, share=0.8
-    )
+    shown = {"order": alphabet.order, "chance": chance, "share": 0.8}
+    layout = filled(solid, pitch, half + 6.5, turned=turned, **shown)
     parts = [emboss_whole(solid, layout, tiers, "body")]
     refused = refusal(panels, solid, layout, tiers, 2.0, PRINTERS["fdm-0.4"])
     if refused is None:
@@ -122,8 +177,7 @@ def test_inset_edges_stay_parallel_at_their_distance(polar, insets):
     normal = np.stack([-edge[:, 1], edge[:, 0]], axis=1) / np.hypot(*edge.T)[:, None]
     for corner in (moved, np.roll(moved, -1, axis=0)):
         reach = np.abs(corner - ring).max() + 1.0
-        assert ((corner - ring) * normal).sum(axis=1) == pytest.approx(
-            each, abs=1e-12 * reach * 1e3
-        )
+        away = ((corner - ring) * normal).sum(axis=1)
+        assert away == pytest.approx(each, abs=1e-12 * reach * 1e3)
     if each.min() >= 0:
         assert points_inside(moved, [ring]).all() or distance(moved, [ring]).min() < 1e-9

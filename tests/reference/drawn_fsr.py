@@ -20,23 +20,16 @@ from probe.circuit.fsr import BREAK_N, GAIN_S, LEAK_S, SERIES_OHM, Fsr
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Medians and spreads of the law, and how many tactels are unsound (shares of 1)."""
+    """Standard deviations of the law's numbers, and shares (of 1) of tactels that are unsound."""
 
-    gain_s: float = GAIN_S  #: S, median
-    gain_spread: float = 0.30  #: standard deviation of its logarithm
-    exponent: float = 1.0  #: mean
-    exponent_spread: float = 0.08  #: standard deviation
-    break_n: float = BREAK_N  #: N, median
-    break_spread: float = 0.5  #: standard deviation of its logarithm
-    series_ohm: float = SERIES_OHM  #: median
-    series_spread: float = 0.3  #: standard deviation of its logarithm
+    gain_spread: float = 0.30  #: of its logarithm
+    exponent_spread: float = 0.08
+    break_spread: float = 0.5  #: of its logarithm
+    series_spread: float = 0.3  #: of its logarithm
     dead: float = 147 / 256  #: share that never responds
     stuck: float = 1 / 256  #: share that shows one conductance whatever the force
     preloaded: float = 5 / 256  #: share that is pressed by the assembly
     preload_n: float = 0.3  #: N, mean force on those (exponential)
-    leak_s: float = LEAK_S  #: S
-    hysteresis: float = 0.10  #: reading on the way back over the way up, less 1
-    drift: float = 0.05  #: per decade of time
 
 
 MEASURED = Spread()
@@ -47,43 +40,33 @@ DATASHEET = Spread(
 )  # fmt: skip
 
 
-def draw_fsr(
-    rng: Generator,
-    spread: Spread = MEASURED,
-    rows: int = 16,
-    columns: int = 16,
-) -> Fsr:
-    """Draw a sensor; exactly the stated shares of its tactels (rounded up) are unsound."""
-    shape, size = (rows, columns), rows * columns
+def draw_fsr(rng: Generator, spread: Spread = MEASURED) -> Fsr:
+    """Draw a sensor of 16 x 16; exactly the stated shares of its tactels (rounded up) are unsound.
+
+    It reads 10 % more on the way back than on the way up, and drifts 5 % per decade of time.
+    """
+    shape, size = (16, 16), 256
 
     def lognormal(median: float, deviation: float) -> np.ndarray:
         return median * np.exp(deviation * rng.standard_normal(shape))
 
-    gain = lognormal(spread.gain_s, spread.gain_spread)
-    exponent = spread.exponent + spread.exponent_spread * rng.standard_normal(shape)
-    broken = lognormal(spread.break_n, spread.break_spread)
-    series = lognormal(spread.series_ohm, spread.series_spread)
+    gain = lognormal(GAIN_S, spread.gain_spread)
+    exponent = 1.0 + spread.exponent_spread * rng.standard_normal(shape)
+    broken = lognormal(BREAK_N, spread.break_spread)
+    series = lognormal(SERIES_OHM, spread.series_spread)
     order = rng.permutation(size)
     counts = [int(np.ceil(s * size - 1e-9)) for s in (spread.dead, spread.stuck, spread.preloaded)]
     ends = np.minimum(np.cumsum(counts), size)
     dead, stuck, preload = np.zeros(size, bool), np.zeros(size), np.zeros(size)
     dead[order[: ends[0]]] = True
     held = order[ends[0] : ends[1]]
-    stuck[held] = spread.gain_s * np.exp(rng.uniform(-3.0, 3.0, held.size))
+    stuck[held] = GAIN_S * np.exp(rng.uniform(-3.0, 3.0, held.size))
     pressed = order[ends[1] : ends[2]]
-    preload[pressed] = spread.break_n + rng.exponential(spread.preload_n, pressed.size)
+    preload[pressed] = BREAK_N + rng.exponential(spread.preload_n, pressed.size)
     return Fsr(
-        gain,
-        np.maximum(exponent, 0.2),
-        broken,
-        preload.reshape(shape),
-        series,
-        stuck.reshape(shape),
-        dead.reshape(shape),
-        leak_s=spread.leak_s,
-        hysteresis=spread.hysteresis,
-        drift=spread.drift,
-    )
+        gain, np.maximum(exponent, 0.2), broken, preload.reshape(shape), series,
+        stuck.reshape(shape), dead.reshape(shape), leak_s=LEAK_S, hysteresis=0.10, drift=0.05,
+    )  # fmt: skip
 
 
 def read_sequence(

@@ -33,9 +33,8 @@ def write(url: str, first: int, count: int, symbols: int) -> None:
             every, taken = np.arange(ARRAY.rows * ARRAY.columns), rows * ARRAY.columns + columns
             free = np.setdiff1d(every, taken)[: 6 * symbols].reshape(6, -1)
             faces = []
-            for face, (rows, columns) in enumerate(
-                zip(*np.divmod(free, ARRAY.columns), strict=True)
-            ):
+            places = zip(*np.divmod(free, ARRAY.columns), strict=True)
+            for face, (rows, columns) in enumerate(places):
                 centres = np.stack([rows / 7, columns / 3], axis=1)
                 labels, place = ARRAY.symbols(rows, columns), Placement(0, 0, 0.0, 0.0, 0.0)
                 faces.append(FaceLayout(face, place, rows, columns, labels, centres, 1))

@@ -122,9 +122,8 @@ def test_scores_of_labels_by_hand():
     truth[0, 0, 2] = truth[1, 0, 0] = truth[1, 1, 3] = 0.0
     truth[0, 1] = 0.0
     np.testing.assert_allclose(found, truth, rtol=1e-6)
-    assert unrelated_score(found.reshape(1, 4, 4))[0] == pytest.approx(
-        3 * math.log((1 + 3 * math.exp(least)) / 4)
-    )
+    unrelated = 3 * math.log((1 + 3 * math.exp(least)) / 4)
+    assert unrelated_score(found.reshape(1, 4, 4))[0] == pytest.approx(unrelated)
     for order, bound in ((2, 0.5), (4, 0.75)):
         hard_scores(np.array([0]), order, bound - 1e-6)
         for error in (bound, 0.0, -0.1):
@@ -197,10 +196,8 @@ def test_candidates_are_listed_down_to_seven_nats_and_sixteen_of_them(turns):
         ranked, doubt, _ = bayes(BINARY, scores, turns, blank=0.0)
         assert doubt > 5e-4
         found = Likelihood(BINARY, rotations=turns, blank=0.0).decode(scores)[0]
-        truth = [one for one in ranked if one[3] >= -7.0][:16]
-        assert [c.score for c in found.candidates] == pytest.approx(
-            [one[3] for one in truth], abs=1e-4
-        )
+        truth = [one[3] for one in ranked if one[3] >= -7.0][:16]
+        assert [c.score for c in found.candidates] == pytest.approx(truth, abs=1e-4)
         lengths.add(len(truth))
     assert 16 in lengths
     assert min(lengths) < 16
@@ -299,17 +296,14 @@ def test_the_best_places_are_where_they_are_said_to_be(places, number):
     assert found.shape == chosen.shape == (3, kept)
     np.testing.assert_array_equal(np.take_along_axis(values, found, axis=1), chosen)
     np.testing.assert_array_equal(chosen, -np.sort(-values, axis=1)[:, :kept])
-    np.testing.assert_allclose(
-        rest, np.exp(values - values.max(axis=1, keepdims=True)).sum(axis=1) - 1, rtol=1e-4
-    )
+    weights = np.exp(values - values.max(axis=1, keepdims=True))
+    np.testing.assert_allclose(rest, weights.sum(axis=1) - 1, rtol=1e-4)
 
 
 @pytest.mark.parametrize("number", [2, 5, 20])
 @pytest.mark.parametrize("pairs", [15, 40, 60])  # one, two and four rows at a time
 @pytest.mark.parametrize(("array", "shape"), [(PRODUCT, (4, 5)), (MIXED, (6, 2))])
-def test_a_window_of_a_product_array_is_searched_as_it_is_weighed(
-    monkeypatch, array, shape, pairs, number
-):
+def test_windows_of_products_are_searched_as_weighed(monkeypatch, array, shape, pairs, number):
     rng = np.random.default_rng(10)
     scores = rng.normal(size=(8, *shape, array.order))
     scores *= np.array([1, 2, 3, 4, 6, 8, 20, 60])[:, None, None, None]  # from faint to sharp
@@ -405,9 +399,7 @@ SCORES = [
     ("checked", "shape", "kind", "whole"),
     [(checked_labels, *case) for case in LABELS] + [(checked_scores, *case) for case in SCORES],
 )
-def test_windows_have_two_dimensions_scores_one_more_and_batches_another(
-    checked, shape, kind, whole
-):
+def test_windows_have_two_dimensions_scores_and_batches_one_more(checked, shape, kind, whole):
     if whole is None:
         with pytest.raises(WindowError, match=r"a window is|scores are|at least one cell"):
             checked(np.zeros(shape, kind), 4)

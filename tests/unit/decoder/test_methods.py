@@ -127,9 +127,8 @@ def test_windows_that_each_miss_other_symbols_decode_as_one_by_one(values):
     array = array_from(values)
     side = 10 if array.rows > 10**6 else 6
     rng = np.random.default_rng(2)
-    places = [
-        (int(r) % array.rows, int(c) % array.columns) for r, c in rng.integers(0, 2**62, (60, 2))
-    ]
+    drawn = rng.integers(0, 2**62, (60, 2)).tolist()
+    places = [(row % array.rows, column % array.columns) for row, column in drawn]
     windows = windows_at(array, *zip(*places, strict=True), (side, side))
     windows = np.where(rng.random(windows.shape) < rng.uniform(0, 0.9, (60, 1, 1)), -1, windows)
     windows[3] = 0

@@ -39,10 +39,8 @@ async def answers(
         "type": kind, "method": method, "path": path, "query_string": query.encode(),
         "headers": [(k.replace("_", "-").encode(), v.encode()) for k, v in headers.items()],
     }  # fmt: skip
-    waiting = [
-        {"type": "http.request", "body": part, "more_body": i + 1 < len(body)}
-        for i, part in enumerate(body)
-    ]
+    waiting = [{"type": "http.request", "body": part, "more_body": True} for part in body]
+    waiting[-1]["more_body"] = False
     sent = []
 
     async def receive():
@@ -185,9 +183,7 @@ def refused(capsys, *words):
         ("--parts", "spec", "no such folder\n  fix: give --parts"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_met_is_refused_with_the_way_out(
-    option, value, said, tmp_path, monkeypatch, capsys
-):
+def test_what_cannot_be_met_is_refused(option, value, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "spec").touch()
     assert said in refused(capsys, option, value)

@@ -253,10 +253,10 @@ def test_it_is_the_share_of_all_combinations_and_never_less(seed, monkeypatch):
     assert found[1] <= 5 * truth
 
 
-def square(small, side, order=4, **changed):
-    labels = np.random.default_rng(3).integers(order, size=(side, side))
+def square(small, side):
+    labels = np.random.default_rng(3).integers(4, size=(side, side))
     held = {(r, c): (0, int(labels[r, c])) for r in range(side) for c in range(side)}
-    return small.Lab(held, rows=side + 4, columns=side + 5, order=order, **changed)
+    return small.Lab(held, rows=side + 4, columns=side + 5)
 
 
 def places_that_match(lab, cells, scores, held, anchor, behind):
@@ -278,10 +278,9 @@ def by_border(small, monkeypatch):
     """The doubt of a hypothesis, shares of borders and of what is pressed as they are given."""
 
     def doubt(lab, fit, place, arrays=None, share=1.0, pressed=1.0):
-        monkeypatch.setattr(recognizer.touch.chance, "share_of_borders", lambda *_: share)
-        monkeypatch.setattr(
-            recognizer.touch.chance, "_pressed_share", lambda *_: np.full(len(fit.cells), pressed)
-        )
+        each = np.full(len(fit.cells), pressed)
+        for name, value in (("share_of_borders", share), ("_pressed_share", each)):
+            monkeypatch.setattr(recognizer.touch.chance, name, lambda *_, value=value: value)
         found = SimpleNamespace(embossed=lab.embossed, fit=fit, hypothesis=place)
         return expected_by_border(arrays or [lab.embossed], found, 1.3)
 
@@ -290,9 +289,7 @@ def by_border(small, monkeypatch):
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize(("row", "column"), [(3, 4), (0, 4), (1, 0), (4, 2)])
-def test_places_are_counted_with_what_their_outlines_cost(
-    small, by_border, seed, row, column, monkeypatch
-):
+def test_places_are_counted_by_their_outlines(small, by_border, seed, row, column, monkeypatch):
     """A place may be matched that is bare where a symbol is seen, or bears one where none is."""
     rng, cells = np.random.default_rng(seed), [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0)]
     lab = square(small, 5)

@@ -166,9 +166,8 @@ def test_the_object_is_found_where_it_stands():
 
 def test_a_sensor_that_hangs_over_the_border_sinks_and_tips():
     seating = Seating(0.5, 0.4, 0.3, 0.01, 0.05, half_mm=10.0)
-    assert [seating.depth_mm(at) for at in (25.0, 10.0, 5.0, 0.0, -1.0)] == pytest.approx(
-        [0.5, 0.5, 0.7, 0.9, 0.9]
-    )
+    depths = [seating.depth_mm(at) for at in (25.0, 10.0, 5.0, 0.0, -1.0)]
+    assert depths == pytest.approx([0.5, 0.5, 0.7, 0.9, 0.9])
     assert [seating.spread_rad(at) for at in (10.0, 2.5, 0.0)] == pytest.approx([0.01, 0.04, 0.05])
     assert seating.spread_rad(None) == seating.spread_rad(0.0)  # of a round face nothing is known
 
@@ -189,9 +188,8 @@ def test_the_covariance_is_that_of_drawn_errors():
         touch[[0, 1, 5]] = planar[k]
         touch[2] = rng.normal(0, math.hypot(seating.z_mm, 0.01 * seating.half_mm / 2))
         touch[3:5] = rng.normal(0, seating.tilt_rad, 2)
-        true = moved(sensor.T_base_sensor, errors[k]) @ np.linalg.inv(
-            T_OBJECT_FACE @ moved(T_FACE_PROBE @ sunk, touch)
-        )
+        T_object_probe = T_OBJECT_FACE @ moved(T_FACE_PROBE @ sunk, touch)
+        true = moved(sensor.T_base_sensor, errors[k]) @ np.linalg.inv(T_object_probe)
         drawn[k] = error_between(placed.T_robot_object, true)
     whitened = np.linalg.solve(np.linalg.cholesky(placed.covariance), drawn.T)
     assert np.cov(whitened) == pytest.approx(np.eye(6), abs=6 / math.sqrt(number))

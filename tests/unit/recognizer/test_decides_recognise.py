@@ -27,17 +27,14 @@ from recognizer.touch.recognition import (
 from recognizer.touch.signal import Signal, swap_halves
 from recognizer.touch.verdict import Evidence
 
-READER = SimpleNamespace(
-    sensor=SensorType(), options=ReaderOptions(), lab=SimpleNamespace(arrays=("one", "two"))
-)
+LAB = SimpleNamespace(arrays=("one", "two"))
+READER = SimpleNamespace(sensor=SensorType(), options=ReaderOptions(), lab=LAB)
 PAD = SensorType().with_overlay("pad")
 BITS = 40.0
 INF = math.inf
 #: Limits of margins, nats: 10 and 14 but for rounding.
 TEN, FOURTEEN = READER.options.margin, READER.options.margin_by_few
-SURE = Evidence(
-    log_likelihood_ratio=19.9, explained=0.95, inliers=16, bits=32.0, contradictions=0
-)  # fmt: skip
+SURE = Evidence(19.9, inliers=16, bits=32.0, contradictions=0, explained=0.95)
 
 
 @dataclass

@@ -48,9 +48,7 @@ def six(value, others=0.0, count=6):
         (9.0, 5, True, False),
     ],
 )
-def test_a_contact_is_six_tactels_over_eight_counts_or_a_twentieth_newton(
-    value, count, newtons, contact
-):
+def test_a_contact_is_six_tactels_over_eight_counts_or_50_mn(value, count, newtons, contact):
     found = signal_of(six(value, count=count), floor=0.0, newtons=newtons)
     assert found.contact is contact
     assert found.newtons is newtons
@@ -278,10 +276,7 @@ def like(image, other, correlation):
 
 
 def cut_film(*film):
-    frames = [
-        frame_from(np.rint(image), t_ns=n, seq=n, wrist=[0, 0, 0, 0], pose=None)
-        for n, image in enumerate(film)
-    ]
+    frames = [frame_from(np.rint(image), t_ns=n, seq=n) for n, image in enumerate(film)]
     return [(touch.seq, touch.frames) for touch in cut_touches(frames)]
 
 

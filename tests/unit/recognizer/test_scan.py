@@ -89,9 +89,8 @@ def test_a_surface_that_is_not_registered_is_no_object(reader):
 @pytest.fixture(scope="module")
 def one_touch(make_lab):
     """Two cubes whose faces one touch can tell, and what touches of them feel."""
-    lab = open_lab(
-        make_lab("{name: Cube, shape: {cube: 50 mm}, profile: one-touch, copies: 2}") / "lab.db"
-    )
+    spec = "{name: Cube, shape: {cube: 50 mm}, profile: one-touch, copies: 2}"
+    lab = open_lab(make_lab(spec) / "lab.db")
 
     def felt(name, face, x, y, T_base_object=None):
         scene = registered_surface(lab.url, name, face)

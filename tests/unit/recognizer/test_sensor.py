@@ -261,9 +261,7 @@ def test_a_way_of_wiring_is_said_when_refused_touches_agree(reader, felt, way, f
         (lambda image: np.rot90(image.T, 2), ("transpose", "quarter", "quarter")),
     ],
 )
-def test_a_placed_touch_tells_the_mounting_and_answers_say_that_it_was_checked(
-    reader, way, changes
-):
+def test_a_placed_touch_tells_the_mounting_and_answers_say_it_was_checked(reader, way, changes):
     surface = registered_surface(reader.lab.url, "Cube", "F1").surface
     forces = press(surface, SENSOR, Touch(29.0, 31.0, np.radians(-12), 70.0)).forces_n
     image = way(np.rint(8 + 150 * forces))
