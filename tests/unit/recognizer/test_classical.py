@@ -61,9 +61,6 @@ def scan(lab):
     return Scan(lab.url, "Cube", "F2", seed=3)
 
 
-# --- merging ----------------------------------------------------------------------------
-
-
 def pattern(points):
     x, y = np.moveaxis(points, -1, 0)
     return 2 + np.sin(0.45 * x + 0.3) * np.cos(0.35 * y) + np.sin(0.2 * x - 0.4 * y)
@@ -92,9 +89,6 @@ def test_bad_tactels_are_filled_by_other_touches():
     inner = (np.abs(at[..., 0] - 2.4) < 0.5) & (np.abs(at[..., 1]) < 10)
     assert found.image.defined[inner].all()
     assert np.abs(found.image.values - pattern(at))[inner].max() < 0.3
-
-
-# --- reading ----------------------------------------------------------------------------
 
 
 def test_a_scan_names_object_face_and_place(lab, scan):

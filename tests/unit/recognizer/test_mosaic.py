@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import SensorType
+from generator.alphabet import alphabet_named
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.scan import surface_to_sensor
@@ -43,18 +44,13 @@ from recognizer.touch.signal import Signal, signal_of
 SENSOR = SensorType()
 P = SENSOR.pitch_mm
 DEG = math.pi / 180
-GLYPHS = (
-    (((-1, 1), (-1, -1)), ((-1, -1), (1, -1))),
-    (((1, -1), (-1, -1)), ((-1, -1), (-1, 0)), ((-1, 0), (0, 1)), ((0, -1), (0, 0))),
-    (((-1, -1), (0, -1)), ((0, -1), (0, 0)), ((0, 0), (1, 1)), ((0, 0), (-1, 0))),
-    (((-1, 1), (-1, -1)), ((-1, -1), (1, -1)), ((1, -1), (1, 1))),
-)
+GLYPHS = [glyph.strokes for glyph in alphabet_named("dense-4").glyphs]
 TACTELS = SENSOR.centres_mm().reshape(-1, 2)
 SURE = np.diag([1e-4, 1e-4, 1e-7])
 
 
-def newtons(forces, trust=None):
-    return Signal(forces, np.ones((16, 16)) if trust is None else trust, True, newtons=True)
+def newtons(forces):
+    return Signal(forces, np.ones((16, 16)), True, newtons=True)
 
 
 def symbols(seed=0):
@@ -69,8 +65,8 @@ def felt(surface, pose, rng):
     return np.maximum(forces + rng.normal(0, 0.02, (16, 16)), 0)
 
 
-def patch(readings, trust=None):
-    return patch_of(SENSOR, newtons(np.asarray(readings, float), trust))
+def patch(readings):
+    return patch_of(SENSOR, newtons(np.asarray(readings, float)))
 
 
 def waves(points):
@@ -79,8 +75,6 @@ def waves(points):
 
 
 WAVES = waves(TACTELS).reshape(16, 16)
-
-# --- poses in the plane ---------------------------------------------------------------------
 
 
 def test_a_quarter_turn_by_hand():
@@ -117,9 +111,6 @@ def test_poses_in_space_and_what_is_no_place():
     assert decoded_place(refusal(1, "ambiguous")) is None
 
 
-# --- correlation ----------------------------------------------------------------------------
-
-
 def test_correlation_in_parts_is_that_of_every_overlap():
     rng = np.random.default_rng(4)
     wide = KnownRaster(rng.normal(5, 1, (20, 23)), rng.random((20, 23)) > 0.2, 0, 0, 1)
@@ -149,9 +140,6 @@ def test_peaks_lie_between_cells_and_none_where_nothing_varies():
         assert np.isnan(rho).all()
         assert (overlap > 0).all() == (overlap > 0).any() == seen.all()
         assert peaks(rho, 4) == []
-
-
-# --- one touch as an image ------------------------------------------------------------------
 
 
 def test_a_patch_between_the_tactels():
@@ -184,8 +172,6 @@ def test_a_ridge_moved_along_itself_and_a_dome_that_is_turned_are_invisible(angl
     assert np.linalg.eigvalsh(information).min() > -1e-6
     assert (restrict_information(np.eye(3), np.zeros((3, 0)), SENSOR, np.eye(3)) == 0).all()
 
-
-# --- one touch against another --------------------------------------------------------------
 
 A = np.array([41.3, 52.9, 0.35])
 BELIEF = np.diag([P**2, P**2, (0.5 * DEG) ** 2])
@@ -247,8 +233,6 @@ def test_reasons_for_no_answer():
         assert math.isnan(refused.gain)
 
 
-# --- the pose graph -------------------------------------------------------------------------
-
 BELIEVED, PAIR = np.diag([0.4, 0.4, 4e3]), np.diag([90.0, 60.0, 6e4])
 
 
@@ -297,9 +281,6 @@ def test_covariances_are_true():
     assert 0.9 < np.mean(inside) < 0.99
 
 
-# --- the canvas -----------------------------------------------------------------------------
-
-
 def test_the_image_is_the_weighted_mean():
     canvas = empty_canvas(P)
     how = CanvasEntry(np.zeros(3), SURE, 1.0)
@@ -312,8 +293,6 @@ def test_the_image_is_the_weighted_mean():
     # variances go with the level: weights 1, 1, 1 / 1.69
     assert image.values == pytest.approx((1 + 1 + 1.3 / 1.69) / (2 + 1 / 1.69), abs=1e-6)
 
-
-# --- scans: without and with decoded places, blank, wrong, by steps ---------------------------
 
 SPREAD = (1.0 * P, 1.0 * P, 0.3 * DEG)
 DECODED = (0.03, 0.03, 0.1 * DEG)

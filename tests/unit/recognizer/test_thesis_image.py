@@ -35,9 +35,6 @@ PITCH = 12.0
 LABELS = np.array([[0, 1, 1, 0], [1, 1, 0, 0], [0, 1, 0, 1]])
 
 
-# --- filters
-
-
 def noise(seed=0, shape=(16, 16)):
     return np.random.default_rng(seed).uniform(0, 1, shape)
 
@@ -119,9 +116,6 @@ def drawn(alphabet, placed, size_mm=50.0, pitch=12.0, half_mm=None):
     return tactile_image(image, step_mm=STEP)
 
 
-# --- counts -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
@@ -138,9 +132,6 @@ def test_a_ring_is_one_loop_without_ends():
     ring = np.zeros((5, 5), bool)
     ring[[1, 2, 2, 3], [2, 1, 3, 2]] = True
     assert points_of_skeleton(ring, 100.0).counts == (0, 0, 1)
-
-
-# --- symbols ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["thesis-2", "letters-4"])
@@ -169,9 +160,6 @@ def test_what_is_no_symbol_is_rejected_with_a_reason():
     ):
         (found,) = symbols(image, alphabet, style(alphabet))
         assert (found.label, found.rejected) == (-1, reason)
-
-
-# --- grid
 
 
 def symbol(x, y, theta, label=0):
@@ -224,9 +212,6 @@ def joined(*parts):
     )
 
 
-# --- points, lines, segments ------------------------------------------------------------
-
-
 @pytest.mark.parametrize("degrees", range(-180, 180, 120))
 def test_line_through_points_and_its_covariance(degrees):
     rng, angle = np.random.default_rng(degrees + 180), math.radians(degrees)
@@ -258,9 +243,6 @@ def test_longest_segment_is_taken_first_and_noise_is_none():
     assert len(segments(joined(long, against))) == 2
 
 
-# --- production rules -------------------------------------------------------------------
-
-
 def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
     rng = np.random.default_rng(4)
     below = on_line(math.pi / 2, -5.0, np.linspace(-9, 5, 20), rng, 0.02)
@@ -271,9 +253,6 @@ def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
     far = on_line(0.02, 8.0, np.linspace(-9, 5, 20), rng, 0.02)
     across = next(edge for edge in edges if abs(edge.angle_rad) < 0.1)
     assert vertices([across, fit_line(far.at_mm, far.normals), across]) == []
-
-
-# --- simulated touches ------------------------------------------------------------------
 
 
 def touches(loop, places, rng):
