@@ -30,9 +30,6 @@ Action = Callable[[], int]
 Chosen = Callable[[list[str]], Application]
 """Arguments -> the application that reads them; heavy parts load when it is called."""
 
-LINES = frozenset({"--follow", "live", "replay"})
-"""Words of commands that print JSON line by line: their error takes one line, too."""
-
 MATRIX_LIBRARIES = ("OMP", "OPENBLAS", "MKL")
 
 #: What typer's help page imports and no page of ours uses: names that it imports, by module.
@@ -150,7 +147,7 @@ def run(name: str, chosen: Chosen, arguments: list[str], *, bare: bool = False) 
         code, problem = BAD_INPUT, _misuse(error, name, app, arguments)
     problem.exit_code = code
     try:
-        output.error(problem, as_json=as_json, line=not LINES.isdisjoint(arguments))
+        output.error(problem, as_json=as_json)
         sys.stdout.flush()
     except OSError:
         output.error(problem, as_json=False)

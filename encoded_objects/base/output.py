@@ -46,10 +46,10 @@ def version(name: str, *, as_json: bool, **parts: str) -> None:
             write(f"{part}: {used}")
 
 
-def error(problem: EncodedObjectsError, *, as_json: bool, line: bool = False) -> None:
-    """Say what is wrong: to stderr, or as JSON to stdout, on a line of its own if asked."""
+def error(problem: EncodedObjectsError, *, as_json: bool) -> None:
+    """Say what is wrong: to stderr, or as JSON to stdout."""
     if as_json:
-        write_json({"error": problem.as_json()}, line=line)
+        write_json({"error": problem.as_json()})
     else:
         message(problem.as_text(), "error:", "red")
 

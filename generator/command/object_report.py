@@ -15,9 +15,6 @@ from encoded_objects.base.errors import without_password
 from generator.database.read import natural_key, surfaces_of
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from encoded_objects.base.sensor_type import SensorType
     from generator.database.lab import ArrayUse, Fullness, PitchUse
     from generator.database.part_file import PartState
@@ -182,7 +179,7 @@ class _Face:
     area_mm2: float  #: of a round face, of all its facets
     placement: Placement | None
     layout: FaceLayout
-    T_object_face: NDArray[np.float64]  #: (4, 4), mm; of a round face, of its first facet
+    T_object_face: list[list[float]]  #: (4, 4), mm; of a round face, of its first facet
     promise: RecognitionRate | None = None  #: None: nothing was measured
 
 
@@ -216,7 +213,7 @@ def _faces(held: RegisteredObject, sensor: SensorType) -> tuple[list[_Face], Par
                 area_mm2=sum(area[n] for n in surface.facets) if surface else face.area_mm2,
                 placement=face.placement,
                 layout=layouts[face.face_id],
-                T_object_face=face.T_object_face,
+                T_object_face=face.T_object_face.tolist(),
                 promise=rates.get(face.face_id),
             )
         )
@@ -296,7 +293,7 @@ def _face_values(face: _Face) -> dict[str, Any]:
         "name": face.name,
         "type": face.kind,
         "area_mm2": face.area_mm2,
-        "T_object_face": face.T_object_face.tolist(),
+        "T_object_face": face.T_object_face,
         "symbols": len(on.labels),
         "places": on.places,
         "promise": asdict(face.promise) if face.promise else None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -146,16 +147,6 @@ class Overhangs:
     faces: tuple[str, ...] = ()  #: that hang over: a slicer must make supports under them
 
 
-def _panels_fit(plan: ObjectPlan) -> bool:
-    """Whether an object can be made of panels as thick as its spec says."""
-    try:
-        spec = plan.spec
-        plain_panels(plan.polyhedron, spec.wall_mm, plan.printer, spec.gap_mm, spec.name)
-    except SolidError:
-        return False
-    return True
-
-
 def overhangs(plan: ObjectPlan, layout: Layout) -> Overhangs:
     """Return how the parts lie, and what hangs over of a whole body."""
     if plan.spec.parts == "panels":
@@ -195,5 +186,8 @@ def overhangs(plan: ObjectPlan, layout: Layout) -> Overhangs:
     if upright:  # their lower sides hang over by their height
         needed += f", {upright} symbols stand out sideways"
     flat = not (polyhedron.surfaces or polyhedron.blank) and (over or upright)
-    better = "; with  parts: panels  nothing hangs over" if flat and _panels_fit(plan) else ""
+    spec, better = plan.spec, ""
+    with suppress(SolidError):  # panels would be too small for their wall
+        if flat and plain_panels(polyhedron, spec.wall_mm, plan.printer, spec.gap_mm, spec.name):
+            better = "; with  parts: panels  nothing hangs over"
     return Overhangs(f"{lies}, {needed}{better}", over)

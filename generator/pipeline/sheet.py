@@ -107,12 +107,10 @@ def build_sheet(
         ]
     if checks := _checks(plan, layout):
         title = f"Check by {'three touches' if len(checks) == 3 else 'touch'}"
-        force = LIGHT_N * force_share(plan.spec.sensor)
-        text = _CHECK.format(force=force) + _MIXED * panelled
+        text = _CHECK.format(force=LIGHT_N * force_share(plan.spec.sensor)) + _MIXED * panelled
         if promise is not None:
-            side, where = 1.0, "anywhere"
-            if promise.one_side:
-                side, where = promise.encoded, "on its encoded side"
+            side = promise.encoded if promise.one_side else 1.0
+            where = "on its encoded side" if promise.one_side else "anywhere"
             text += f" {percent(promise.at_once / side)} of touches {where} are answered at once."
         sections.append(Section(title, text, ("", "touch", "must answer"), checks))
     return sheet_html(f"{plan.spec.name}: build sheet", sections)
@@ -176,8 +174,7 @@ def _facts(
         if any(_mark(part).startswith(code) for part in parts):
             marks = f"backs say {code}, which stands for {spec.name} on small parts, and the face"
         rows.append(("marks", marks))
-    if spec.mount is not None:
-        buy += fasteners(spec.mount)
+    buy += fasteners(spec.mount) if spec.mount else ()
     rows.append(("to buy", "; ".join(buy)))
     if cost:
         rows.append(("printing", f"{cost} ({source}, 15 % infill)"))

@@ -124,10 +124,8 @@ def fasteners(mount: Mount) -> tuple[str, ...]:
         return (f"{len(CORNERS)} magnets of {size[0]:g} x {size[1]:g} mm",)
     if isinstance(size, float):
         return (f"a rod of {size:g} mm",) if mount.kind == "rod" else ()
-    if mount.kind == "screws":
-        return (f"{len(CORNERS)} screws {size}",)
-    _, count, thread, pin = FLANGES[size]
-    return f"{count} screws {thread}", f"a pin of {pin:g} mm"
+    _, count, thread, pin = FLANGES.get(size, (0.0, len(CORNERS), size, 0.0))
+    return (f"{count} screws {thread}", *([f"a pin of {pin:g} mm"] if pin else []))
 
 
 def with_mount(solid: Polyhedron, mount: Mount, face: int) -> Polyhedron:

@@ -189,8 +189,7 @@ def _tree_at(path: Path) -> Tree:
     from generator.polyhedron.read import MESHES, STEP
 
     if path.suffix.lower() in (*STEP, *MESHES) and path.is_file():
-        spec = f"{path.stem}.yaml"
-        fix = f"encode-object init '{path}' -o '{spec}', then encode-object '{spec}'"
+        fix = f"encode-object init '{path}' -o '{path.stem}.yaml' writes one"
         raise SpecError([Problem("this is a model, not a spec", fix, file=str(path))])
     return read_tree(path, SPEC)
 

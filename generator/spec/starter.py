@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from pathlib import Path
-
-import yaml
 
 from encoded_objects.base.document import Problem, suggest
 from generator.spec.problem import SpecError
@@ -21,7 +18,7 @@ _POLYHEDRON = """shape:
     faces: [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]"""
 
 _TEMPLATE = """\
-# {title}: make it with  encode-object {file}
+# {name}: make it with  encode-object {file}
 # A line that starts with # is off: delete the # to use it. The values shown are those
 # that hold without it. Lengths: 40, 40 mm, 4 cm, 1.6 in. Angles: 10 deg, 0.17 rad.
 version: 1
@@ -61,37 +58,26 @@ name: {name}
 """
 
 
-def starter(shape: str, file: str = "", model: str = "part.step") -> str:
-    """Return a commented spec for one of the shapes of `EXAMPLES`; it can be made as it is.
-
-    `model` is the file of a shape that is read from one.
+def starter(shape: str, file: str = "", model: str = "") -> str:
+    """Return a commented spec for one of the shapes of `EXAMPLES`, or for a model's file.
 
     >>> starter("cube").splitlines()[5]
     'shape: {cube: 60 mm}'
     """
-    named = shape.replace("_", " ") if shape != "file" else Path(model).stem
-    name = named[:1].upper() + named[1:]
+    name = "Part" if shape == "file" else shape.replace("_", " ").capitalize()
     folder = name.lower().replace(" ", "-")
     line = _POLYHEDRON if shape == "polyhedron" else f"shape: {EXAMPLES[shape]}"
+    if model:
+        name, line = json.dumps(Path(model).stem), f"shape: {{file: {json.dumps(model)}}}"
     if shape == "file":
-        line = f"shape: {{file: {_scalar(model)}}}"
         line += "    # .step, .stl or .obj, relative to this file"
         line += "\n# shape: {file: part.stl, scale: 25.4}    # a model in inches"
     file = file or f"{folder}.yaml"
-    return _TEMPLATE.format(title=name, name=_scalar(name), file=file, shape=line, folder=folder)
-
-
-def _scalar(text: str) -> str:
-    """Return a text as YAML has it: plain where that is read as the same text."""
-    plain = re.fullmatch(r"[\w./ -]+", text) and yaml.safe_load(text) == text
-    return text if plain else json.dumps(text, ensure_ascii=False)
+    return _TEMPLATE.format(name=name, file=file, shape=line, folder=folder)
 
 
 def starter_named(shape: str, file: Path | None = None) -> tuple[str, str]:
-    """Return the name of a shape, or of what a model file has, and a spec for `file`.
-
-    Raises `SpecError` for what is neither.
-    """
+    """Return the kind of a shape or a model, and a spec `file`; raises `SpecError` for neither."""
     from generator.polyhedron.read import MESHES, STEP
 
     name = file.name if file else ""

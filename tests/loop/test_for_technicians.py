@@ -145,13 +145,6 @@ def test_poses_that_contradict_a_scan_are_named(tmp_path, monkeypatch, ask):
     assert "the poses contradict the touches, which without them say Plate/F1; poses are T" in notes
 
 
-def test_a_follower_gets_an_error_on_a_line_too(here, ask):
-    words = ("--port", "file:no.h5", "--database", here, "--follow", "--json")
-    code, said, _ = ask(recognize_object, *words)
-    assert code in (2, 3)
-    assert json.loads(said.splitlines()[0])["error"]["cause"]
-
-
 def test_a_type_too_coarse_is_told_which_symbols_it_reads(here, ask):
     ask(probe_sensor, "simulate", f"{here}#Cube/F1", "--sensor-type", "fsr-8x8", "-o", "c.h5")
     _, said, _ = ask(recognize_object, "c.h5", "--database", here)

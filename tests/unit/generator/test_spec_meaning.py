@@ -284,7 +284,7 @@ def test_a_model_gets_a_spec_that_names_it_from_where_the_spec_is(tmp_path, monk
     assert kind == "file"
     wanted = read_tree(own, SPEC).value
     assert wanted["shape"] == {"file": f"../{model}"}
-    assert wanted["name"] == name[0].upper() + name[1:]
+    assert wanted["name"] == name
 
 
 def test_words_of_people():

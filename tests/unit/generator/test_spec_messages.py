@@ -73,7 +73,7 @@ def test_a_file_that_is_no_text_of_ours(text, place, cause, fix):
         ("no/x.yaml", "there is no such file", "check the folder 'no'"),
         ("part.stk", "there is no such file", "did you mean 'part.stl'?"),
         ("part.stl", "this is a model, not a spec",
-         "encode-object init 'part.stl' -o 'part.yaml', then encode-object 'part.yaml'"),
+         "encode-object init 'part.stl' -o 'part.yaml' writes one"),
         ("parts.stl", "there is no such file", "did you mean 'part.stl'?"),
         ("a\0b", "cannot read: embedded null byte", "check the name and the rights of the file"),
         ("/dev/zero", "cannot read: it is a device, not a file",
