@@ -1,6 +1,7 @@
 """Sets: in parallel, resumable, on no cell twice; what is said of faces and of supports."""
 
 import hashlib
+import html
 import pickle
 import re
 import shutil
@@ -18,7 +19,7 @@ from generator.database.open import open_database
 from generator.database.read import read_layout
 from generator.database.transaction import read_transaction
 from generator.errors import DatabaseError, PrintError, WriteError
-from generator.layout.recognition_rate import LOW
+from generator.layout.recognition_rate import LOW, percent
 from generator.pipeline import encode
 from generator.pipeline.faces import face_reports, whole_rate
 from generator.pipeline.files import parts_of
@@ -88,6 +89,9 @@ def test_the_next_run_makes_only_what_is_missing_or_changed(there):
     assert [made.skipped for made in again.objects] == [False, False, True]
     assert all(made.reused for made in again.objects)
     assert "C is there, with all its files: skipped" in said
+    assert digests(there / "out") == before
+    proven = run(there, jobs=1, formats=("stl", "3mf"), verify=True)
+    assert [made.skipped for made in proven.objects] == [False] * 3
     assert digests(there / "out") == before
 
 
@@ -233,6 +237,39 @@ def test_what_a_slicer_reckons():
         read_cost("; nothing\n")
 
 
+def encoded(folder, formats, *, dry_run=False, **settings):
+    """Encode an object of these settings; return what is told of it, and of all."""
+    specs = read_specs([tree_from({"name": "A", **settings})])
+    here = {"folder": folder, "database": f"sqlite:///{folder}/lab.db", "jobs": 1}
+    made = encode(specs, formats=formats, dry_run=dry_run, **here)
+    return made.objects[0], made
+
+
+@pytest.mark.parametrize(
+    ("mount", "bought"),
+    [
+        ({"magnets": "6 x 3 mm"}, "4 magnets of 6 x 3 mm"),
+        ({"screws": "M3"}, "4 screws M3"),
+        ({"rod": 3}, "a rod of 3 mm"),
+        ({"flange": "ISO 9409-1-31.5-4-M5"}, "4 screws M5; a pin of 5 mm"),
+    ],
+)
+def test_a_sheet_names_what_to_buy_and_the_encoded_side(tmp_path, mount, bought):
+    shape = {"tag": {"size": [60, 60], "thickness": 12}}
+    one, _ = encoded(tmp_path, ("stl",), shape=shape, mount=mount)
+    sheet = html.unescape((tmp_path / "A-build.html").read_text())
+    assert f"g if solid; {bought}<" in sheet
+    promise = percent(one.promise.at_once / one.promise.encoded)
+    assert f"{promise} of touches on its encoded side are answered at once" in sheet
+
+
+def test_panels_are_advised_only_where_they_can_be_made(tmp_path):
+    for thick, advised in ((6, False), (40, True)):
+        settings = {"shape": {"box": [60, 60, thick]}, "print": {"parts": "whole"}}
+        one, _ = encoded(tmp_path, (), dry_run=True, **settings)
+        assert ("parts: panels" in one.lying) == advised
+
+
 @pytest.mark.parametrize(
     ("shape", "how", "said"),
     [
@@ -243,9 +280,7 @@ def test_what_a_slicer_reckons():
     ],
 )  # fmt: skip
 def test_sheet_advice_and_slicer_project_agree_on_supports(tmp_path, shape, how, said):
-    specs = read_specs([tree_from({"name": "A", "shape": shape, "print": how})])
-    url = f"sqlite:///{tmp_path}/l.db"
-    made = encode(specs, folder=tmp_path, database=url, formats=("3mf",), jobs=1)
+    one, made = encoded(tmp_path, ("3mf",), shape=shape, print=how)
     sheet = (tmp_path / "A-build.html").read_text()
     assert said in sheet
     assert said in next_step(made)
@@ -259,4 +294,4 @@ def test_sheet_advice_and_slicer_project_agree_on_supports(tmp_path, shape, how,
         assert set(re.findall(r'support_material" value="(.)"', of_object)) == {wanted}
     if shape == {"cube": 40}:
         way = r"F1 down, no supports needed, \d+ symbols stand out sideways; with  parts: .*"
-        assert re.fullmatch(way, made.objects[0].lying)
+        assert re.fullmatch(way, one.lying)

@@ -24,7 +24,6 @@ from probe.protocol import (
 
 COUNTS = (np.arange(256, dtype=np.uint16) * 4).reshape(16, 16)
 READ_WRIST = np.array([0, 1, 512, 1023], np.uint16)
-FRAME = FramePacket(0x1234, 0x89ABCDEF, COUNTS, READ_WRIST)
 
 
 def wire(payload: bytes) -> bytes:
@@ -85,6 +84,12 @@ BODY = bytes(12 * 32) + READ_WRIST.tobytes()
 )
 def test_what_is_no_packet_says_why(block, damage):
     assert decode(block) is damage
+
+
+@pytest.mark.parametrize("filling", [b" ", b"\0"])
+def test_a_short_name_may_be_filled_up_as_c_does(filling):
+    block = wire(HEADER + IDENT[:-8] + b"mine".ljust(8, filling))
+    assert decode(block).name == "mine"
 
 
 @pytest.mark.parametrize(
