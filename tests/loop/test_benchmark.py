@@ -42,6 +42,7 @@ def made(tmp_path_factory):
     (folder / "my_reader.py").write_text(code)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(encoded_set, "subprocess", HERE)
+        patch.setattr("generator.pipeline.plates.overview_pdf", lambda *_: b"")  # drawn elsewhere
         patch.syspath_prepend(str(folder))
         found = run_benchmark(folder, touches=8, worlds=[WORLD], seed=5,
                               readers=["ours", "chance", "my_reader:reader"])  # fmt: skip
@@ -129,6 +130,8 @@ def test_a_campaign_over_worlds(tmp_path, monkeypatch):
     for name, count in few.items():  # each object takes time to make, as does each process
         monkeypatch.setattr(encoded_set, name, count)
     monkeypatch.setattr(encoded_set, "subprocess", HERE)
+    monkeypatch.setattr("recognizer.validation.report.page_of", lambda *_: "")
+    monkeypatch.setattr("generator.pipeline.plates.overview_pdf", lambda *_: b"")
     (tmp_path / "set.yaml").write_text(SET)
     folder = tmp_path / "run"
     result = validate(
