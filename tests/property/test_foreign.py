@@ -21,16 +21,9 @@ from foreign import case, databases, lines, page, recordings
 from encoded_objects.base.errors import EncodedObjectsError
 from probe.recording.ros import DEFINITIONS, IMAGE
 
-CASES = {
-    "step": 25,
-    "3mf": 60,
-    "array": 60,
-    "database": 30,
-    "import": 30,
-    "command": 15,
-    "spec": 100,
-}  #: of a kind; others have `USUAL`
-USUAL = 150
+CASES = {"command": 15, "step": 17, "database": 20, "import": 20, "3mf": 40, "array": 60}
+CASES |= {"spec": 100, "recording": 100, "calibration": 100}
+USUAL = 150  #: of other kinds
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +94,10 @@ def _lab_where(change):
         return path.read_bytes()
 
 
+def _damaged(change, said="damaged", kind="database"):
+    return kind, "lab.db", partial(_lab_where, change), said
+
+
 def _packed_by_lzma():
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", zipfile.ZIP_LZMA) as archive:
@@ -122,19 +119,11 @@ FOUND = {
     "a chunk of another check sum": ("mcap", "a.mcap", _mcap_of_another_sum, "damaged"),
     "a summary of another check sum": ("mcap", "a.mcap", _mcap_of_another_type, "check sum"),
     "a plate packed by LZMA": ("3mf", "p.3mf", _packed_by_lzma, "no plate"),
-    "glyphs that are a number": (
-        "database", "lab.db", lambda: _lab_where("update alphabets set definition = 0"), "damaged",
-    ),
-    "no vertex of a face": (
-        "database", "lab.db", lambda: _lab_where("delete from faces_to_vertices"), "damaged",
-    ),
+    "glyphs that are a number": _damaged("update alphabets set definition = 0"),
+    "no vertex of a face": _damaged("delete from faces_to_vertices"),
     **{
-        f"{value} in {table}.{column}": (
-            "database",
-            "lab.db",
-            partial(_lab_where, f'update or replace {table} set "{column}" = {value}'),
-            "never written",
-        )
+        f"{value} in {table}.{column}":
+            _damaged(f'update or replace {table} set "{column}" = {value}', "never written")
         for table, columns, value in (
             ("placements", "rotation_rad x_mm y_mm", "'x'"),
             ("objects", "pitch_mm height_mm chamfer_mm", "'x'"),
@@ -148,9 +137,7 @@ FOUND = {
         )
         for column in columns.split()
     },
-    "a pose that is no JSON": (
-        "import", "lab.db", lambda: _lab_where("update parts set T_object_part = '['"), "be read",
-    ),
+    "a pose that is no JSON": _damaged("update parts set T_object_part = '['", "be read", "import"),
 }  # fmt: skip
 
 

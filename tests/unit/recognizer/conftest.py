@@ -19,14 +19,10 @@ class SmallLab:
     `held` is (row, column) -> (face, label); the array goes round, 11 x 13 by default.
     """
 
-    def __init__(self, held, rows=11, columns=13, order=4, dense=False):
+    def __init__(self, held, rows=11, columns=13, order=4):
         self.held, self.rows, self.columns, self.order = held, rows, columns, order
         cells = sorted(held)
         keys = np.array([r * columns + c for r, c in cells], np.uint64)
-        table = None
-        if dense:
-            table = np.full(rows * columns, len(cells), np.int32)
-            table[keys] = np.arange(len(cells))
         owners = [held[cell][0] for cell in cells]
         self.embossed = EmbossedArray(
             array=SimpleNamespace(rows=rows, columns=columns, order=order),
@@ -35,7 +31,7 @@ class SmallLab:
             keys=keys,
             owners=np.array([*owners, -1], np.int32),
             labels=np.array([*(held[cell][1] for cell in cells), -1], np.int8),
-            dense=table,
+            dense=None,
             faces=np.array([[1, face] for face in range(max(owners) + 1)]),
             names={1: "Thing"},
             engine=None,
@@ -59,12 +55,12 @@ class SmallLab:
         }
 
 
-def two_faces(dense=False):
+def two_faces():
     """A face of 6 x 6 cells, and one of 3 x 4 that lies over the array's corner."""
     labels = np.random.default_rng(20).integers(0, 4, (11, 13))
     held = {(r, c): (0, int(labels[r, c])) for r in range(1, 7) for c in range(2, 8)}
     held |= {(r, c): (1, int(labels[r, c])) for r in (9, 10, 0) for c in (11, 12, 0, 1)}
-    return SmallLab(held, dense=dense)
+    return SmallLab(held)
 
 
 def fit_of(cells, scores, seen=20.0, **changed):

@@ -157,22 +157,13 @@ def test_a_pose_that_is_read_becomes_the_pose_on_the_print(scale_x, scale_y, ske
     np.testing.assert_allclose(T_part_face @ found, T_part_probe, atol=1e-9)
 
 
-def at_rest(x=0.0, y=0.0, turn=0.0):
-    pose = np.eye(4)
-    pose[:2, :2], pose[:2, 3] = turned(turn)[:2, :2], (x, y)
-    return pose
-
-
-def felt(excess, sigma=1e-3, expected=1e9, with_pose=(0.0, 0.0, 0.0)):
-    return TouchScale(excess, np.array([*with_pose, sigma**2]), expected)
-
-
 def test_on_a_wall_the_height_is_as_designed_and_the_scale_felt_is_half():
-    T_part_face = np.eye(4)
-    T_part_face[:3, :3] = WALL_X
+    T_part_face, pose = np.eye(4), np.eye(4)
+    T_part_face[:3, :3], pose[:2, 3] = WALL_X, (20.0, 10.0)
     spread = np.diag([4e-6, 4e-6, 1e-12, 1])
+    felt = TouchScale(0.002, np.array([0.0, 0.0, 0.0, 1e-6]), 1e9)
     face = PrintedFace(print_with(covariance=spread), T_part_face)
-    found, _ = face.pose(at_rest(20.0, 10.0), np.zeros((3, 3)), felt(0.002))
+    found, _ = face.pose(pose, np.zeros((3, 3)), felt)
     at = T_part_face[:3, :3] @ found[:3, 3]
     before = T_part_face[:3, :3] @ (20.0, 10.0, 0.0)
     assert at[2] == pytest.approx(before[2], abs=1e-9)
@@ -233,10 +224,10 @@ def reader(make_lab):
     return Reader(open_lab(make_lab(*specs, formats=("stl",)) / "lab.db"))
 
 
-def image_felt(reader, matrix, touch, name="Cube", seq=0):
+def image_felt(reader, matrix, touch, name="Cube"):
     scene = registered_surface(reader.lab.url, name, "F1")
     forces = press(Stretched(scene.surface, matrix), reader.sensor, touch).forces_n
-    return TouchImage(seq, 0, 1, 100 * forces, np.zeros(4), None)
+    return TouchImage(0, 0, 1, 100 * forces, np.zeros(4), None)
 
 
 @pytest.mark.parametrize("matrix", [np.diag([0.98, 1.0]), np.array([[1.0, 0.015], [0.0, 0.99]])])

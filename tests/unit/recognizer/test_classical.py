@@ -61,16 +61,9 @@ def scan(lab):
     return Scan(lab.url, "Cube", "F2", seed=3)
 
 
-# --- merging ----------------------------------------------------------------------------
-
-
-def pattern(x, y):
+def pattern(points):
+    x, y = np.moveaxis(points, -1, 0)
     return 2 + np.sin(0.45 * x + 0.3) * np.cos(0.35 * y) + np.sin(0.2 * x - 0.4 * y)
-
-
-def felt_at(pose):
-    at = transform_points(np.asarray(pose, float), SENSOR.centres_mm())
-    return pattern(at[..., 0], at[..., 1])
 
 
 def test_products_find_steps_to_a_quarter_of_a_tactel_where_something_is_felt_in_common():
@@ -89,15 +82,13 @@ def test_bad_tactels_are_filled_by_other_touches():
     poses = np.array([[0.0, 0, 0], [6.7, 0, 0]])
     trust = np.ones((16, 16))
     trust[:, 9] = 0
-    readings = [np.where(trust > 0, felt_at(pose), np.nan) for pose in poses]
+    felt = [pattern(transform_points(pose, SENSOR.centres_mm())) for pose in poses]
+    readings = [np.where(trust > 0, one, np.nan) for one in felt]
     found = merge_touches(SENSOR, readings, poses, "believed", trust=trust)
     at = found.image.xy_mm(*np.indices(found.image.values.shape))
     inner = (np.abs(at[..., 0] - 2.4) < 0.5) & (np.abs(at[..., 1]) < 10)
     assert found.image.defined[inner].all()
-    assert np.abs(found.image.values - pattern(at[..., 0], at[..., 1]))[inner].max() < 0.3
-
-
-# --- reading ----------------------------------------------------------------------------
+    assert np.abs(found.image.values - pattern(at))[inner].max() < 0.3
 
 
 def test_a_scan_names_object_face_and_place(lab, scan):

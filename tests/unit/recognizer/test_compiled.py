@@ -28,13 +28,13 @@ STYLE = SymbolStyle(pitch_mm=5.0)
 TRUE = np.array([[1.3, -0.7, 0.4, 0.1, 0.05, -0.02, 0.003]])
 
 
-def scene(overlay="tab", *, tilt=0.0, noise=0.0, newtons=True, falls=None, dead=3):
+def scene(overlay="tab", *, tilt=0.0, noise=0.0, newtons=True, falls=None):
     """Return an image of symbols pressed by a plate, and the gain."""
     sensor = SensorType().with_overlay(overlay)
     template = template_of(alphabet_named("dense-4"), STYLE, sensor)
     draw = np.random.default_rng(7)
     trust = np.ones((16, 16))
-    trust.flat[draw.choice(256, dead, replace=False)] = 0.0
+    trust.flat[draw.choice(256, 3, replace=False)] = 0.0
     signal = Signal(np.ones((16, 16)), trust, contact=True, newtons=newtons, noise=noise)
     image = image_of_signal(sensor, signal, template, STYLE.height_mm)
     image = replace(image, falls=falls, noise=noise)
@@ -201,10 +201,10 @@ def test_names_are_counted_alike(names):
     assert given_.tolist() == names
 
 
-def embossed_of(held, *, dense, columns=9):
+def embossed_of(held, *, dense):
     """Return cells (row, column, face, label) of a torus of 7 x 9 cells as a lab has them."""
     rows, across, faces, labels = np.array(sorted(held)).T
-    keys = cell_keys(columns, rows, across)
+    keys = cell_keys(9, rows, across)
     table = np.full(63, len(keys), np.int32)
     table[keys[keys < 63]] = np.flatnonzero(keys < 63)
     return EmbossedArray(

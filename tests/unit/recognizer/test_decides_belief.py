@@ -253,10 +253,10 @@ def test_it_is_the_share_of_all_combinations_and_never_less(seed, monkeypatch):
     assert found[1] <= 5 * truth
 
 
-def square(small, side, order=4, **changed):
-    labels = np.random.default_rng(3).integers(order, size=(side, side))
+def square(small, side):
+    labels = np.random.default_rng(3).integers(4, size=(side, side))
     held = {(r, c): (0, int(labels[r, c])) for r in range(side) for c in range(side)}
-    return small.Lab(held, rows=side + 4, columns=side + 5, order=order, **changed)
+    return small.Lab(held, rows=side + 4, columns=side + 5)
 
 
 def places_that_match(lab, cells, scores, held, anchor, behind):

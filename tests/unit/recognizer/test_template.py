@@ -1,4 +1,7 @@
-"""Templates out of the cache are those that were worked out, bit by bit."""
+"""Templates out of the cache, crosses about their middle, and how an overlay presses.
+
+Round faces under the sensor are in the corpus `answers`.
+"""
 
 import math
 from dataclasses import fields, replace
@@ -11,10 +14,12 @@ from generator.alphabet import SymbolStyle, alphabet_named
 from generator.alphabet.strokes import Glyph
 from recognizer.touch import prepare
 from recognizer.touch.prepare import template_and_bank
+from recognizer.touch.symbols.image import pressing_of
 from recognizer.touch.symbols.search import bank_of
 from recognizer.touch.symbols.template import template_of
 
-CASE = (alphabet_named("dense-4"), SymbolStyle(), SensorType())
+SENSOR = SensorType()
+CASE = (alphabet_named("dense-4"), SymbolStyle(), SENSOR)
 
 
 def same(one, other):
@@ -47,7 +52,7 @@ def test_crosses_are_felt_about_their_middle(pitch_mm):
     """A plate of crosses looks the same after half a turn, and so does what a pad feels of it."""
     dense = alphabet_named("dense-4")
     crosses = replace(dense, glyphs=(Glyph("+", PLUS),))
-    sensor = replace(SensorType().with_overlay("pad"), pitch_mm=pitch_mm)
+    sensor = replace(SENSOR.with_overlay("pad"), pitch_mm=pitch_mm)
     template = template_of(crosses, STYLE, sensor)
     psi = template.values[:, :, 0, 0].astype(float)
     felt = np.expm1(psi * math.log(4))
@@ -58,3 +63,16 @@ def test_crosses_are_felt_about_their_middle(pitch_mm):
     y = (part.sum(axis=1) * axis[inner]).sum() / part.sum()
     assert math.hypot(x, y) < 0.1 * template.step_mm
     assert np.abs(felt - felt[::-1, ::-1]).max() < 0.02 * felt.max()
+
+
+def test_how_an_overlay_presses_by_its_kind():
+    tab, pad = SENSOR, SENSOR.with_overlay("pad")
+    area = math.pi * (tab.overlay.tab_diameter_mm / 2) ** 2
+    for sensor, each in ((tab, area), (pad, pad.pitch_mm**2)):
+        law = pressing_of(sensor, 0.9)
+        assert law.hardens is (sensor is tab)
+        assert law.scale == pytest.approx(sensor.overlay.young_mpa * each / 3)
+        assert law.symbol == pytest.approx(0.9 / sensor.overlay.height_mm)
+        depths = np.array([0.1, 0.4])
+        np.testing.assert_allclose(law.depth(law.force(depths)), depths)
+    np.testing.assert_allclose(law.force(np.array([-0.5, 0.1, 0.4])), [0.0, 0.3, 1.2])

@@ -1,4 +1,4 @@
-"""Touches that are drawn: those that follow one without an answer, and those of printed parts.
+"""Touches that are drawn: those that follow one without an answer, of prints, and of decoys.
 
 The slicer is left out: what stands for a print is the written part's own height map, moved.
 The real one runs in tests/loop/test_validate_printed.py.
@@ -22,7 +22,10 @@ from generator.printed.surface import PrintedSurface, write_surface
 from probe.errors import SurfaceError
 from probe.simulate import printed
 from probe.simulate.printed import PrintOptions, listing_of, printed_scene, read_listing
+from probe.simulate.registered import registered_surface
 from probe.simulate.target import part_surface
+from probe.simulate.world.surfaces import exchange_symbols, seat_panel, seats_of
+from probe.surface.polygon import polygon
 from recognizer.scan.session import Scan
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
@@ -238,3 +241,40 @@ def test_touches_are_of_what_was_printed_with_its_own_faults(panels, listing, tm
     (tmp_path / "other.json").write_text(json.dumps(values | {"faces": {"Ball": {"F1": "a"}}}))
     with pytest.raises(ValidationError, match="no face for touches of kind face was printed"):
         draw_touch(TouchPlan(panels, prints=str(tmp_path / "other.json")), 0, reader)
+
+
+SQUARE = polygon([np.array([[0.0, 0], [60, 0], [60, 60], [0, 60]])])
+OBLONG = polygon([np.array([[0.0, 0], [60, 0], [60, 40], [0, 40]])])
+
+
+@pytest.mark.parametrize(
+    ("seat", "panel", "ways"), [(SQUARE, SQUARE, 4), (OBLONG, OBLONG, 2), (SQUARE, OBLONG, 0)]
+)
+def test_a_panel_fills_a_seat_in_as_many_ways_as_it_looks_alike(seat, panel, ways):
+    found = seats_of(seat, panel)
+    assert len(found) == ways
+    for place in found:
+        inside = place.into(seat.starts)
+        assert panel.contains(0.99 * (inside - panel.starts.mean(0)) + panel.starts.mean(0)).all()
+
+
+def test_a_panel_in_another_seat_has_its_own_symbols(url):
+    seat, panel = (registered_surface(url, "Cube", face) for face in ("F1", "F2"))
+    points = np.random.default_rng(0).uniform(5, 55, (400, 2))
+    for place in seats_of(seat.region, panel.region):
+        there = seat_panel(seat.surface, panel.surface, place).heights_mm(points)
+        assert there == pytest.approx(panel.surface.heights_mm(place.into(points)), abs=1e-9)
+        assert not np.allclose(there, seat.surface.heights_mm(points))
+
+
+def test_exchanged_symbols_are_others_and_no_more(url):
+    scene = registered_surface(url, "Cube", "F1")
+    held = scene.surface.lattice
+    at = np.array([[30.0, 30.0], [12.0, 40.0]])
+    rows, columns = held.cells_at(at)
+    labels = (held.label_at(rows, columns) + 1) % 4
+    found = exchange_symbols(scene.surface, at, labels).lattice
+    assert found.label_at(rows, columns).tolist() == labels.tolist()
+    everywhere = [grid.ravel() for grid in np.indices((16, 16))]
+    differ = found.label_at(*everywhere) != held.label_at(*everywhere)
+    assert differ.sum() <= 2
