@@ -217,6 +217,7 @@ def _decode_ident(seq: int, t_us: int, payload: bytes) -> IdentPacket | Damage:
     fields = _IDENT.unpack_from(payload, _HEADER.size)
     rows, columns, bits, sensors, sensor, major, minor, settling, kbaud, boot, name = fields
     sane = rows * columns > 0 and 8 <= bits <= 16 and sensor < sensors
+    name = name.rstrip(b"\0")  # as C fills what is left of a text
     if not sane or not name.isascii() or not name.decode("ascii").isprintable():
         return Damage.VALUE
     return IdentPacket(

@@ -158,7 +158,7 @@ def encode(
     if printed_check:
         print_printed(checked, as_json=as_json)
     else:
-        print_made(made, dry_run=dry_run, as_json=as_json)
+        print_made(made, dry_run=dry_run, as_json=as_json, verified=verify)
     return 0
 
 

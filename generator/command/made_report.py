@@ -27,8 +27,8 @@ NAMED_KINDS = 3  #: kinds of faces that are named one by one
 BLOCKED = 0.1  #: share of places where the sensor meets another face, from which that is said
 
 
-def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
-    """Say what was made."""
+def print_made(result: Encoded, *, dry_run: bool, as_json: bool, verified: bool) -> None:
+    """Say what was made, and whether its files were read back."""
     if as_json:
         output.write_json(_encoded_values(result, dry_run))
         return
@@ -45,9 +45,9 @@ def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
     if result.set_files:
         folder = result.set_files[0].parent
         output.write(f"set:\n  {folder}{os.sep}  {_file_list(folder, result.set_files)}")
-    output.write(
-        f"\n{array}; registered in {without_password(result.database)} ({result.seconds:.1f} s)"
-    )
+    array += f"; registered in {without_password(result.database)}"
+    proven = "; every model was read back: no fault" if verified else ""
+    output.write(f"\n{array} ({result.seconds:.1f} s){proven}")
     if following := next_step(result):
         output.write(following)
 

@@ -173,6 +173,7 @@ class _Face:
     area_mm2: float  #: of a round face, of all its facets
     placement: Placement | None
     layout: FaceLayout
+    T_object_face: list[list[float]]  #: (4, 4), mm; of a round face, of its first facet
     promise: RecognitionRate | None = None  #: None: nothing was measured
 
 
@@ -206,6 +207,7 @@ def _faces(held: RegisteredObject, sensor: SensorType) -> tuple[list[_Face], Par
                 area_mm2=sum(area[n] for n in surface.facets) if surface else face.area_mm2,
                 placement=face.placement,
                 layout=layouts[face.face_id],
+                T_object_face=face.T_object_face.tolist(),
                 promise=rates.get(face.face_id),
             )
         )
@@ -285,6 +287,7 @@ def _face_values(face: _Face) -> dict[str, Any]:
         "name": face.name,
         "type": face.kind,
         "area_mm2": face.area_mm2,
+        "T_object_face": face.T_object_face,
         "symbols": len(on.labels),
         "places": on.places,
         "promise": asdict(face.promise) if face.promise else None,

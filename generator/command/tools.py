@@ -16,7 +16,7 @@ def init(
     shape: Annotated[
         str,
         Argument("cube, box, triangular_prism, tetrahedron, octahedron, dodecahedron, prism, "
-                 "pyramid, cylinder, cone, tag, polyhedron or file."),
+                 "pyramid, cylinder, cone, tag, polyhedron or file; or a model, as part.step."),
     ] = "cube",
     file: Annotated[
         Path | None,
@@ -29,7 +29,7 @@ def init(
     from encoded_objects.base import output
     from generator.spec.starter import starter_named
 
-    kind, text = starter_named(shape, file.name if file else "")
+    kind, text = starter_named(shape, file)
     if file is not None:
         _write_new(file, text, force)
     if as_json:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,12 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from generator.array.contract import touches_needed
+from generator.errors import SolidError
 from generator.layout.placement import Layout
 from generator.layout.recognition_rate import PartRate
 from generator.pipeline.faces import FaceReport, whole_rate
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import face_vector
 from generator.polyhedron.standing import DOWN, FLAT, LEVEL, Stance, bridges
+from generator.solid.plate import plain_panels
 
 if TYPE_CHECKING:
     from generator.export.check import FitReport
@@ -183,5 +186,8 @@ def overhangs(plan: ObjectPlan, layout: Layout) -> Overhangs:
     if upright:  # their lower sides hang over by their height
         needed += f", {upright} symbols stand out sideways"
     flat = not (polyhedron.surfaces or polyhedron.blank) and (over or upright)
-    better = "; with  parts: panels  nothing hangs over" if flat else ""
+    spec, better = plan.spec, ""
+    with suppress(SolidError):  # panels would be too small for their wall
+        if flat and plain_panels(polyhedron, spec.wall_mm, plan.printer, spec.gap_mm, spec.name):
+            better = "; with  parts: panels  nothing hangs over"
     return Overhangs(f"{lies}, {needed}{better}", over)

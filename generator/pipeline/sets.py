@@ -56,7 +56,7 @@ def make_set(
     tasks: dict[int, Task[MadeObject]] = {}
     with read_transaction(engine) as connection:
         for number, job in enumerate(to_make):
-            if (skipped := _intact_object(connection, job)) is not None:
+            if not job.verify and (skipped := _intact_object(connection, job)) is not None:
                 made[number] = skipped
                 progress(f"{skipped.name} is there, with all its files: skipped", 0.0)
         left = {number: job for number, job in enumerate(to_make) if number not in made}

@@ -31,6 +31,7 @@ from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import face_vector, points_inside
 from generator.polyhedron import face_polygon
 from generator.polyhedron.assembly import AssemblyStep, assembly_order, distinct_faces
+from generator.polyhedron.mount import fasteners
 from generator.printers import Printer
 from generator.solid import Part, box, volume
 
@@ -58,7 +59,8 @@ _MIXED = (
 )
 _CHECK = (
     "Hold the sensor flat on the part, {force:.2g} N or more. recognize-object --port URL --follow "
-    "--database lab.db answers, or open-bench; probe-sensor list gives the URL of the probe."
+    "--database lab.db answers, or open-bench; lab.db stands for the database that the part was "
+    "made with, and probe-sensor list gives the URL of the probe."
 )
 Rows = Sequence[tuple[str, ...]]
 
@@ -107,7 +109,9 @@ def build_sheet(
         title = f"Check by {'three touches' if len(checks) == 3 else 'touch'}"
         text = _CHECK.format(force=LIGHT_N * force_share(plan.spec.sensor)) + _MIXED * panelled
         if promise is not None:
-            text += f" {percent(promise.at_once)} of touches anywhere are answered at once."
+            side = promise.encoded if promise.one_side else 1.0
+            where = "on its encoded side" if promise.one_side else "anywhere"
+            text += f" {percent(promise.at_once / side)} of touches {where} are answered at once."
         sections.append(Section(title, text, ("", "touch", "must answer"), checks))
     return sheet_html(f"{plan.spec.name}: build sheet", sections)
 
@@ -170,6 +174,7 @@ def _facts(
         if any(_mark(part).startswith(code) for part in parts):
             marks = f"backs say {code}, which stands for {spec.name} on small parts, and the face"
         rows.append(("marks", marks))
+    buy += fasteners(spec.mount) if spec.mount else ()
     rows.append(("to buy", "; ".join(buy)))
     if cost:
         rows.append(("printing", f"{cost} ({source}, 15 % infill)"))

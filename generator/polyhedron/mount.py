@@ -117,6 +117,17 @@ def least_thickness_mm(mount: Mount | None) -> float:
     return max((screw.sunk_mm - screw.clear_mm) / 2 + LAND_MM, pocket)
 
 
+def fasteners(mount: Mount) -> tuple[str, ...]:
+    """Return what has to be bought for a mount; nothing for a hole, whose bolt is not known."""
+    size = mount.size
+    if isinstance(size, tuple):
+        return (f"{len(CORNERS)} magnets of {size[0]:g} x {size[1]:g} mm",)
+    if isinstance(size, float):
+        return (f"a rod of {size:g} mm",) if mount.kind == "rod" else ()
+    _, count, thread, pin = FLANGES.get(size, (0.0, len(CORNERS), size, 0.0))
+    return (f"{count} screws {thread}", *([f"a pin of {pin:g} mm"] if pin else []))
+
+
 def with_mount(solid: Polyhedron, mount: Mount, face: int) -> Polyhedron:
     """Return the solid with a mount's holes in a planar face; that face and they stay blank.
 

@@ -66,7 +66,7 @@ def read_specs(
     context = None if files else NO_FILES
     for path in paths:
         try:
-            source = path if isinstance(path, Tree) else read_tree(Path(path), SPEC)
+            source = path if isinstance(path, Tree) else _tree_at(Path(path))
         except SpecError as error:
             problems += error.problems
             continue
@@ -182,6 +182,16 @@ def with_profile(
         encoding=encoding,
         array_key=array_key,
     )
+
+
+def _tree_at(path: Path) -> Tree:
+    """Return what a spec file says; raises `SpecError`, also for a model in its place."""
+    from generator.polyhedron.read import MESHES, STEP
+
+    if path.suffix.lower() in (*STEP, *MESHES) and path.is_file():
+        fix = f"encode-object init '{path}' -o '{path.stem}.yaml' writes one"
+        raise SpecError([Problem("this is a model, not a spec", fix, file=str(path))])
+    return read_tree(path, SPEC)
 
 
 def _origin(path: Path | str | Tree, source: Tree) -> str:

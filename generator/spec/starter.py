@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import os
+from pathlib import Path
+
 from encoded_objects.base.document import Problem, suggest
 from generator.spec.problem import SpecError
 from generator.spec.shape import EXAMPLES, OTHER_NAMES
@@ -54,8 +58,8 @@ name: {name}
 """
 
 
-def starter(shape: str, file: str = "") -> str:
-    """Return a commented spec for one of the shapes of `EXAMPLES`; it can be made as it is.
+def starter(shape: str, file: str = "", model: str = "") -> str:
+    """Return a commented spec for one of the shapes of `EXAMPLES`, or for a model's file.
 
     >>> starter("cube").splitlines()[5]
     'shape: {cube: 60 mm}'
@@ -63,6 +67,8 @@ def starter(shape: str, file: str = "") -> str:
     name = "Part" if shape == "file" else shape.replace("_", " ").capitalize()
     folder = name.lower().replace(" ", "-")
     line = _POLYHEDRON if shape == "polyhedron" else f"shape: {EXAMPLES[shape]}"
+    if model:
+        name, line = json.dumps(Path(model).stem), f"shape: {{file: {json.dumps(model)}}}"
     if shape == "file":
         line += "    # .step, .stl or .obj, relative to this file"
         line += "\n# shape: {file: part.stl, scale: 25.4}    # a model in inches"
@@ -70,11 +76,16 @@ def starter(shape: str, file: str = "") -> str:
     return _TEMPLATE.format(name=name, file=file, shape=line, folder=folder)
 
 
-def starter_named(shape: str, file: str = "") -> tuple[str, str]:
-    """Return the shape's own name and its spec for `file`; raises `SpecError` for no shape."""
+def starter_named(shape: str, file: Path | None = None) -> tuple[str, str]:
+    """Return the kind of a shape or a model, and a spec `file`; raises `SpecError` for neither."""
+    from generator.polyhedron.read import MESHES, STEP
+
+    name = file.name if file else ""
+    if Path(shape).suffix.lower() in (*STEP, *MESHES):
+        return "file", starter("file", name, os.path.relpath(shape, file.parent if file else "."))
     word = shape.lower().replace("-", "_").replace(" ", "_")
     kind = OTHER_NAMES.get(word, word)
     if kind not in EXAMPLES:
         fix = suggest(word, EXAMPLES, f"choose one of {', '.join(EXAMPLES)}")
         raise SpecError([Problem(f"unknown shape '{shape}'", fix)])
-    return kind, starter(kind, file)
+    return kind, starter(kind, name)

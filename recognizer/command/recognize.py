@@ -49,10 +49,15 @@ from recognizer.touch.source import TouchImage, TouchSource, source_of
 if TYPE_CHECKING:
     from recognizer.sensor.wiring import Wiring
     from recognizer.touch.robot import ObjectPose
+    from recognizer.touch.signal import Signal
 
 MOUNTING = (
     "how this sensor is mounted was never checked, and no touch shows a quarter or half turn: "
     "recognize-object check --at OBJECT/FACE --sensor-state FILE"
+)
+POSES = (
+    "the poses contradict the touches, which without them say {object}/{face}; poses are "
+    "T_base_sensor in mm, z away from the surface (docs/recognizer.md)"
 )
 TRIED = 6  #: refused touches, none answered, after which the wiring is checked
 
@@ -193,6 +198,7 @@ def _answers(
     if belief is not None and options.recording is not None:
         touches = refuse_single(touches, source.place, touches_for(reader))
     warned = ""
+    placed: list[tuple[Signal, int]] = []  # touches of a scan whose pose is known
     last: Answer | None = None  # that answers
     for count, touch in enumerate(touches, start=1):
         if interrupted.is_set():  # a touch that is cut short is none
@@ -204,6 +210,7 @@ def _answers(
             signal = reader.signal(touch.counts, calibration=source.calibration)
             pose = pose_during(touch, count, by_touch, options.joint_error, source.place)
             found = belief.add(signal, pose, seq=touch.seq)
+            placed += [(signal, touch.seq)] if pose is not None else []
         joints = by_touch[count - 1] if len(by_touch) >= count else options.joints_deg
         in_base, trouble = _object_in_base(touch, found, joints, options.joint_error)
         answer = Answer(touch, found, in_base, None if belief is None else belief.touches)
@@ -219,6 +226,12 @@ def _answers(
         until_answered = belief is not None and options.port and not options.follow
         if count == most or (found and until_answered):
             return
+    if belief is not None and placed and not belief.answer:
+        alone = belief_for(reader, method)
+        for signal, seq in placed:
+            alone.add(signal, None, seq=seq)
+        if alone.answer:
+            message(POSES.format(object=alone.answer.object, face=alone.answer.face))
     if belief is None or not belief.touches or found or not belief.answer:
         return
     # the answer of the scan, though its last touch could not be read

@@ -122,7 +122,7 @@ class Reader(PreparedLab):
         shape, sensor = (self.sensor.rows, self.sensor.columns), self.sensor
         try:
             image = counts.counts if isinstance(counts, Frame) else counts
-            if np.iscomplexobj(image) or np.iscomplexobj(() if trust is None else trust):
+            if np.iscomplexobj(image) or (trust is not None and np.iscomplexobj(trust)):
                 raise TypeError("complex numbers")
             values = np.asarray(image, np.float64)
             known = None if trust is None else np.asarray(trust, np.float64)

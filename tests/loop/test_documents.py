@@ -83,6 +83,7 @@ def said_by():
 SAID = {
     "decode_windows": r"row 1, column 61 \(t = 2206\)\n.*\n2206\n.*Cube/F1\n",
     "encode_set": r"Cube:.*\nBox-1:.*\nBox-2:(?s:.*)\n\d+ of 262143 cells in use\n(?s:.*)",
+    "hand_eye": r"(1[6-9]|20) of 20 .*\n0\.[01]\d mm across, -?0\.\d+ mm along, 0\.[01]\d deg.*\n",
     "mujoco_press": r"Cube/F6 at \(.*\n",
     "follow_port": r"(?s:.*)Cube/F1(?s:.*)",
     "own_sensor_data": r"mine\.h5: 2 frames.*\n.*Cube/F4.*\n.*Cube/F4.*\n",
@@ -147,7 +148,7 @@ def test_mujoco_arm(tmp_path, said_by):
 def test_examples_are_short_and_all_shown_and_run():
     scripts = {path.stem: path.read_text() for path in EXAMPLES.glob("*.py")}
     long = {stem for stem, text in scripts.items() if text.count("\n") > 30}
-    assert long == {"mujoco_arm"}  # a world
+    assert long == {"hand_eye", "mujoco_arm"}  # a calibration, a world
     shown = re.findall(r"examples/(\w+)\.py", (EXAMPLES.parent / "examples.md").read_text())
     assert sorted(shown) == sorted(scripts)
     assert {f"test_{stem}" for stem in scripts if stem not in SAID} <= set(globals())

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 
+import h5py
 import manifold3d
 import numpy as np
 import pytest
@@ -116,6 +117,32 @@ def test_a_scan_of_a_recording_says_its_news_and_its_answer(here, ask):
     assert (code, len(said.splitlines())) == (0, 2)
     assert said.splitlines()[-1].startswith("a scan of 6 touches: Cube/F1 at (")
     assert "mounted" not in notes  # a simulated sensor is not
+
+
+def test_the_frames_of_faces_are_those_of_answers(here, tmp_path, ask):
+    touch = ("simulate", f"{here}#Cube/F3", "-o", "f.h5", "--truth", "f.json", "--replace")
+    assert ask(probe_sensor, *touch)[0] == 0
+    (truth,) = json.loads((tmp_path / "f.json").read_text("utf-8"))["touches"]
+    _, said, _ = ask(encode_object, "show", "Cube", "--database", here, "--json")
+    (shown,) = (face for face in json.loads(said)["faces"] if face["name"] == "F3")
+    held = np.array(shown["T_object_face"]) @ truth["T_face_probe"]
+    assert held == pytest.approx(np.array(truth["T_object_probe"]))
+
+
+def test_poses_that_contradict_a_scan_are_named(tmp_path, monkeypatch, ask):
+    monkeypatch.chdir(tmp_path)
+    plate = {"name": "Plate", "shape": {"box": "90 x 90 x 40 mm"}, "profile": "thesis"}
+    encode(plate, database="lab.db", formats=("stl",))
+    touches = ("simulate", "lab.db#Plate/F1", "--scan", "raster", "--touches", 8)
+    assert ask(probe_sensor, *touches, "-o", "s.h5")[0] == 0
+    read = ("s.h5", "--database", "lab.db", "--scan")
+    code, _, notes = ask(recognize_object, *read)
+    assert (code, "contradict" in notes) == (0, False)
+    with h5py.File("s.h5", "r+") as recording:
+        recording["pose"][:, :3, 3] /= 1000  # metres
+    code, _, notes = ask(recognize_object, *read)
+    assert code == 1
+    assert "the poses contradict the touches, which without them say Plate/F1; poses are T" in notes
 
 
 def test_a_type_too_coarse_is_told_which_symbols_it_reads(here, ask):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 import zipfile
 
@@ -9,7 +10,7 @@ import pytest
 
 from generator.command.made_report import next_step, rate_lines
 from generator.errors import PrintError
-from generator.layout.recognition_rate import LOW
+from generator.layout.recognition_rate import LOW, percent
 from generator.pipeline import encode
 from generator.pipeline.faces import face_reports, whole_rate
 from generator.pipeline.place import NO_CELLS, lay_out_object
@@ -84,6 +85,36 @@ def test_what_a_slicer_reckons():
     assert str(PlateCost(157, 22.41)) == "2 h 37 min, 22 g"
     with pytest.raises(PrintError, match="no time"):
         read_cost("; nothing\n")
+
+
+@pytest.mark.parametrize(
+    ("mount", "bought"),
+    [
+        ({"magnets": "6 x 3 mm"}, "4 magnets of 6 x 3 mm"),
+        ({"screws": "M3"}, "4 screws M3"),
+        ({"rod": 3}, "a rod of 3 mm"),
+        ({"flange": "ISO 9409-1-31.5-4-M5"}, "4 screws M5; a pin of 5 mm"),
+    ],
+)
+def test_a_sheet_names_what_to_buy_and_the_encoded_side(tmp_path, mount, bought):
+    shape = {"tag": {"size": [60, 60], "thickness": 12}}
+    specs = read_specs([tree_from({"name": "A", "shape": shape, "mount": mount})])
+    url = f"sqlite:///{tmp_path}/lab.db"
+    made = encode(specs, folder=tmp_path, database=url, formats=("stl",), jobs=1)
+    sheet = html.unescape((tmp_path / "A-build.html").read_text())
+    assert f"g if solid; {bought}<" in sheet
+    promise = percent(made.objects[0].promise.at_once / made.objects[0].promise.encoded)
+    assert f"{promise} of touches on its encoded side are answered at once" in sheet
+
+
+def test_panels_are_advised_only_where_they_can_be_made(tmp_path):
+    for thick, advised in ((6, False), (40, True)):
+        shape = {"box": [60, 60, thick]}
+        print_ = {"parts": "whole"}
+        specs = read_specs([tree_from({"name": "A", "shape": shape, "print": print_})])
+        url = f"sqlite:///{tmp_path}/{thick}.db"
+        (one,) = encode(specs, folder=tmp_path, database=url, formats=(), dry_run=True).objects
+        assert ("parts: panels" in one.lying) == advised
 
 
 @pytest.mark.parametrize(

@@ -81,6 +81,9 @@ def test_the_next_run_makes_only_what_is_missing_or_changed(there):
     assert all(made.reused for made in again.objects)
     assert "C is there, with all its files: skipped" in said
     assert digests(there / "out") == before
+    proven = run(there, jobs=1, formats=("stl", "3mf"), verify=True)
+    assert [made.skipped for made in proven.objects] == [False] * 3
+    assert digests(there / "out") == before
 
 
 def test_a_changed_spec_in_a_set_is_refused_and_the_rest_stays(there):

@@ -273,6 +273,20 @@ def test_starters_can_be_made_as_they_are_and_show_the_values_that_hold_without_
     assert set(ObjectSettings.model_fields) - {"encoding"} <= set(re.findall(r"([a-z_]+):", text))
 
 
+@pytest.mark.parametrize("name", ["part 2", "No", "12", "a, {b}: #c", "it's"])
+def test_a_model_gets_a_spec_that_names_it_from_where_the_spec_is(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    model, own = Path(f"{name}.stl"), Path("specs/own.yaml")
+    model.write_bytes((FIXTURES / "shapes/l_bracket.stl").read_bytes())
+    own.parent.mkdir()
+    kind, text = starter_named(str(model), own)
+    own.write_text(text)
+    assert kind == "file"
+    wanted = read_tree(own, SPEC).value
+    assert wanted["shape"] == {"file": f"../{model}"}
+    assert wanted["name"] == name
+
+
 def test_words_of_people():
     assert starter_named("Parallelepiped")[0] == "box"
     assert starter_named("triangular-prism")[0] == "triangular_prism"

@@ -87,6 +87,12 @@ def test_what_is_no_packet_says_why(block, damage):
     assert decode(block) is damage
 
 
+@pytest.mark.parametrize("filling", [b" ", b"\0"])
+def test_a_short_name_may_be_filled_up_as_c_does(filling):
+    block = wire(HEADER + IDENT[:-8] + b"mine".ljust(8, filling))
+    assert decode(block).name == "mine"
+
+
 @pytest.mark.parametrize(
     ("call", "error", "says"),
     [
