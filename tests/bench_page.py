@@ -5,14 +5,13 @@ is waited for is asked again and again.
 """
 
 import re
-import subprocess
-import sys
 import time
 import zipfile
 from contextlib import contextmanager
 from weakref import WeakKeyDictionary
 
 from playwright.sync_api import Page, expect
+from programs import PATIENCE_S, started
 
 CHROMIUM = "/usr/bin/chromium"
 FLAGS = (
@@ -20,7 +19,6 @@ FLAGS = (
     "--no-first-run", "--disable-background-networking", "--disable-component-update",
     "--disable-sync",
 )  # fmt: skip
-PATIENCE_S = 60.0  #: for anything, on a busy machine
 PATIENCE_MS = 1e3 * PATIENCE_S
 RESTED: WeakKeyDictionary[Page, int] = WeakKeyDictionary()  #: the touch that a page rested from
 SETTLED = """() => new Promise((done) => {
@@ -46,14 +44,9 @@ expect.set_options(timeout=PATIENCE_MS)
 @contextmanager
 def running(*options, folder=None, errors=None):
     """Run `open-bench` at any free port of its own; yields its address and its process."""
-    command = [sys.executable, "-m", "recognizer.bench.command", "--web-port", 0, *options]
-    with subprocess.Popen(
-        list(map(str, command)), stdout=subprocess.PIPE, stderr=errors, text=True, cwd=folder
-    ) as process:
-        try:
-            yield process.stdout.readline().split()[-1], process
-        finally:
-            process.kill()
+    words = ("--web-port", 0, *options)
+    with started("recognizer.bench", *words, stderr=errors, cwd=folder) as process:
+        yield process.stdout.readline().split()[-1], process
 
 
 @contextmanager
@@ -110,13 +103,26 @@ def shown(page, name):
     until(page, f"bench.shown === '{name}'")
 
 
-def touched(page, x=0.42, y=0.55):
-    """Click on the part; returns what the page then says."""
+def answered(page, act, *values):
+    """Do what brings an answer; returns what the page then says."""
     before = page.evaluate("bench.answers")
-    box = page.get_by_test_id("part").bounding_box()
-    page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
+    act(*values)
     until(page, f"bench.answers > {before}")
     return page.get_by_test_id("answer").inner_text()
+
+
+def touched(page, x=0.42, y=0.55):
+    """Click on the part; returns what the page then says."""
+    box = page.get_by_test_id("part").bounding_box()
+    at = box["x"] + x * box["width"], box["y"] + y * box["height"]
+    return answered(page, page.mouse.click, *at)
+
+
+def downloaded(button, patience_ms=PATIENCE_MS):
+    """Click; return the file that comes."""
+    with button.page.expect_download(timeout=patience_ms) as download:
+        button.click()
+    return download.value
 
 
 def opened_to_make(browser, address):
@@ -148,8 +154,6 @@ def making(page, settings, state="sound"):
 
 def made(page):
     """Let it be made; return the name of the zip, and its files by their names."""
-    with page.expect_download(timeout=5 * PATIENCE_MS) as download:
-        page.get_by_test_id("make-go").click()
-    with zipfile.ZipFile(download.value.path()) as archive:
-        files = {name: archive.read(name) for name in archive.namelist()}
-    return download.value.suggested_filename, files
+    packed = downloaded(page.get_by_test_id("make-go"), 5 * PATIENCE_MS)
+    with zipfile.ZipFile(packed.path()) as archive:
+        return packed.suggested_filename, {name: archive.read(name) for name in archive.namelist()}

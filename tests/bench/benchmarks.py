@@ -53,34 +53,33 @@ SET = """objects:
   - {name: Tetra, shape: {tetrahedron: 80 mm}, copies: 10}
 """
 TOUCHES = 8  #: read of each sort
-PRODUCT = """
-import time
+CLOCK = """
+import json, statistics, sys, time
 import numpy as np
-a, b = np.random.default_rng(0).normal(size=(2, 1000, 1000))
 times = []
-for _ in range(5):
+def clock(work, *values, parts=1):
     start = time.process_time()
-    a @ b
-    times.append(time.process_time() - start)
+    work(*values)
+    times.append((time.process_time() - start) / parts)
+"""
+PRODUCT = f"""{CLOCK}
+a, b = np.random.default_rng(0).normal(size=(2, 1000, 1000))
+for _ in range(5):
+    clock(np.matmul, a, b)
 print(min(times))
 """
-READING = """
-import json, statistics, sys, time
+READING = f"""{CLOCK}
 import h5py
 from encoded_objects import Reader, open_lab
 reader = Reader(open_lab(sys.argv[1]))
-times, touches = [], h5py.File(sys.argv[2])["frames"][:]
+touches = h5py.File(sys.argv[2])["frames"][:]
 for counts in touches:
     reader.read(counts)
 for counts in touches:  # others in between: what one was searched with is kept for the next try
-    start = time.process_time()
-    reader.read(counts)
-    times.append(time.process_time() - start)
+    clock(reader.read, counts)
 print(json.dumps(statistics.median(times)))
 """
-DECODING = """
-import json, sys, time
-import numpy as np
+DECODING = f"""{CLOCK}
 from decoder import Likelihood
 from generator.array import profile
 array = profile("one-touch").array()
@@ -89,28 +88,29 @@ rows, columns = rng.integers(0, 63, 2000), rng.integers(0, 65, 2000)
 r, c = np.indices((6, 6))
 windows = array.symbols((rows[:, None, None] + r) % 63, (columns[:, None, None] + c) % 65)
 decoder = Likelihood(array)
-times = []
 for _ in range(3):
-    start = time.process_time()
-    decoder.decode(windows)
-    times.append((time.process_time() - start) / len(windows))
+    clock(decoder.decode, windows, parts=len(windows))
 print(json.dumps(min(times)))
 """
-EXACT = """
-import json, statistics, time
-import numpy as np
+EXACT = f"""{CLOCK}
 from decoder import decode_exact
 from generator.array import array_from
-array = array_from({"family": "prba", "order": 2, "degree": 64})
+array = array_from(dict(family="prba", order=2, degree=64))
 places = np.random.default_rng(1).integers(0, 2**31, (2, 50, 1, 1)).astype(np.uint64)
 a, b = np.indices(array.window).astype(np.uint64)
-windows = array.symbols(places[0] + a, places[1] + b)
-times = []
-for window in windows:
-    start = time.process_time()
-    decode_exact(array, window[None], "logarithm")
-    times.append(time.process_time() - start)
+for window in array.symbols(places[0] + a, places[1] + b):
+    clock(decode_exact, array, window[None], "logarithm")
 print(json.dumps(statistics.median(times)))
+"""
+HEAD = """# Benchmarks
+
+Processor time of one thread with start-up and all files, in products of two 1000 x 1000
+matrices of numpy in the same minute; in brackets seconds on the machine of the record,
+and the peak of memory. *Target*: seconds on a quiet core. Made by
+`python tests/bench/benchmarks.py`, whose head says how; the records are
+[benchmarks.json](benchmarks.json).
+
+![Figures of the last two records](benchmarks.png)
 """
 
 
@@ -203,24 +203,20 @@ def measure(tree: Tree, found: dict[str, Figure], keep: Callable[[], None], *, l
         note("encode-object, set of 40", [_encode(tree, SET, "forty", "-j", "1")])
     lab = tree.folder / "384-0" / "lab.db"
     face = tree.folder / "384-0" / "out" / "Cube-F1.stl"
-    for name, target, place in (
-        ("mid-face", face, ("--x", 0, "--y", 0)),
-        ("at a corner", face, ("--x", 21, "--y", 21)),
-        ("a washer refused", "washer", ()),
-    ):
+    corner = ("at a corner", face, ("--x", 21, "--y", 21))
+    middle, washer = ("mid-face", face, ("--x", 0, "--y", 0)), ("a washer refused", "washer", ())
+    for name, target, place in (middle, corner, washer):
         touches = tree.folder / f"{name}.h5"
         made = tree.command("probe-sensor", "simulate", target, *place, "--touches", TOUCHES,
                             "--seed", 3, "-o", touches)  # fmt: skip
         if name == "mid-face":
             note(f"probe-sensor simulate, {TOUCHES} touches", [made])
             one = tree.folder / "one.h5"
-            note("probe-sensor simulate, one touch",
-                 [tree.command("probe-sensor", "simulate", target, *place, "-o", one, "--replace")
-                  for _ in range(3)])  # fmt: skip
-            note(
-                "recognize-object, one touch",
-                [tree.command("recognize-object", one, "--database", lab) for _ in range(6)][1:],
-            )
+            words = ("simulate", target, *place, "-o", one, "--replace")
+            again = [tree.command("probe-sensor", *words) for _ in range(3)]
+            note("probe-sensor simulate, one touch", again)
+            read = [tree.command("recognize-object", one, "--database", lab) for _ in range(6)]
+            note("recognize-object, one touch", read[1:])
         try:
             note(f"Reader.read, {name}", [_inside(tree, READING, lab, touches)])
         except RuntimeError as error:  # a release of another signature
@@ -261,20 +257,8 @@ def page(records: dict[str, dict]) -> str:
     """Return the page: the last two records side by side."""
     labels = list(records)[-2:]
     newest = records[labels[-1]]
-    lines = [
-        "# Benchmarks",
-        "",
-        "Processor time of one thread with start-up and all files, in products of two 1000 x 1000",
-        "matrices of numpy in the same minute; in brackets seconds on the machine of the record,",
-        "and the peak of memory. *Target*: seconds on a quiet core. Made by",
-        "`python tests/bench/benchmarks.py`, whose head says how; the records are",
-        "[benchmarks.json](benchmarks.json).",
-        "",
-        "![Figures of the last two records](benchmarks.png)",
-        "",
-        "| | " + " | ".join(labels) + " | quotient | target |",
-        "| --- |" + " ---: |" * (len(labels) + 2),
-    ]
+    lines = [HEAD, "| | " + " | ".join(labels) + " | quotient | target |"]
+    lines.append("| --- |" + " ---: |" * (len(labels) + 2))
     for name, figure in newest["figures"].items():
         cells = [_cell(records[label]["figures"].get(name)) for label in labels]
         before = records[labels[0]]["figures"].get(name) if len(labels) > 1 else None
@@ -289,14 +273,13 @@ def page(records: dict[str, dict]) -> str:
 
 def _peer_lines(newest: dict) -> list[str]:
     """Return the table of embossing beside peers."""
-    lines = [
-        "",
-        f"Embossing a cube of {newest['peer_symbols']} symbols, STEP and STL (manifold3d: STL",
-        "alone), imports left out:",
-        "",
-        "| way | products, seconds, memory | times this project |",
-        "| --- | ---: | ---: |",
-    ]
+    told = f"""
+Embossing a cube of {newest["peer_symbols"]} symbols, STEP and STL (manifold3d: STL
+alone), imports left out:
+
+| way | products, seconds, memory | times this project |
+| --- | ---: | ---: |"""
+    lines = [told]
     ours = newest["peers"][OURS]["ratio"]
     for name, figure in newest["peers"].items():
         lines.append(f"| {name} | {_cell(figure)} | {figure['ratio'] / ours:.1f} |")

@@ -71,13 +71,10 @@ def scene(symbols: int, draft_rad: float) -> Scene:
     array = PROFILES["large"].array()
     r, c = (index.ravel() for index in np.indices((k, k)))
     centres = np.stack([(c + 0.75) * PITCH_MM, (k - r - 0.25) * PITCH_MM], axis=1)
-    faces = [
-        FaceLayout(
-            face, Placement(0, face * k, 0.0, 0.0, 0.0), r, c + face * k,
-            array.symbols(r, c + face * k), centres, 0,
-        )
-        for face in range(6)
-    ]  # fmt: skip
+    faces = []
+    for face in range(6):
+        columns, place = c + face * k, Placement(0, face * k, 0.0, 0.0, 0.0)
+        faces.append(FaceLayout(face, place, r, columns, array.symbols(r, columns), centres, 0))
     side = (k + 0.5) * PITCH_MM
     tiers = outlines(alphabet_named("dense-4"), SymbolStyle(PITCH_MM, draft_rad=draft_rad))
     return Scene(side, cube(side), Layout("faces", PITCH_MM, tuple(faces)), tiers)
@@ -144,13 +141,10 @@ def manifold_union(made: Scene, folder: Path) -> Made:
     import numpy as np
 
     corner = made.polyhedron.vertices.min(axis=0).tolist()
-    prisms = [
-        m3.Manifold.extrude(
-            m3.CrossSection([ring.tolist() for ring in tiers.rings[0]], m3.FillRule.EvenOdd),
-            tiers.z_mm[-1],
-        )
-        for tiers in made.tiers
-    ]
+    prisms = []
+    for tiers in made.tiers:
+        outline = m3.CrossSection([ring.tolist() for ring in tiers.rings[0]], m3.FillRule.EvenOdd)
+        prisms.append(m3.Manifold.extrude(outline, tiers.z_mm[-1]))
     solids = [m3.Manifold.cube(3 * [made.side_mm]).translate(corner)]
     for T, x, y, label in made.symbols:
         place = np.column_stack([T[:3, :3], (T @ [x, y, 0.0, 1.0])[:3]])

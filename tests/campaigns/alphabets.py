@@ -196,11 +196,10 @@ def lines(numbers):
         line = [(odd or sorted(ends))[0]]
         while nexts := [one for one in left if line[-1] in one]:
             ways = {one[one[0] == line[-1]]: one for one in nexts}
-            ahead = (
-                tuple(2 * now - before for now, before in zip(line[-1], line[-2], strict=True))
-                if line[1:]
-                else None
-            )
+            ahead = None
+            if line[1:]:
+                (x, y), (before_x, before_y) = line[-1], line[-2]
+                ahead = 2 * x - before_x, 2 * y - before_y
             node = ahead if ahead in ways else min(ways)
             left.remove(ways[node])
             line.append(node)
@@ -267,10 +266,10 @@ def main() -> None:
     heads = ("pitch", "reach", "stroke", *(f"{size} letters" for size in asked.letters))
     runner.table((*heads, *(f"{printer} makes" for printer in PRINTED)))
     for pitch, reach, stroke in product(asked.pitch, asked.reach, asked.stroke):
-        letters, shapes = zip(*(
-            one for one in every
-            if not asked.printer or prints([one[0]], pitch, reach, stroke, asked.printer)
-        ), strict=True)  # fmt: skip
+        kept = every
+        if asked.printer:
+            kept = [one for one in every if prints([one[0]], pitch, reach, stroke, asked.printer)]
+        letters, shapes = zip(*kept, strict=True)
         apart, ink = distances(letters, sensor, pitch, reach, stroke)
         apart[[[one == other for other in shapes] for one in shapes]] = 0.0
         found = [best_set(apart, ink, size) for size in asked.letters]

@@ -100,12 +100,10 @@ def main() -> None:
         compare_types(folder, save=asked.save)
         return
     folder.mkdir(parents=True, exist_ok=True)
-    rows = [
-        row
-        for lab, specs in labs(folder).items()
-        if asked.only in lab
-        for row in touch_lab(folder, lab, specs, asked.rounds, asked.seed)
-    ]
+    rows: list[runner.Row] = []
+    for lab, specs in labs(folder).items():
+        if asked.only in lab:
+            rows += touch_lab(folder, lab, specs, asked.rounds, asked.seed)
     compare(folder, rows)
     if asked.save:
         flat = [row for row in rows if row["lab"] == FLAT]
@@ -153,13 +151,13 @@ def drawn(folder: Path) -> dict[str, Spec]:
     corner = (b.Align.MIN,) * 3
     bore = b.Pos(0, 0, 10) * b.Cylinder(31, 80, align=low)
     handle = b.Pos(48, 0, 45) * (b.Box(40, 14, 60) - b.Pos(-2, 0, 0) * b.Box(26, 14, 40))
+    hollow = b.Pos(0, 0, 12) * b.Box(90, 70, 40, align=low)
     models = {
         "bracket/angle.step": b.Box(80, 60, 12, align=corner) + b.Box(12, 60, 70, align=corner),
         "bracket/tee.stl": b.Box(90, 50, 14, align=low) + b.Box(14, 50, 60, align=low),
         "mug/plain.stl": b.Cylinder(40, 85, align=low) - bore,
         "mug/handle.step": b.Cylinder(40, 85, align=low) + handle - bore,
-        "imported/tray.stl": b.Box(110, 90, 40, align=low)
-        - b.Pos(0, 0, 12) * b.Box(90, 70, 40, align=low),
+        "imported/tray.stl": b.Box(110, 90, 40, align=low) - hollow,
         "imported/flange.step": b.Box(100, 100, 10, align=low) + b.Cylinder(25, 50, align=low),
         "imported/shaft.step": b.Cylinder(35, 30, align=low) + b.Cylinder(22, 80, align=low),
         "imported/hexagon.stl": b.extrude(b.RegularPolygon(45, 6), 35),
@@ -168,8 +166,7 @@ def drawn(folder: Path) -> dict[str, Spec]:
     for name, solid in models.items():
         file = (folder / name.replace("/", " ")).absolute()
         if not file.exists():
-            write = b.export_step if file.suffix == ".step" else b.export_stl
-            write(solid, str(file))
+            (b.export_step if file.suffix == ".step" else b.export_stl)(solid, str(file))
         shapes[name] = {"file": str(file)}
     return shapes
 
@@ -242,10 +239,8 @@ def compare(folder: Path, rows: Iterable[runner.Row]) -> None:
         face = next(one for one in said[part]["faces"] if one["name"] == name)
         promise = face["promise"]
         again = [row for row in touches if row["most"] > 1]
-        values = (
-            promise["at_once"], _share(touches, "first"),
-            promise["within_three"], _share(again, "last"),
-        )  # fmt: skip
+        answered, later = _share(touches, "first"), _share(again, "last")
+        values = promise["at_once"], answered, promise["within_three"], later
         shown = [f"{100 * value:.0f} %" for value in values]
         why = f"{', '.join(promise['meets'])} {promise['blocked']:.0%}" if promise["meets"] else ""
         lost = sum(row["no_rest"] for row in touches)

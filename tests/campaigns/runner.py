@@ -26,6 +26,7 @@ from typing import Any, TypeVar
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import postgres
+from programs import command
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -124,11 +125,6 @@ def row(*cells: object) -> None:
     """Print a line of a Markdown table; numbers that are not whole to three digits."""
     shown = (f"{cell:.3g}" if isinstance(cell, float) else str(cell) for cell in cells)
     print(f"| {' | '.join(shown)} |", flush=True)
-
-
-def command(package: str, *words: object) -> list[str]:
-    """Return the words that run a command of a package: `recognizer.validation`, `generator`."""
-    return [sys.executable, "-c", f"from {package}.command import main; main()", *map(str, words)]
 
 
 def run(package: str, *words: object) -> None:

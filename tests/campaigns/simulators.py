@@ -49,13 +49,10 @@ def points(path: Path) -> Array:
 def rotation(quaternion: Array) -> Array:
     """Return (3, 3) of (w, x, y, z)."""
     w, x, y, z = quaternion / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    first = [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)]
+    second = [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)]
+    third = [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]
+    return np.array([first, second, third])
 
 
 class Part:
@@ -65,13 +62,10 @@ class Part:
         self.xml = next(folder.glob("*.xml"))
         self.name = self.xml.stem
         root = ElementTree.parse(self.xml)
-        self.faces = {
-            site.attrib["name"]: (
-                np.array(site.attrib["pos"].split(), float),
-                rotation(np.array(site.attrib["quat"].split(), float)),
-            )
-            for site in root.iter("site")
-        }
+        self.faces = {}
+        for site in root.iter("site"):
+            at, turn = (np.array(site.attrib[name].split(), float) for name in ("pos", "quat"))
+            self.faces[site.attrib["name"]] = at, rotation(turn)
         files = sorted(folder.glob("*-touch.obj")) or sorted(folder.glob("*-collision-*.obj"))
         self.corners = np.concatenate([points(file) for file in files])
 

@@ -180,11 +180,8 @@ def count_symbols(spec: Path, counts: Counter[str]) -> None:
         for at, label in zip(face.centres_mm, face.labels.tolist(), strict=True):
             place = at + own[0].T_part_facet[:2, 3]
             reach = NEAR * style.pitch_mm
-            near = [
-                k
-                for k, (_, centre, _) in enumerate(outlines)
-                if k not in used and np.hypot(*(centre - place)) < reach
-            ]
+            free = [k for k in range(len(outlines)) if k not in used]
+            near = [k for k in free if np.hypot(*(outlines[k][1] - place)) < reach]
             if len(near) != 1:
                 counts["missing"] += 1
                 continue

@@ -16,10 +16,8 @@ def labs():
 
     folder = kept()[0] / "lab"
     folder.mkdir(exist_ok=True)
-    for spec in (
-        "name: Cube\nshape: {cube: 60 mm}\n",
-        "name: Box\nshape: {box: 40 x 30 x 20 mm}\n",
-    ):
+    for name, shape in (("Cube", "cube: 60 mm"), ("Box", "box: 40 x 30 x 20 mm")):
+        spec = f"name: {name}\nshape: {{{shape}}}\n"
         encode(spec, database=str(folder / "lab.db"), folder=folder, formats=("stl",))
     made = {"lab": (folder / "lab.db").read_bytes()}
     for version in ("v1", "v2"):

@@ -73,10 +73,8 @@ def read_packets(given, _out):
     receiver, now = Receiver(), 0
     for piece in given[0]:
         now += 10**7
-        for frame in (
-            *receiver.feed(piece, now),
-            *(receiver.settle(now) if len(piece) == 7 else ()),
-        ):
+        last = receiver.settle if len(piece) == 7 else lambda _: ()
+        for frame in (*receiver.feed(piece, now), *last(now)):
             if frame.counts.shape == (16, 16) and frame.counts.max() > 0:
                 true = kept()[1][frame.seq % 65536 % GOOD]
                 if not (frame.counts == true.counts).all() and frame.counts.max() < 1023:

@@ -64,16 +64,10 @@ def read_state(path, _out):
 YAML_SPLICES = ("{", "}", "[", "]", ":", "- ", "\t", "\n", "'", '"', "#", "&a ", "*a", "!!int ",
                 "|", "? ", "---\n", "...\n", "%YAML 1.2\n", "\x00", "\x85", "<<: ", "\u2028", "\r",
                 "objects:", "{{{{{{", "file: c.yaml")  # fmt: skip
-MINE = """like: prusa-mini
-name: mine
-nozzle: 0.6 mm
-bed: 180 x 180 mm
-stroke: 1 mm
-gap: 1 mm
-height: 0.6 mm
-edge: 1 mm
-overhang: 45 deg
-"""
+MINE = (
+    "like: prusa-mini\nname: mine\nnozzle: 0.6 mm\nbed: 180 x 180 mm\nstroke: 1 mm\ngap: 1 mm\n"
+    "height: 0.6 mm\nedge: 1 mm\noverhang: 45 deg\n"
+)
 
 
 @cache

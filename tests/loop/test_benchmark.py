@@ -1,4 +1,4 @@
-"""The benchmark in small: touches as frozen, three forms, and a reader of one's own."""
+"""Small campaigns: the benchmark, as frozen, in three forms; faulty sensors, objects to mistake."""
 
 import json
 import re
@@ -24,11 +24,23 @@ from recognizer.validation.benchmark import (
     run_benchmark,
 )
 from recognizer.validation.benchmark_readers import ReaderWorld, network
+from recognizer.validation.campaign import Campaign, series_of
 from recognizer.validation.command import run
+from recognizer.validation.encoded_set import is_extra
+from recognizer.validation.files import columns_of, read_series
+from recognizer.validation.pipeline import validate
 from recognizer.validation.run import TouchProgress
 
 PAGE = Path(__file__).parents[2] / "docs" / "benchmark.md"
 WORLD = "fsr-8x8"
+HERE = SimpleNamespace(  # in this process, where others are started for each object
+    run=lambda command, **_: SimpleNamespace(returncode=encode_object(command[3:]))
+)
+KINDS = ("copy", "near", "small", "side", "same_profile", "decoy")
+SET = """objects:
+  - {name: Block, shape: {box: [60 mm, 50 mm, 40 mm]}, profile: one-touch}
+  - {name: Prism, shape: {triangular_prism: {side: 50 mm, height: 40 mm}}, profile: one-touch}
+"""
 
 
 @pytest.fixture(scope="module")
@@ -36,11 +48,8 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("benchmark")
     (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
     (folder / "my_reader.py").write_text(code)
-    here = SimpleNamespace(
-        run=lambda command, **_: SimpleNamespace(returncode=encode_object(command[3:]))
-    )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(encoded_set, "subprocess", here)
+        patch.setattr(encoded_set, "subprocess", HERE)
         patch.setattr(sys, "path", [one for one in sys.path if one])  # as of an installed command
         patch.chdir(folder)
         found = run_benchmark(folder, touches=8, worlds=[WORLD], seed=5,
@@ -138,3 +147,31 @@ def test_answers_of_a_reader_are_tuples_whose_covariance_is_one(made):
             read(name, 1.0, 2.0, 0.0, 1.0, spread)
     with pytest.raises(EncodedObjectsError, match="names 'Ball'"):
         read("Ball", 1.0, 2.0, 0.0)
+
+
+def test_a_campaign_over_worlds(tmp_path, monkeypatch):
+    few = {"COPIES": 2, "SMALL_PITCHES": (3.3,), "LAB_OBJECTS": 1, "OTHER_LABS": 1}
+    for name, count in few.items():  # each object takes time to make, as does each process
+        monkeypatch.setattr(encoded_set, name, count)
+    monkeypatch.setattr(encoded_set, "subprocess", HERE)
+    (tmp_path / "set.yaml").write_text(SET)
+    folder = tmp_path / "run"
+    result = validate(
+        tmp_path / "set.yaml", folder=folder, touches=22, seed=3, kinds=",".join(KINDS),
+        levels="typical,dead-10,slide-2", sensor_per="run", study=0,
+    )  # fmt: skip
+    assert result.touches == 22
+    rows = columns_of(read_series(folder, series_of(Campaign(22))[0]))
+    assert set(rows["kind"]) <= set(KINDS)
+    for kind, name in zip(rows["kind"], rows["object"], strict=True):
+        if kind == "same_profile":
+            assert name == ""  # nobody's, to this lab: every answer is wrong
+        elif kind == "decoy":
+            assert name in ("", "Block", "Prism")  # exchanged symbols are nobody's
+        elif kind == "side":
+            assert name in ("Block", "Prism")
+        else:
+            assert is_extra(name, kind)
+    kept = rows["kind"] != "same_profile"
+    assert not (rows["verdict"][kept] == "wrong").any()
+    assert (rows["verdict"][kept] == "right").any()

@@ -31,15 +31,10 @@ STORED = Path(__file__).with_name("mujoco_touches.npz")
 
 def box(folder):
     """Return a reader of one registered box, whose parts are written."""
-    encode(
-        {
-            "name": "Box",
-            "shape": {"box": ["70 mm", "55 mm", "45 mm"]},
-            "symbols": {"alphabet": "dense-4"},  # as the touches of MuJoCo are stored
-            "output": {"lab_key": "FMJ7-TFFE-Q560-Y90B"},
-        },
-        database=f"sqlite:///{folder}/lab.db", folder=folder, formats=("stl",),
-    )  # fmt: skip
+    spec = {"name": "Box", "shape": {"box": ["70 mm", "55 mm", "45 mm"]}}
+    spec |= {"symbols": {"alphabet": "dense-4"}}  # as the touches of MuJoCo are stored
+    spec |= {"output": {"lab_key": "FMJ7-TFFE-Q560-Y90B"}}
+    encode(spec, database=f"sqlite:///{folder}/lab.db", folder=folder, formats=("stl",))
     return Reader(open_lab(folder / "lab.db"))
 
 

@@ -4,14 +4,13 @@ import json
 import re
 import signal
 import sqlite3
-import subprocess
-import sys
 import time
 
 import h5py
 import manifold3d
 import numpy as np
 import pytest
+from programs import PATIENCE_S, started
 
 from encoded_objects import Reader, encode, open_lab
 from encoded_objects.base.output import some_of
@@ -19,8 +18,6 @@ from generator.command import run as encode_object
 from probe.command import run as probe_sensor
 from probe.simulate.simulation import SimulatedProbe, TouchOptions
 from recognizer.command import run as recognize_object
-
-PATIENCE_S = 60.0  #: for anything, on a busy machine
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +60,7 @@ def test_a_set_without_formats_writes_nothing(tmp_path):
 def test_who_waits_for_a_locked_database_says_so_and_obeys_ctrl_c(here):
     with sqlite3.connect(here, isolation_level=None) as other:
         other.execute("BEGIN EXCLUSIVE")
-        command = [sys.executable, "-m", "generator.command", "list", "--database", here]
-        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        with started("generator", "list", "--database", here) as process:
             said = process.stderr.readline()
             began = time.monotonic()
             process.send_signal(signal.SIGINT)

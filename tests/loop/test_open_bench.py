@@ -1,13 +1,12 @@
 """`open-bench` as an operator meets it: a server, a probe on a serial line, a real browser."""
 
 import re
-import time
 
 import httpx
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from bench_page import PATIENCE_MS, WATCH, opened, rest, settle, shown, touched, until
+from bench_page import WATCH, answered, downloaded, opened, rest, settle, shown, touched, until
 from playwright.sync_api import expect
 
 from probe.recording.read import Recording
@@ -82,12 +81,8 @@ def test_touches_are_kept_to_go_back_to(page):
     expect(buttons.nth(kept - 1)).to_contain_text("the first one")
     buttons.nth(kept).click(modifiers=["Shift"])
     expect(page.get_by_test_id("touch-compared")).to_contain_text("Cube")
-    with page.expect_download() as download:
-        page.get_by_test_id("touch-csv").click()
-    assert "the first one" in download.value.path().read_text()
-    with page.expect_download() as download:
-        page.get_by_test_id("touch-h5").click()
-    assert len(Recording(download.value.path())) >= 2
+    assert "the first one" in downloaded(page.get_by_test_id("touch-csv")).path().read_text()
+    assert len(Recording(downloaded(page.get_by_test_id("touch-h5")).path())) >= 2
     page.get_by_test_id("touch-list").press("Escape")
     buttons.nth(kept - 1).click()
     page.get_by_test_id("touch-delete").click()
@@ -98,14 +93,12 @@ def test_touches_are_kept_to_go_back_to(page):
 def test_keys_turn_the_part_and_touch_it(page):
     part = page.get_by_test_id("part")
     part.focus()
-    before, answers = part.screenshot(), page.evaluate("bench.answers")
+    before = part.screenshot()
     for _ in range(6):
         page.keyboard.press("ArrowRight")
-    page.keyboard.press("Enter")
-    until(page, f"bench.answers > {answers}")
+    said = answered(page, page.keyboard.press, "Enter")
     assert part.screenshot() != before
-    face = page.get_by_test_id("touch-face").input_value()
-    assert page.get_by_test_id("answer").inner_text().startswith(f"Cube {face}")
+    assert said.startswith(f"Cube {page.get_by_test_id('touch-face').input_value()}")
 
 
 def test_filters_and_overlays(page):
@@ -124,16 +117,15 @@ def test_filters_and_overlays(page):
 def test_unplug_and_replug_are_said_plainly(page):
     page.get_by_test_id("unplug").click()
     state = page.get_by_test_id("state")
-    expect(state).to_contain_text("probe is gone", timeout=PATIENCE_MS)
-    expect(state).to_contain_text("probe is there", timeout=PATIENCE_MS)
+    expect(state).to_contain_text("probe is gone")
+    expect(state).to_contain_text("probe is there")
     frames = page.evaluate("bench.frames")
     until(page, f"bench.frames > {frames + 10}")
     page.get_by_test_id("filter").select_option("raw")  # the image of a touch is held until then
     paints = page.evaluate("bench.paints")
     until(page, f"bench.paints > {paints + 3}")
-    before, deadline = heat(page), time.monotonic() + PATIENCE_MS / 1000
-    while heat(page) == before:  # noise alone moves it
-        assert time.monotonic() < deadline
+    before = heat(page)
+    until(page, f"document.getElementById('heat').toDataURL() !== '{before}'")  # by noise alone
     page.get_by_test_id("filter").select_option("bias-free")
     assert 20 < float(page.get_by_test_id("rate").inner_text().split()[0]) < 300
     assert touched(page).startswith("Cube")
@@ -151,12 +143,9 @@ def test_record_and_replay(page, lab):
     name = page.get_by_test_id("recordings").input_value()
     frames = len(Recording(lab / "recordings" / name))
     assert frames > 50
-    answers = page.evaluate("bench.answers")
-    page.get_by_test_id("replay").click()
+    assert answered(page, page.get_by_test_id("replay").click).startswith(said)
     expect(page.get_by_test_id("state")).to_contain_text("replaying")
-    until(page, f"bench.answers > {answers}")
-    assert page.get_by_test_id("answer").inner_text().startswith(said)
-    expect(page.get_by_test_id("play")).to_have_text("Play", timeout=PATIENCE_MS)
+    expect(page.get_by_test_id("play")).to_have_text("Play")
     until(page, "bench.contact === false")
     strength = httpx.get(f"{page.url}api/timeline").json()["strength"]
     held = np.flatnonzero(np.array(strength) > 0.8)
@@ -167,40 +156,31 @@ def test_record_and_replay(page, lab):
     words = "document.querySelector('[data-testid=place]').innerText.split(' ').map(parseFloat)"
     until(page, f"(w => Math.abs(w[0] - {place / 1000} * w[2]) < 0.2)({words})")
     page.get_by_test_id("leave").click()
-    expect(page.get_by_test_id("state")).to_contain_text("probe is there", timeout=PATIENCE_MS)
+    expect(page.get_by_test_id("state")).to_contain_text("probe is there")
 
 
 def test_files_and_pictures_can_be_had(page, lab):
     page.get_by_text("Files of this object").click()
-    with page.expect_download() as download:
-        page.get_by_test_id("files").get_by_role("link").first.click()
-    name = download.value.suggested_filename
-    assert download.value.path().read_bytes() == (lab / "out" / name).read_bytes()
-    with page.expect_download() as download:
-        page.get_by_test_id("save-picture").click()
-    assert download.value.path().read_bytes().startswith(b"\x89PNG")
-    with page.expect_download() as download:
-        page.get_by_test_id("save-frame").click()
-    assert np.loadtxt(download.value.path(), delimiter=",").shape == (16, 16)
+    file = downloaded(page.get_by_test_id("files").get_by_role("link").first)
+    assert file.path().read_bytes() == (lab / "out" / file.suggested_filename).read_bytes()
+    picture = downloaded(page.get_by_test_id("save-picture")).path()
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    frame = downloaded(page.get_by_test_id("save-frame")).path()
+    assert np.loadtxt(frame, delimiter=",").shape == (16, 16)
 
 
 def test_where_to_touch_next_is_said_and_done(page):
     page.get_by_test_id("touch-face").select_option("F1")
-    answers = page.evaluate("bench.answers")
     for axis in "xy":
         page.locator(f"#touch-{axis}").fill("-4")
-    page.get_by_test_id("touch-go").click()
-    until(page, f"bench.answers > {answers}")
-    assert page.get_by_test_id("answer").inner_text().startswith("Not recognised:")
+    assert answered(page, page.get_by_test_id("touch-go").click).startswith("Not recognised:")
     assert page.get_by_test_id("part").get_attribute("data-lit") == ""
     expect(page.get_by_test_id("next")).to_contain_text(re.compile("Next: .* mm (right|left)"))
     rest(page)
     for _ in range(2):
         if page.evaluate("bench.state") == "answered":
             break
-        answers = page.evaluate("bench.answers")
-        page.get_by_test_id("next-go").click()
-        until(page, f"bench.answers > {answers}")
+        answered(page, page.get_by_test_id("next-go").click)
         rest(page)
     assert page.get_by_test_id("answer").inner_text().startswith("Cube F1")
 
@@ -218,9 +198,7 @@ def test_two_browsers_see_the_same_and_both_can_work(browser, page, bench):
         assert page.evaluate("bench.shown") == "Cube"  # each looks at what it wants
         other.get_by_test_id("record").click()
         for one in (page, other):
-            expect(one.get_by_test_id("record")).to_have_attribute(
-                "aria-pressed", "true", timeout=PATIENCE_MS
-            )
+            expect(one.get_by_test_id("record")).to_have_attribute("aria-pressed", "true")
         page.get_by_test_id("record").click()
         expect(other.get_by_test_id("record")).to_have_attribute("aria-pressed", "false")
         buttons = [one.get_by_test_id("touch-list").locator("button") for one in (page, other)]
@@ -281,10 +259,9 @@ def test_a_phone_touches_by_a_tap(browser, bench):
         shown(page, "Cube")
         part = page.get_by_test_id("part")
         part.scroll_into_view_if_needed()
-        box, answers = part.bounding_box(), page.evaluate("bench.answers")
-        page.touchscreen.tap(box["x"] + 0.46 * box["width"], box["y"] + 0.55 * box["height"])
-        until(page, f"bench.answers > {answers}")
-        assert page.get_by_test_id("answer").inner_text().startswith("Cube")
+        box = part.bounding_box()
+        at = box["x"] + 0.46 * box["width"], box["y"] + 0.55 * box["height"]
+        assert answered(page, page.touchscreen.tap, *at).startswith("Cube")
         assert violations(page) == []
         until(page, "document.documentElement.scrollWidth <= 390")
         assert page.evaluate(SMALL) == []

@@ -7,7 +7,7 @@ import re
 import httpx
 import numpy as np
 import pytest
-from bench_page import PATIENCE_MS, opened, rest, shown, touched, until, until_redrawn
+from bench_page import PATIENCE_MS, answered, opened, rest, shown, touched, until, until_redrawn
 from PIL import Image
 from playwright.sync_api import expect
 
@@ -82,8 +82,7 @@ def test_what_is_promised_colours_the_faces_and_is_said(page, bench):
     page.get_by_test_id("tint").select_option("promise")
     faces = page.get_by_test_id("face-list")
     expect(faces).to_contain_text(
-        re.compile(r"F1: \d+ % of touches answered at once, \d+ % within three"),
-        timeout=PATIENCE_MS,
+        re.compile(r"F1: \d+ % of touches answered at once, \d+ % within three")
     )
     told = httpx.get(f"{bench}api/promise/Cube").json()["faces"]
     assert len(told) == 6
@@ -94,7 +93,7 @@ def test_what_is_promised_colours_the_faces_and_is_said(page, bench):
     assert np.mean(green - blue > 80) > 0.05  # 92 % are nearly yellow
     shown(page, "Cylinder")
     round_face = re.compile(r"F2: \d+ % of touches answered at once")
-    expect(faces).to_contain_text(round_face, timeout=PATIENCE_MS)
+    expect(faces).to_contain_text(round_face)
     page.get_by_test_id("tint").select_option("plain")
     assert httpx.get(f"{bench}api/promise/Nobody").status_code == 400
 
@@ -104,10 +103,7 @@ def at(page, x, y, theta=15, face="F1"):
     page.get_by_test_id("touch-face").select_option(face)
     for name, value in (("x", x), ("y", y), ("theta", theta)):
         page.locator(f"#touch-{name}").fill(str(value))
-    answers = page.evaluate("bench.answers")
-    page.get_by_test_id("touch-go").click()
-    until(page, f"bench.answers > {answers}")
-    said = page.get_by_test_id("answer").inner_text()
+    said = answered(page, page.get_by_test_id("touch-go").click)
     rest(page)
     return said
 
@@ -221,10 +217,7 @@ def test_what_is_left_of_a_load_is_no_touch_and_the_scale_follows(page, lab):
     expect(page.get_by_test_id("calibration-age")).to_contain_text("fresh")
     assert list((lab / "recordings").glob("calibration-*.json"))
     page.wait_for_timeout(400)
-    answers = page.evaluate("bench.answers")
-    page.get_by_test_id("touch-go").click()
-    until(page, f"bench.answers > {answers}")
-    assert page.get_by_test_id("answer").inner_text().startswith("Cube")
+    assert answered(page, page.get_by_test_id("touch-go").click).startswith("Cube")
     expect(page.locator("#scale")).to_contain_text(re.compile(r"0 to \d\.\d+ N"))
     rest(page)
     page.get_by_test_id("calibrations").select_option("")
@@ -248,20 +241,18 @@ def test_a_recording_is_sent_in_with_progress_and_times_are_its_own(page, lab, t
     sent.write_bytes((lab / "recordings" / name).read_bytes())
     page.evaluate(SHARES)
     page.get_by_test_id("upload").set_input_files(sent)
-    expect(page.get_by_test_id("recordings")).to_contain_text(sent.name, timeout=PATIENCE_MS)
+    expect(page.get_by_test_id("recordings")).to_contain_text(sent.name)
     until(page, "window.shares.some((share) => share === 1)")
     expect(page.get_by_test_id("upload-share")).to_be_hidden()
     page.get_by_test_id("upload").set_input_files(sent)
     expect(page.get_by_test_id("error")).to_contain_text("there is a recording")
     page.get_by_test_id("recordings").select_option(sent.name)
-    answers = page.evaluate("bench.answers")
-    page.get_by_test_id("replay").click()
-    until(page, f"bench.answers > {answers}")
+    answered(page, page.get_by_test_id("replay").click)
     told = re.search(rf"{sent.name} at ([\d.]+) s", page.get_by_test_id("answer-of").inner_text())
     frames = list(Recording(lab / "recordings" / name).frames())
     assert 0 < float(told.group(1)) < 1e-9 * (frames[-1].t_ns - frames[0].t_ns)
     page.get_by_test_id("leave").click()
-    expect(page.get_by_test_id("state")).to_contain_text("probe is there", timeout=PATIENCE_MS)
+    expect(page.get_by_test_id("state")).to_contain_text("probe is there")
 
 
 def test_the_tour_comes_once_and_columns_are_as_wide_as_one_wants(browser, bench):

@@ -7,7 +7,7 @@ from urllib.parse import parse_qsl
 import httpx
 import pytest
 from bench_loads import LARGE, family
-from bench_page import PATIENCE_MS, made, making, opened_to_make, running, until
+from bench_page import downloaded, made, making, opened_to_make, running, until
 from playwright.sync_api import expect
 
 from generator.command import run as encode_object
@@ -42,7 +42,7 @@ def ask(address, spec, *, path="make/try", keep=False, timeout=60.0):
 def test_an_empty_lab_offers_an_example(page, own):
     address, _, folder = own
     button = page.get_by_test_id("example")
-    expect(button).to_be_visible(timeout=PATIENCE_MS)
+    expect(button).to_be_visible()
     button.click()
     until(page, "bench.answers > 0")
     assert page.get_by_test_id("answer").inner_text().startswith("Example F1")
@@ -75,10 +75,8 @@ def test_what_is_promised_is_seen_and_a_link_opens_it_again(page, browser):
     colours = faces.locator("i").evaluate_all("all => all.map((one) => one.style.background)")
     assert len(set(colours)) == 2
     spec = page.get_by_test_id("make-spec").text_content()
-    with page.expect_download() as download:
-        page.get_by_test_id("make-save").click()
-    assert download.value.suggested_filename == "Flat.yaml"
-    assert download.value.path().read_text() == spec
+    saved = downloaded(page.get_by_test_id("make-save"))
+    assert (saved.suggested_filename, saved.path().read_text()) == ("Flat.yaml", spec)
     assert dict(parse_qsl(page.url.split("?")[1]))["shape.box"] == "[60 mm, 60 mm, 5 mm]"
     other = opened_to_make(browser, page.url)
     assert other.get_by_test_id("make-spec").text_content() == spec

@@ -37,7 +37,7 @@ def test_what_fails_is_said_and_overcome(browser, lab):
         first.send_signal(signal.SIGCONT)
         until(page, f"document.body.dataset.line === 'there' && bench.frames > {frames + 20}")
         first.send_signal(signal.SIGKILL)
-        expect(state).to_contain_text("open-bench does not answer", timeout=PATIENCE_MS)
+        expect(state).to_contain_text("open-bench does not answer")
         expect(state).to_contain_text("looked for")
         until(page, "document.getElementById('touch').inert")  # nothing to be clicked
         page.get_by_test_id("filter").select_option("median")  # what is on the page goes on
@@ -48,7 +48,7 @@ def test_what_fails_is_said_and_overcome(browser, lab):
     with ExitStack() as kept:
         with page.expect_navigation(timeout=PATIENCE_MS):  # of another server, the page is too
             kept.enter_context(process_of(lab, int(address.split(":")[-1].strip("/"))))
-        expect(state).to_contain_text("probe is there", timeout=PATIENCE_MS)
+        expect(state).to_contain_text("probe is there")
         until(page, "bench.shown !== '' && bench.frames > 0")
         until(page, "bench.touch === 0")  # nothing is left of the other server's touches
         shown(page, "Cube")
@@ -73,7 +73,7 @@ def somebody_locks_the_database(page, error, lab):
     with closing(sqlite3.connect(lab / "lab.db", isolation_level=None)) as other:
         other.execute("BEGIN EXCLUSIVE")
         page.get_by_test_id("object").select_option("Cylinder")
-        expect(error).to_contain_text("keep the database locked", timeout=PATIENCE_MS)
+        expect(error).to_contain_text("keep the database locked")
         expect(error).to_contain_text("Touches are still read")
         assert page.evaluate("bench.shown") == "Cube"
         expect(page.get_by_test_id("object")).to_have_value("Cube")  # what is really shown
@@ -100,11 +100,11 @@ def test_a_token_is_asked_for_and_a_port_that_is_gone_for_good_is_named(served, 
         cookie = page.context.cookies()[0]
         assert (cookie["httpOnly"], cookie["sameSite"]) == (True, "Strict")
         state = page.get_by_test_id("state")
-        expect(state).to_contain_text(re.compile("probe is gone: .*ttyNONE"), timeout=PATIENCE_MS)
+        expect(state).to_contain_text(re.compile("probe is gone: .*ttyNONE"))
         for name in ("record", "bias", "calibrate", "touch-go"):  # cannot work: off
             expect(page.get_by_test_id(name)).to_be_disabled()
         page.get_by_test_id("port").select_option("sim:touch")  # another one still can be chosen
-        expect(state).to_contain_text("probe is there", timeout=PATIENCE_MS)
+        expect(state).to_contain_text("probe is there")
         assert httpx.get(f"{bare}api/touches", headers=bearer).json()["touches"] == []
         shown(page, "Cube")
         assert touched(page).startswith("Cube")

@@ -9,14 +9,13 @@ import select
 import signal
 import struct
 import subprocess
-import sys
 import termios
 import time
-from contextlib import contextmanager
 from functools import partial
 
 import numpy as np
 import pytest
+from programs import command, started, wait_for
 from recorded import record
 from reference.emulated_probe import emulated_probe
 
@@ -26,35 +25,13 @@ from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.recording.read import Recording
 
-COMMAND = (sys.executable, "-c", "from probe.command import main; main()")
 FULL_MV = 5000.0
 SHORT_S = 20.0  #: for anything, on a busy machine
-
-
-@contextmanager
-def started(*words, **named):
-    """Start a command; it is gone when the block ends."""
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | named
-    with subprocess.Popen([*COMMAND, *map(str, words)], **pipes) as process:
-        try:
-            yield process
-        finally:
-            if process.poll() is None:
-                process.kill()
 
 
 @pytest.fixture
 def asked(ask):
     return partial(ask, run)
-
-
-def wait_for(what, timeout_s=SHORT_S):
-    until_s = time.monotonic() + timeout_s
-    while time.monotonic() < until_s:
-        if found := what():
-            return found
-        time.sleep(0.02)
-    raise AssertionError("it did not come")
 
 
 def held_in(path):
@@ -68,7 +45,7 @@ def held_in(path):
 def test_simulate_that_is_interrupted_leaves_its_touches(tmp_path):
     out, truth = tmp_path / "a.h5", tmp_path / "a.json"
     words = ["--touches", "100000", "-o", out, "--truth", truth, "--accuracy", "footprint"]
-    with started("simulate", "washer", *words) as process:
+    with started("probe", "simulate", "washer", *words) as process:
         wait_for(lambda: any(held_in(path) for path in tmp_path.glob(".a.*.part.h5")))
         process.send_signal(signal.SIGINT)
         text, err = process.communicate(timeout=SHORT_S)
@@ -83,7 +60,7 @@ def test_simulate_that_is_interrupted_leaves_its_touches(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_recording_that_is_ended_by_a_signal_is_complete(tmp_path, number):
     out, part = tmp_path / "a.h5", tmp_path / "a.part.h5"
-    with started("record", "sim:?rate=400", "-o", out) as process:
+    with started("probe", "record", "sim:?rate=400", "-o", out) as process:
         wait_for(lambda: held_in(part))
         process.send_signal(number)
         text, err = process.communicate(timeout=SHORT_S)
@@ -104,7 +81,7 @@ class Terminal:
         fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("4H", 24, 90, 0, 0))
         known = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
         self.process = subprocess.Popen(
-            [*COMMAND, *map(str, words)], stdin=slave, stdout=slave, stderr=slave,
+            command("probe", *words), stdin=slave, stdout=slave, stderr=slave,
             env={**known, "TERM": "xterm-256color"}, start_new_session=True,
             preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # Ctrl-C goes to it
         )  # fmt: skip
@@ -176,7 +153,7 @@ def test_live_on_a_terminal_obeys_its_keys(tmp_path):
 def test_the_reader_of_a_replay_may_leave(tmp_path):
     stills = (frame_from(np.full((16, 16), i), t_ns=i * 10**7, seq=i) for i in range(81))
     path = record(tmp_path / "a.h5", stills).files[0]
-    with started("replay", path, "--speed", "1") as process:
+    with started("probe", "replay", path, "--speed", "1") as process:
         assert process.stdout.readline().startswith("seq,t_ns")
         process.stdout.close()
         process.wait(SHORT_S)
@@ -194,7 +171,8 @@ def emulated():
 
 def test_record_shows_what_happens_to_the_probe_and_goes_on(asked, emulated, tmp_path):
     out = tmp_path / "a.h5"
-    with started("record", emulated.url, "-o", out, "--seconds", "3", "--sensor", "2") as process:
+    words = ("record", emulated.url, "-o", out, "--seconds", "3", "--sensor", "2")
+    with started("probe", *words) as process:
         wait_for(lambda: held_in(tmp_path / "a.part.h5"))
         code, text, _ = asked("info", emulated.url, "--json")
         assert code == 3
@@ -222,7 +200,7 @@ def test_a_calibration_is_guided_through_the_firmware(asked, emulated, tmp_path)
 
     words = ["calibrate", "port", emulated.url, "-o", out, "--newtons", "40,130,400",
              "--folder", folder, "--seconds", "0.3", "--board", "simulated"]  # fmt: skip
-    with started(*words, stdin=subprocess.PIPE) as process:
+    with started("probe", *words, stdin=subprocess.PIPE) as process:
         for newtons in (0, 40, 130, 400):
             told = ""
             while not told.endswith("then press Enter: "):

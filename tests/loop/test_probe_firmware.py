@@ -6,6 +6,7 @@ where time does not matter: they take an eighth of the time.
 
 import re
 import subprocess
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -28,10 +29,7 @@ class Line:
         self.splitter = Splitter()
         self.waiting = []
 
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
+    def close(self):
         self.port.close()
 
     def send(self, commands):
@@ -87,7 +85,7 @@ def probe():
 
 @pytest.fixture
 def line(probe):
-    with Line(probe.url) as opened:
+    with closing(Line(probe.url)) as opened:
         opened.send(b"a0")
         opened.quiet()
         yield opened
@@ -161,7 +159,7 @@ def level(ports, pins):
 def test_pins_move_as_documented(board, wiring, tmp_path):
     trace = tmp_path / "trace.txt"
     running = emulated_probe(board=board, wiring=wiring, paced=False, trace=trace)
-    with running as probe, Line(probe.url) as line:
+    with running as probe, closing(Line(probe.url)) as line:
         line.send(b"6")
         line.ask(b"g", FramePacket)
     pins = pins_of(board)
@@ -214,7 +212,8 @@ def test_a_rate_that_is_not_exact_is_refused(tmp_path):
 
 def test_frames_are_of_version_2_and_tell_their_shape():
     mv = np.arange(256.0).reshape(16, 16) * 15
-    with emulated_probe(tau_us=0, paced=False, shape=(8, 12)) as probe, Line(probe.url) as line:
+    running = emulated_probe(tau_us=0, paced=False, shape=(8, 12))
+    with running as probe, closing(Line(probe.url)) as line:
         probe.show(mv)
         line.ask(b"g", FramePacket)
         frame = line.ask(b"g", FramePacket)
@@ -232,7 +231,7 @@ def test_a_matrix_of_resistors_reads_as_its_network(wiring):
                         feedback_ohm=1000.0)  # fmt: skip
     load = board.feedback_ohm if wiring == "virtual" else board.load_ohm
     running = emulated_probe(wiring=wiring, load_ohm=load, tau_us=0, paced=False)
-    with running as probe, Line(probe.url) as line:
+    with running as probe, closing(Line(probe.url)) as line:
         probe.show_conductances(g)
         line.ask(b"g", FramePacket)
         counts = line.ask(b"g", FramePacket).counts.astype(float)

@@ -1,6 +1,5 @@
 """A recording whose writer is killed, whose disk is full, and one that is read meanwhile."""
 
-import signal
 import subprocess
 import sys
 
@@ -39,11 +38,8 @@ except RecordingError as error:
 
 def writer(path, count, *, limit=0, roll_over_s=300.0):
     arguments = [str(path), str(count), str(limit), str(roll_over_s)]
-    return subprocess.Popen(
-        [sys.executable, "-c", WRITER, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
+    pipes = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+    return subprocess.Popen([sys.executable, "-c", WRITER, *arguments], **pipes)
 
 
 def check(frames, least):
@@ -60,15 +56,12 @@ def check(frames, least):
 @pytest.mark.parametrize("moment", [137, 611])
 def test_a_killed_writer_loses_the_frames_since_the_last_flush_at_most(tmp_path, moment):
     path = tmp_path / "touch.h5"
-    process = writer(path, 1_000_000, roll_over_s=1.4)
     handed = 0
-    while handed < moment:
-        handed += len(process.stdout.read(1))
-    process.send_signal(signal.SIGKILL)
-    handed += len(process.stdout.read())
-    process.wait()
-    process.stdout.close()
-    process.stderr.close()
+    with writer(path, 1_000_000, roll_over_s=1.4) as process:
+        while handed < moment:
+            handed += len(process.stdout.read(1))
+        process.kill()
+        handed += len(process.stdout.read())
     with pytest.raises(RecordingError, match="interrupted stands there; run `repair`"):
         Recorder(path, replace=True)
     left = check(Recording(path).frames(), handed - 64)

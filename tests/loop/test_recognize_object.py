@@ -6,9 +6,6 @@ import math
 import queue
 import signal
 import socket
-import subprocess
-import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
@@ -16,6 +13,7 @@ import numpy as np
 import pytest
 import zenoh
 from corpora.commands import DATA
+from programs import started
 from reference.emulated_probe import emulated_port
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
@@ -34,7 +32,6 @@ from recognizer.sensor.file import read_state
 from recognizer.touch.robot import Seating
 
 CUBE = Path(__file__).parents[2] / "fixtures" / "cube.yaml"
-COMMAND = (sys.executable, "-c", "from recognizer.command import main; main()")
 SHORT_S = 30.0  #: for anything, on a busy machine
 
 
@@ -51,18 +48,6 @@ def asked(ask, lab, monkeypatch):
     """Run a command in the lab's folder; its exit code and what it printed."""
     monkeypatch.chdir(lab)
     return lambda *words: ask(*words)[:2]
-
-
-@contextmanager
-def started(lab, *words):
-    """Start `recognize-object` in the lab's folder; it is gone when the block ends."""
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen([*COMMAND, *map(str, words)], cwd=lab, **pipes) as process:
-        try:
-            yield process
-        finally:
-            if process.poll() is None:
-                process.kill()
 
 
 def test_how_the_sensor_is_mounted_is_checked_once_and_known_from_then_on(ask, asked, tmp_path):
@@ -118,7 +103,7 @@ def test_the_thesis_says_which_edges_a_touch_feels(asked):
 
 def test_a_port_is_followed_until_it_is_interrupted(lab):
     port = "sim:lab.db#Cube/F2?period=0.6&seed=5"
-    with started(lab, "--port", port, "--follow", "--json") as process:
+    with started("recognizer", "--port", port, "--follow", "--json", cwd=lab) as process:
         lines = [json.loads(process.stdout.readline()) for _ in range(2)]
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=SHORT_S)
@@ -192,7 +177,7 @@ def test_what_is_followed_is_published(lab):
     config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
     config.insert_json5("scouting/multicast/enabled", "false")
     came = {"bench/image": queue.Queue(), "bench/answer": queue.Queue()}
-    with started(lab, *words) as process:
+    with started("recognizer", *words, cwd=lab) as process:
         while not process.stderr.readline().startswith("publishing"):
             assert process.poll() is None
         with zenoh.open(config) as session:

@@ -8,20 +8,20 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import psutil
 import pyarrow.parquet as pq
 import pytest
+from programs import command, wait_for
 
 from recognizer.validation.command import run
 from recognizer.validation.errors import SetError
 from recognizer.validation.touch_plan import written_surface
 
 TOUCHES, SHARD = 18, 6
-COMMAND = [sys.executable, "-m", "recognizer.validation.command"]
+COMMAND = command("recognizer.validation")
 ADDRESS = re.compile(r'"address": "([^"]+)"')
 OUTWARD = re.compile(r"""(src|href)\s*=\s*["'](?!#|data:)|url\((?!#)|@import""")
 SAME = ("trials.parquet", "results.json")
@@ -60,15 +60,6 @@ def begun(*arguments: str) -> subprocess.Popen:
         [*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         start_new_session=True,
     )  # fmt: skip
-
-
-def wait_for(holds, seconds=60.0):
-    """Return what `holds` returns, as soon as that is true."""
-    end = time.monotonic() + seconds
-    while not (found := holds()):
-        assert time.monotonic() < end, "it takes too long"
-        time.sleep(0.02)
-    return found
 
 
 def left_of(session: int) -> list[int]:

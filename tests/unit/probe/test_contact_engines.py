@@ -53,12 +53,8 @@ def compression_mm(force_n, overlay=SENSOR.overlay):
     return brentq(miss, 0, 0.9 * DEEPEST_MM)
 
 
-DRAKE = pytest.param(
-    "drake",
-    marks=pytest.mark.skipif(
-        find_spec("pydrake") is None, reason="pip install 'encoded-objects[drake]'"
-    ),
-)
+MISSING, EXTRA = find_spec("pydrake") is None, "pip install 'encoded-objects[drake]'"
+DRAKE = pytest.param("drake", marks=pytest.mark.skipif(MISSING, reason=EXTRA))
 
 
 @pytest.fixture(scope="module", params=["mujoco", DRAKE])

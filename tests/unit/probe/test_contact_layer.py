@@ -1,6 +1,7 @@
 """The layer: conditions of contact, which one solution alone meets, refusals, extreme scenes.
 
-Its blur taken back as far as the noise lets: case 7 of the stiff and extreme cases.
+The rigid plate on tips and wrist: by hand, where it tips. The layer's blur taken back as far as
+the noise lets: case 7 of the stiff and extreme cases.
 """
 
 import math
@@ -16,11 +17,14 @@ from probe.contact.layer import layer
 from probe.contact.layer_equilibrium import deep_mm, descend, equilibrium, plate_of, springs_mm
 from probe.contact.layer_influence import influence
 from probe.contact.layer_patch import DepthWindow, levels_of, patch_under
-from probe.contact.plate import PlatePose
+from probe.contact.neo_hooke import Linear, NeoHooke
+from probe.contact.plate import PlatePose, rest
 from probe.errors import ContactError
 from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, RoughSurface, TiltedPlane, Washer
 
 FREE, HELD = WristStiffness(0.0, 0.0), WristStiffness(math.inf, math.inf)
+HINGED = WristStiffness(0.0, math.inf)
+POINTS, ONE = SensorType().centres_mm().reshape(-1, 2), Linear(1.0)
 
 
 def pad(rows=16, **given):
@@ -50,10 +54,7 @@ SCENES = {
     "held fast": (Cross(1.3, 7.0), Touch(0.2, 0.1, 0.3, 5.0, 0.01, 0.0, HELD)),
     "free": (FlatPlate(), Touch(0.0, 0.0, 0.0, 10.0, wrist=FREE)),
     "rough": (RoughSurface(3, 0.05, 1.0), Touch(0.0, 0.0, 0.0, 4.0)),
-    "one wrist axis": (
-        RaisedStrip(2.0),
-        Touch(0.4, 0, 0.2, 4.0, 0, 0.01, WristStiffness(0.0, math.inf)),
-    ),
+    "one wrist axis": (RaisedStrip(2.0), Touch(0.4, 0, 0.2, 4.0, 0, 0.01, HINGED)),
 }
 
 
@@ -123,6 +124,58 @@ def test_forces_of_every_size_are_borne_or_refused(exponent):
     # Under a flat stamp everything goes with the force.
     assert found.z_mm == pytest.approx(small.z_mm * force / 1e-3, rel=1e-3)
     assert found.forces_n / force == pytest.approx(small.forces_n / 1e-3, rel=1e-3, abs=1e-5)
+
+
+def load(force=80.0, *wrist, **tilts):
+    return Touch(0.0, 0.0, 0.0, force, wrist=WristStiffness(*wrist), **tilts)
+
+
+def standing(touch, height=0.0):
+    """Return how a plate rests whose tips are all over one height."""
+    return rest(POINTS, np.full(256, height), ONE, touch)
+
+
+def test_a_stiff_arm_keeps_its_tilt_and_a_soft_one_gives_way():
+    def at(stiffness):
+        return standing(load(80.0, stiffness, stiffness, tilt_x_rad=0.02, tilt_y_rad=-0.01)).pose
+
+    held, nearly, soft = at(math.inf), at(1e12), at(1e-3)
+    assert (held.tilt_x_rad, held.tilt_y_rad) == (0.02, -0.01)
+    assert nearly.z_mm == pytest.approx(held.z_mm, rel=1e-6)
+    assert math.hypot(soft.tilt_x_rad, soft.tilt_y_rad) < 1e-6
+
+
+@pytest.mark.parametrize("force", [1e-9, 1.0, 80.0, 1e9])
+def test_a_crushed_column_answers_by_its_law(force):
+    found = rest(np.zeros((1, 2)), np.array([0.5]), NeoHooke(0.6, 2.0), load(force, 0.0, 0.0))
+    stretch = 1 - (0.5 - found.pose.z_mm) / 2.0
+    assert 0 < stretch < 1
+    law = 0.6 * 2.0 / 3 * (1 - stretch) * (1 + stretch + stretch**2) / stretch**2
+    assert law == pytest.approx(force, rel=1e-6)
+    assert found.forces_n[0] == pytest.approx(force, rel=1e-9)
+
+
+@pytest.mark.parametrize(("aside", "stands"), [(0.0, True), (11.8, True), (12.0, False)])
+def test_a_free_plate_tips_where_its_centre_leaves_the_hull(aside, stands):
+    points, heights = POINTS + np.array([aside, 0.0]), np.full(256, -1.0)
+    heights[[37, 200]] = 0.0
+    if stands:
+        found = rest(points, heights, ONE, load(1.0, 0.0, 0.0))
+        assert found.forces_n.sum() == pytest.approx(1.0, rel=1e-9)
+        assert found.forces_n @ points == pytest.approx(0.0, abs=1e-8)
+        return
+    with pytest.raises(ContactError, match=r"tips.*outside the hull.*0\.09375 \.\.\. 23\.91 mm"):
+        rest(points, heights, ONE, load(1.0, 0.0, 0.0))
+
+
+def test_a_free_plate_needs_the_hull_along_its_free_axes_alone():
+    at = np.array([[2.0, 1.0], [2.0, -1.0]])
+    held = rest(at, np.zeros(2), ONE, load(1.0, 0.0, 100.0))
+    assert held.forces_n.sum() == pytest.approx(1.0)
+    with pytest.raises(ContactError, match="tips"):
+        rest(at, np.zeros(2), ONE, load(1.0, 100.0, 0.0))
+    alone = rest(np.zeros((1, 2)), np.zeros(1), ONE, load(1.0, 0.0, 0.0))
+    assert alone.forces_n == pytest.approx(1.0)
 
 
 def blurred(sensor, forces):
@@ -195,6 +248,12 @@ HOLE = Formula(lambda x, _y: np.where(x > 0, math.nan, 0.0))
         (lambda: layer(WASHER, pad(), Touch(80.0, 0, 0, 10.0)), "nothing under"),
         (lambda: layer(WASHER, pad(), Touch(8.0, 0.0, 0.0, 30.0, wrist=FREE)), "tips: its centre"),
         (lambda: layer(HOLE, pad(), HERE), "no numbers"),
+        (lambda: standing(load(-1.0)), "not negative"),
+        (lambda: standing(load(math.nan)), "finite"),
+        (lambda: standing(load(1.0, tilt_x_rad=math.nan)), "finite"),
+        (lambda: standing(load(1.0, -1.0, 0.0)), "a wrist of"),
+        (lambda: standing(load(1.0, math.nan, 1.0)), "a wrist of"),
+        (lambda: standing(load(5.0), -math.inf), "nothing under the plate to bear 5 N"),
         (lambda: deblur(IMAGE, SensorType(), noise_n=0.01), "kind 'tab'"),
         (lambda: deblur(IMAGE, pad(height_mm=4.0), noise_n=0.01), r"passes.*at most 3\.75 mm"),
         (lambda: deblur(IMAGE[:, 1:], pad(), noise_n=0.01), "shape"),

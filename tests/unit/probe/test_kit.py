@@ -18,12 +18,7 @@ from probe.kit.command import run
 from probe.kit.sizes import CLEARANCE_MM, HEAD_MM, PIN_MM, WALL_BETWEEN_MM, kit_sizes
 from probe.simulate.registered import registered_surface
 
-YAML = """name: small
-rows: 8
-columns: 8
-pitch: 2 mm
-overlay: {tip: 1.6 mm}
-"""
+YAML = "name: small\nrows: 8\ncolumns: 8\npitch: 2 mm\noverlay: {tip: 1.6 mm}\n"
 
 
 @pytest.mark.parametrize("name", shipped_names())

@@ -24,7 +24,6 @@ from probe.protocol import (
 
 COUNTS = (np.arange(256, dtype=np.uint16) * 4).reshape(16, 16)
 READ_WRIST = np.array([0, 1, 512, 1023], np.uint16)
-FRAME = FramePacket(0x1234, 0x89ABCDEF, COUNTS, READ_WRIST)
 
 
 def wire(payload: bytes) -> bytes:

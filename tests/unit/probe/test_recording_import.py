@@ -232,11 +232,7 @@ def test_tactels_of_a_table_are_taken_by_name(tmp_path, head):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (
-            "r3c4",
-            "r0c0",
-            r"a\.csv:1: its head names 255 tactels in 256 columns, not r0c0 \.\.\. r15c15",
-        ),
+        ("r3c4", "r0c0", "csv:1: its head names 255 tactels in 256 columns, not r0c0 ... r15c15"),
         ("r3c4", "x", "its head names 255 tactels in 255 columns"),
         ("r0c0", "r1c1", "its head names 255 tactels in 256 columns"),
         ("r3c4", "r16c3", "its head names 256 tactels in 256 columns"),

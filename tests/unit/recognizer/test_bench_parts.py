@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hostile_recordings import write_zeros
+from recorded import record
 from starlette.requests import ClientDisconnect
 
 from encoded_objects.base.sensor_type import SensorType
@@ -25,7 +26,6 @@ from probe.calibration.guide import LONGEST
 from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.recording.read import Recording
-from probe.recording.record import Recorder
 from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker, Subscriber
 from recognizer.bench.errors import BenchError, BusyError, UnknownError
@@ -56,9 +56,7 @@ def pressed(value, seq=0):
 
 
 def recorded(path, counts):
-    with Recorder(path, sensor="bench/0") as recorder:
-        for i, value in enumerate(counts):
-            recorder.append(pressed(value, i))
+    record(path, [pressed(value, seq) for seq, value in enumerate(counts)], sensor="bench/0")
     return path
 
 
@@ -313,8 +311,8 @@ def test_a_page_gets_the_newest_of_every_topic_and_nothing_twice():
     assert asyncio.run(told()) == (newest, [])
 
 
-def taken(feed, seconds):
-    frames, end_s = [], time.monotonic() + seconds
+def taken(feed):
+    frames, end_s = [], time.monotonic() + 5.0
     while time.monotonic() < end_s and feed.as_json()["playing"]:
         frames += feed.take(0.05)
     frames += feed.take(0.0)
@@ -324,14 +322,14 @@ def taken(feed, seconds):
 def test_a_recording_plays_in_order_goes_where_it_is_told_and_pauses_at_its_end(tmp_path):
     feed = ReplayFeed(Recording(recorded(tmp_path / "x.h5", [0] * 20 + [200] * 20 + [0] * 20)))
     assert feed.seconds == pytest.approx(0.59)
-    assert taken(feed, 5.0) == list(range(60))
+    assert taken(feed) == list(range(60))
     assert feed.as_json()["at"] == pytest.approx(feed.seconds, abs=1e-3)
     feed.play(playing=None, speed=None, at_s=0.305)
     assert [frame.seq for frame in feed.take(0.0)] == [30]  # shown although it pauses
     assert feed.take(0.0) == []
     for at_s, first in ((0.205, 20), (None, 0)):  # from its beginning again
         feed.play(playing=True, speed=20.0, at_s=at_s)
-        assert taken(feed, 5.0) == list(range(first, 60))
+        assert taken(feed) == list(range(first, 60))
     strength = np.array(feed.overview())
     assert (strength[22:38].min(), strength[:18].max(), strength[42:].max()) == (1.0, 0.0, 0.0)
     with pytest.raises(BenchError, match="speed"):
@@ -341,11 +339,12 @@ def test_a_recording_plays_in_order_goes_where_it_is_told_and_pauses_at_its_end(
 def test_an_empty_recording_and_one_whose_clock_jumps(tmp_path):
     feed = ReplayFeed(Recording(recorded(tmp_path / "empty.h5", [])))
     assert (feed.take(0.0), feed.overview(), feed.as_json()["playing"]) == ([], [], False)
-    path = tmp_path / "jump.h5"
-    with Recorder(path) as recorder:
-        for i, t_ns in enumerate((0, 10**7, 10**13, 10**13 + 10**7, 5, 10**7)):
-            recorder.append(frame_from(np.zeros((16, 16)), t_ns=t_ns, seq=i))
-    feed = ReplayFeed(Recording(path))
+    times_ns = (0, 10**7, 10**13, 10**13 + 10**7, 5, 10**7)
+    frames = [
+        frame_from(np.zeros((16, 16)), t_ns=t_ns, seq=seq) for seq, t_ns in enumerate(times_ns)
+    ]
+    record(tmp_path / "jump.h5", frames)
+    feed = ReplayFeed(Recording(tmp_path / "jump.h5"))
     assert feed.seconds == pytest.approx(PAUSE_S + 0.03, abs=1e-3)
 
 
