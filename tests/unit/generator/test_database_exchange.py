@@ -13,12 +13,13 @@ from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
 from generator.database.cells import find_array, held_cells, occupied_cells
 from generator.database.exchange import export_objects, import_objects
+from generator.database.lab import lab_key
 from generator.database.open import database_exists, open_database
 from generator.database.read import list_objects, read_object
 from generator.database.register import ObjectRecord, register, remove, restore, retire
 from generator.database.registered import RegisteredPart
 from generator.database.transaction import read_transaction, write_transaction
-from generator.errors import DatabaseError
+from generator.errors import DatabaseError, LabKeyError
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import cube, tetrahedron
 
@@ -155,6 +156,27 @@ def test_a_failed_export_leaves_what_is_there(exported, file):
         export_objects(str(file), file, force=True)
     assert names(str(file)) == ["Cube"]
     assert [path.name for path in file.parent.iterdir()] == ["exchange.db"]
+
+
+def test_an_object_that_is_here_by_another_name_is_known(lab_url, exported):
+    import_objects(lab_url, str(exported), renamed={"Cube": "Theirs"})
+    make(lab_url, "Other", profile="large", solid=cube(60.0))
+    again = ({}, {"Cube": "Third"}, {"Cube": "Theirs"}, {"Cube": "Other"})
+    for renamed in again:
+        done = import_objects(lab_url, str(exported), renamed=renamed)
+        assert (done.copied, done.known, done.refused) == ((), ("Theirs",), ())
+    assert names(lab_url) == ["Other", "Theirs"]
+
+
+def test_a_lab_moves_with_its_key(lab_url, exported):
+    key = "0123-4567-89AB-CDER"
+    import_objects(lab_url, str(exported), lab_key=key.lower())
+    with read_transaction(open_database(lab_url, writable=False)) as connection:
+        assert lab_key(connection) == key
+    assert import_objects(lab_url, str(exported), lab_key=key).known == ("Cube",)
+    for wrong in ("0123-4567-89AB-CDEF", "5AFR-9W3K-2Z3R-HV0H"):
+        with pytest.raises(LabKeyError):
+            import_objects(lab_url, str(exported), lab_key=wrong)
 
 
 def test_a_rehearsed_import_changes_nothing(lab_url, exported):

@@ -251,6 +251,9 @@ def guarded_server(postgresql_server):
         file.write_text(rules + before)
         connection.execute("CREATE ROLE lab LOGIN PASSWORD 'right'")
         connection.execute("CREATE ROLE guest LOGIN")
+        connection.execute("CREATE ROLE crowd LOGIN CONNECTION LIMIT 0")
+        connection.execute("CREATE DATABASE closed")
+        connection.execute("REVOKE CONNECT ON DATABASE closed FROM PUBLIC")
         connection.execute("SELECT pg_reload_conf()")
         address = postgresql_server.partition("@")[2].partition("/")[0]
         for _ in range(200):  # the server takes the rules over in its own time
@@ -261,8 +264,9 @@ def guarded_server(postgresql_server):
             time.sleep(0.05)
         yield address
         file.write_text(before)
-        connection.execute("DROP ROLE lab")
-        connection.execute("DROP ROLE guest")
+        connection.execute("DROP DATABASE closed")
+        for role in ("lab", "guest", "crowd"):
+            connection.execute(f"DROP ROLE {role}")
         connection.execute("SELECT pg_reload_conf()")
 
 
@@ -278,7 +282,9 @@ def guarded_server(postgresql_server):
         ("postgres:secret@{}/nowhere", "has no database 'nowhere'", "createdb nowhere"),
         ("lab:secret@no.such.host.invalid/x", "there is no host 'no.such.host.invalid'", "host"),
         ("lab:secret@127.0.0.1:99999/x", "invalid port number", "port"),
-        ("guest:secret@{}/postgres", "may not be written", "choose another"),
+        ("guest:secret@{}/postgres", "permission denied for schema public", "docs/lab.md"),
+        ("guest:secret@{}/closed", "may not connect to the database 'closed'", "GRANT CONNECT"),
+        ("crowd:secret@{}/postgres", "takes no more connections now", "in a moment"),
     ],
 )  # fmt: skip
 def test_a_server_that_is_not_reached_says_why(guarded_server, url, cause, fix):
@@ -294,6 +300,51 @@ def test_a_server_that_is_not_reached_says_why(guarded_server, url, cause, fix):
     right = f"postgresql://lab:right@{guarded_server}/postgres"
     with pytest.raises(DatabaseError, match="no objects are registered"):
         open_database(right, writable=False)
+
+
+@pytest.fixture
+def guest_of(postgresql_server):
+    """Return a function that grants a new user rights in a schema; returns the URL of theirs."""
+    import psycopg
+
+    with psycopg.connect(postgresql_server, autocommit=True) as connection:
+        connection.execute("CREATE ROLE reader LOGIN")
+
+        def url(lab, *grants):
+            schema = lab.rpartition("%3D")[2]
+            for grant in (f"USAGE ON SCHEMA {schema}", *grants):
+                connection.execute(f"GRANT {grant.format(schema)} TO reader")
+            return lab.replace("postgres@", "reader@")
+
+        yield url
+        connection.execute("DROP OWNED BY reader")
+        connection.execute("DROP ROLE reader")
+
+
+def test_a_right_that_is_missing_is_named(new_database, guest_of):
+    lab = new_database("postgresql")
+    open_database(lab)
+    theirs = guest_of(lab)
+    for _ in range(2):
+        said = refused(theirs, writable=False)
+        assert "permission denied for table meta" in said
+        assert "docs/lab.md, Rights" in said
+        assert "written" not in said  # they only read
+    open_database(guest_of(lab, "SELECT ON ALL TABLES IN SCHEMA {}"), writable=False)
+    before = of_version(1, new_database("postgresql"))
+    said = refused(guest_of(before, "SELECT ON ALL TABLES IN SCHEMA {}"), writable=False)
+    assert "schema version 1, must be brought to 3" in said
+    assert "opened once by who may write it" in said
+
+
+def test_a_reader_waits_for_a_lock_no_longer_than_it_was_told(new_database):
+    import psycopg
+
+    lab = new_database("postgresql")
+    open_database(lab)
+    with psycopg.connect(lab) as other:
+        other.execute("LOCK TABLE meta IN ACCESS EXCLUSIVE MODE")
+        assert "keep the database locked" in refused(lab, writable=False, wait_s=0.2)
 
 
 # Earlier schema versions; that all their rows are there afterwards, tests/corpora hold.
