@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -112,12 +113,12 @@ def print_retired(entries: Sequence[ObjectEntry], done: str, url: str, *, as_jso
         )
         return
     cells = {
-        "removed": "are free again",
+        "removed": "are free again; a reader that runs now still names it: start it again",
         "restored": "were taken all the time",
-        "retired": "stay taken",
+        "retired": "stay taken; undo: encode-object retire --undo ",
     }
     for entry in entries:
-        undo = f"; undo: encode-object retire --undo {entry.name}" if done == "retired" else ""
+        undo = shlex.quote(entry.name) if done == "retired" else ""
         output.write(f"{entry.name}: {done}; its {entry.symbols} cells {cells[done]}{undo}")
 
 
@@ -139,9 +140,8 @@ def print_export(done: CopyReport, file: Path, url: str, *, as_json: bool) -> No
         )
         return
     there = f"in the other lab, before it makes its next object: encode-object import {file.name}"
-    output.write(
-        f"{_object_count(done.copied)} of {without_password(url)} exported to {file}; {there}"
-    )
+    copied = output.count_of(len(done.copied), "object")
+    output.write(f"{copied} of {without_password(url)} exported to {file}; {there}")
 
 
 def print_import(done: CopyReport, url: str, *, dry_run: bool, as_json: bool) -> None:
@@ -155,19 +155,13 @@ def print_import(done: CopyReport, url: str, *, dry_run: bool, as_json: bool) ->
         output.write_json(values | {"dry_run": dry_run, "database": without_password(url)})
         return
     verb = "would be imported" if dry_run else "imported"
-    output.write(
-        "\n  ".join(
-            [f"{_object_count(done.copied)} {verb} into {without_password(url)}", *done.copied]
-        )
-    )
+    copied = f"{output.count_of(len(done.copied), 'object')} {verb} into {without_password(url)}"
+    output.write("\n  ".join([copied, *done.copied]))
     if done.known:
-        output.write(f"{_object_count(done.known)} known already, left as they are")
+        known = output.count_of(len(done.known), "object")
+        output.write(f"{known} known already, left as they are: {output.some_of(done.known)}")
     for each in done.refused:
         output.message(f"refused: '{each.name}' {each.cause}\n  fix: {each.fix}", "refused:")
-
-
-def _object_count(names: Sequence[str]) -> str:
-    return "1 object" if len(names) == 1 else f"{len(names)} objects"
 
 
 @dataclass(frozen=True, slots=True)

@@ -154,6 +154,9 @@ def import_(
         list[str] | None,
         Option("Another name here; may be given several times.", "OLD=NEW"),
     ] = None,
+    lab_key: Annotated[
+        str, Option("Of a new database: the other lab's, to go on with its arrays.", "KEY"),
+    ] = "",
     skip_refused: Annotated[
         bool, Option("Import the others where some cannot be."),
     ] = False,
@@ -179,6 +182,7 @@ def import_(
         renamed=dict(_new_name(given) for given in rename or ()),
         skip_refused=skip_refused,
         dry_run=dry_run,
+        lab_key=lab_key,
     )
     object_report.print_import(done, url, dry_run=dry_run, as_json=as_json)
     return 0

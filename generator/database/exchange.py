@@ -18,6 +18,8 @@ from pathlib import Path
 
 from sqlalchemy import URL, Connection, Engine
 
+from generator.array.lab_key import read_lab_key
+from generator.database.lab import require_lab_key
 from generator.database.migrate import snapshot
 from generator.database.open import database_exists, normal_url, open_database
 from generator.database.transaction import (
@@ -81,6 +83,7 @@ def import_objects(
     renamed: Mapping[str, str] | None = None,
     skip_refused: bool = False,
     dry_run: bool = False,
+    lab_key: str = "",
 ) -> CopyReport:
     """Bring the objects of another database into this one.
 
@@ -96,12 +99,17 @@ def import_objects(
         Import the others where some are refused.
     dry_run
         Say what would be done, and do nothing.
+    lab_key
+        Of a database that is new: that of `given` moves a lab as a whole; drawn if left out.
 
     Raises
     ------
     DatabaseError
         An object is refused: its cells or its name are held here, or it was damaged.
+    LabKeyError
+        It is no key, or the database has another.
     """
+    lab_key = lab_key and read_lab_key(lab_key)
     home = normal_url(given)
     engine_home = normal_url(url)
     if _same_database(home, engine_home):
@@ -115,6 +123,8 @@ def import_objects(
     with _open_unchanged(given, home) as source_engine, read_transaction(source_engine) as source:
 
         def work(target: Connection) -> CopyReport:
+            if lab_key:
+                require_lab_key(target, lab_key)
             carried = copy_objects(
                 source, target, names=names, renamed=renamed, origin=origin,
                 skip_refused=skip_refused,
@@ -125,12 +135,12 @@ def import_objects(
 
         if not database_exists(url):  # what is refused leaves no database behind
             with tempfile.TemporaryDirectory() as folder:
-                trial = open_database(str(Path(folder) / "lab.db"))
+                trial = open_database(str(Path(folder) / "lab.db"), lab_key=lab_key)
                 trial.update_execution_options(home=engine_home)
                 carried = retry_on_conflict(trial, work)
             if dry_run:
                 return carried
-        return retry_on_conflict(open_database(url), work)
+        return retry_on_conflict(open_database(url, lab_key=lab_key), work)
 
 
 @contextmanager

@@ -5,6 +5,7 @@ Another program's database is left alone, a newer schema is refused.
 
 from __future__ import annotations
 
+import logging
 import os
 import sqlite3
 from collections.abc import Iterator
@@ -179,6 +180,7 @@ def _check_writable(path: Path) -> None:
 
 
 def _postgresql_engine(url: URL, writable: bool, wait_s: float) -> Engine:
+    logging.getLogger("psycopg").setLevel(logging.ERROR)  # what failed is ours to say
     try:
         engine = create_engine(
             url,
@@ -234,6 +236,8 @@ def open_database(
         return engine
     if not writable:
         fix = "register an object with encode-object first, or name another database"
+        if engine.dialect.name == "postgresql":  # which hides tables of a schema without rights
+            fix += "; or have its owner grant this user its schema (docs/lab.md, Rights)"
         place = place_of(engine.url)
         raise DatabaseError("no objects are registered here", fix=fix, place=place)
     with write_transaction(engine) as connection:
@@ -300,14 +304,14 @@ def _update_schema(engine: Engine, wait_s: float, keep_older: bool) -> bool:
     if version is not None and version < SCHEMA_VERSION:
         try:
             older = database_engine(engine.url, writable=True, wait_s=wait_s)
+            migrate(older, _schema_version, keep=keep_older)
         except DatabaseError as error:
             raise DatabaseError(
                 f"the database has schema version {version}, must be brought to {SCHEMA_VERSION}, "
                 f"and {error.cause}",
-                fix="open it once where it may be written: encode-object list --database FILE",
+                fix=f"{error.fix}; or have it opened once by who may write it: encode-object list",
                 place=place_of(engine.url),
             ) from error
-        migrate(older, _schema_version, keep=keep_older)
     return version is not None
 
 

@@ -2,11 +2,10 @@
 
 Writers take turns from their first statement (SQLite: BEGIN IMMEDIATE, PostgreSQL: one
 advisory lock for the transaction), so that the occupied cells a writer reads stay what
-they are until it commits. Nobody waits longer than the engine's `wait_s`, nor longer than `QUIET_S`
-without a word. What is left to
-conflict: a layout made before the turn came, a writer that takes no turns, a deadlock on the
-server. The work is then undone and repeated on the state that the other writer left
-(`retry_on_conflict`).
+they are until it commits. Nobody waits for a lock longer than the engine's `wait_s`, nor for a turn
+longer than `QUIET_S` without a word. What is left to conflict: a layout made before the turn came,
+a writer that takes no turns, a deadlock on the server. The work is then undone and repeated on the
+state that the other writer left (`retry_on_conflict`).
 """
 
 from __future__ import annotations
@@ -65,6 +64,7 @@ def read_transaction(engine: Engine) -> Iterator[Connection]:
                 isolation_level="REPEATABLE READ", postgresql_readonly=True
             )
         with connection.begin():
+            _limit_wait(connection)
             yield connection
 
 
@@ -129,8 +129,7 @@ def home_of(engine: Engine) -> URL:
 def take_turn(connection: Connection) -> None:
     """Wait until no other transaction writes; held until this one ends."""
     if connection.dialect.name == "postgresql":
-        wait_s = connection.get_execution_options().get("wait_s", WAIT_S)
-        connection.execute(text(f"SET LOCAL lock_timeout = {int(1000 * wait_s)}"))
+        wait_s = _limit_wait(connection)
         notice = Timer(QUIET_S, _say_waiting, (connection.engine.url, wait_s))
         notice.daemon = True
         notice.start()
@@ -138,6 +137,14 @@ def take_turn(connection: Connection) -> None:
             connection.execute(text("SELECT pg_advisory_xact_lock(:turn)"), {"turn": _TURN})
         finally:
             notice.cancel()
+
+
+def _limit_wait(connection: Connection) -> float:
+    """Let a server's locks be waited for as long as the engine says; returns how long."""
+    wait_s = float(connection.get_execution_options().get("wait_s", WAIT_S))
+    if connection.dialect.name == "postgresql":
+        connection.execute(text(f"SET LOCAL lock_timeout = {int(1000 * wait_s)}"))
+    return wait_s
 
 
 def begin_sqlite(connection: Connection) -> None:
@@ -199,18 +206,9 @@ def explain_error(error: Exception, url: URL) -> DatabaseError:
         fix = "run the same command again"
         return WriteConflictError("another writer was first", fix=fix, place=place)
     if code is not None and code.startswith(("SQLITE_CONSTRAINT", "23")):
-        if code in _NOT_UNIQUE and "cells" in first_line:
-            return WriteConflictError(
-                "the object needs cells of the array that another object holds",
-                fix="place it again on the cells that are free now",
-                place=place,
-            )
-        if code in _NOT_UNIQUE and "objects" in first_line:
-            return WriteConflictError(
-                "an object of this name was registered meanwhile",
-                fix="run the same command again",
-                place=place,
-            )
+        for table, cause, fix in _CONFLICTS:
+            if code in _NOT_UNIQUE and table in first_line:
+                return WriteConflictError(cause, fix=fix, place=place)
         cause = f"the database refuses the object: {first_line}"
         return DatabaseError(cause, fix=restore, place=place)
     if code is None and url.get_backend_name() == "sqlite":
@@ -222,6 +220,11 @@ def explain_error(error: Exception, url: URL) -> DatabaseError:
 
 _RACES = ("40001", "40P01")  # serialization failure, deadlock
 _NOT_UNIQUE = ("SQLITE_CONSTRAINT_PRIMARYKEY", "SQLITE_CONSTRAINT_UNIQUE", "23505")
+_CONFLICTS = (
+    ("cells", "the object needs cells of the array that another object holds",
+     "place it again on the cells that are free now"),
+    ("objects", "an object of this name was registered meanwhile", "run the same command again"),
+)  # fmt: skip
 
 _GONE = "08006"  # SQLSTATE: connection failure
 
@@ -237,9 +240,14 @@ _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
     (("SQLITE_NOTADB",), "this file is not a database", "name another file, or move this one away"),
     (("SQLITE_CORRUPT",), "the database file is damaged", _RESTORE),
     (
-        ("SQLITE_READONLY", "25006", "42501"),
+        ("SQLITE_READONLY",),
         "the database may not be written",
         "allow writing to it and its folder, or choose another with --database",
+    ),
+    (
+        ("42501", "3F000", "25006"),
+        "the server does not let this user do that: {}",
+        "have the database's owner grant it (docs/lab.md, Rights), or name another user or server",
     ),
     (
         ("SQLITE_CANTOPEN",),
@@ -321,6 +329,16 @@ def connection_error(said: str, url: URL, place: str) -> DatabaseError:
 
 _CONNECTION_MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
     (
+        ("starting up", "shutting down", "too many", "remaining connection slots", "not currently"),
+        "the server on {server} takes no more connections now",
+        "run the same command again in a moment, or ask the server's administrator",
+    ),
+    (
+        ("permission denied for database",),
+        "the user '{user}' may not connect to the database '{name}'",
+        'have its owner say: GRANT CONNECT ON DATABASE "{name}" TO "{user}"',
+    ),
+    (
         ("password authentication failed", "no password supplied"),
         "the server refuses the user '{user}' or the password",
         "correct them in the URL, or in PGUSER, PGPASSWORD and ~/.pgpass",
@@ -349,10 +367,5 @@ _CONNECTION_MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
         ("timeout", "timed out", "unreachable", "No route to host"),
         "the server on {server} does not answer",
         "check the network and the firewall, or correct host and port in the URL",
-    ),
-    (
-        ("starting up", "shutting down", "too many clients", "remaining connection slots"),
-        "the server on {server} takes no more connections now",
-        "run the same command again in a moment",
     ),
 )

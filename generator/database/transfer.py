@@ -52,6 +52,7 @@ GEOMETRY = (
 PART_SUFFIXES = {kind: f".{kind}" for kind in ("step", "stl", "3mf", "glb")}
 """Ending of the files of parts, by their format."""
 
+_PLACE = ("row", "column")
 _DAMAGED = "export it once more, from the lab that registered it"
 
 
@@ -108,7 +109,7 @@ def check_readable(source: Connection, name: str) -> None:
         raise CopyRefusedError(f"cannot be read: {error}", _DAMAGED) from error
 
 
-def check_cells(target: Connection, name: str, here: ArrayHere, cells: Rows) -> None:
+def check_cells(target: Connection, here: ArrayHere, cells: Rows) -> None:
     """Refuse cells that say what the array does not, or that another object holds."""
     r, c, labels = (
         np.array([cell[column] for cell in cells], np.int64)
@@ -126,7 +127,7 @@ def check_cells(target: Connection, name: str, here: ArrayHere, cells: Rows) -> 
         raise CopyRefusedError(
             f"needs {np.count_nonzero(held)} cells that "
             f"{_holders(target, here.array_id, r[held], c[held])} here",
-            f"make '{name}' again here from its spec, on cells of its own, and print it again. "
+            "make it again here from its spec, on cells of its own, and print it again. "
             "Labs with a key each (encode-object lab) have arrays of their own; without one, or "
             "with the same, share one database instead, postgresql://HOST/NAME",
         )
@@ -277,7 +278,9 @@ def copy_objects(
     """
     new_names = dict(renamed or {})
     arrays: dict[int, ArrayHere] = {}
-    copied, known, refused = [], [], []
+    copied: list[str] = []
+    known: list[str] = []
+    refused = []
     for name in (*names, *new_names):
         object_entry(source, name)
     for entry in list_objects(source):
@@ -285,10 +288,8 @@ def copy_objects(
             continue
         name = new_names.get(entry.name, entry.name)
         try:
-            if _copy_object(source, target, entry, name, arrays, origin):
-                copied.append(name)
-            else:
-                known.append(name)
+            here = _copy_object(source, target, entry, name, arrays, origin)
+            (known if here else copied).append(here or name)
         except CopyRefusedError as error:
             shown = name if name.isprintable() else repr(name)
             refused.append(RefusedCopy(shown, error.cause, error.fix))
@@ -305,28 +306,32 @@ def _copy_object(
     name: str,
     arrays: dict[int, ArrayHere],
     origin: Mapping[str, str] | None,
-) -> bool:
-    """Copy one object, if it is new; check all of it before the first row is written.
+) -> str:
+    """Copy one object, unless it is here; check all of it before the first row is written.
 
-    Files of parts are named from where people have the two databases.
+    Returns the name that it has here already, empty if it had none. Files of parts are named from
+    where people have the two databases.
     """
     homes = home_of(source.engine), home_of(target.engine)
     parts = rows_of(source, tables.parts, entry.object_id)
     if origin:
         check_names(name, entry.name, parts, homes[0])
     present = find_object(target, name)
-    if present is not None:
-        if same_object(source, entry, target, present):
-            return False
-        fix = f"import it under a name of its own: --rename '{entry.name}=NEW'"
-        raise CopyRefusedError("is the name of another object here", fix)
+    if present is not None and same_object(source, entry, target, present):
+        return name
     if entry.array_id not in arrays:
         arrays[entry.array_id] = array_here(source, target, entry.array_id)
     here = arrays[entry.array_id]
     (row,) = rows_of(source, tables.objects, entry.object_id)
     check_alphabet(source, row["alphabet_id"])
     rows = geometry(source, entry.object_id)
-    check_cells(target, name, here, rows[tables.cells])
+    held = None if here.array_id is None else _held_by(target, here.array_id, rows[tables.cells])
+    if held is not None and same_object(source, entry, target, held):
+        return held.name
+    if present is not None:
+        fix = f"import it under a name of its own: --rename '{entry.name}=NEW'"
+        raise CopyRefusedError("is the name of another object here", fix)
+    check_cells(target, here, rows[tables.cells])
     texts = (x for found in rows.values() for one in found for x in one.values())
     if not all(text.isprintable() for text in texts if isinstance(text, str)):
         raise CopyRefusedError("has names that cannot be shown", _DAMAGED)
@@ -344,7 +349,7 @@ def _copy_object(
         changed = new | ({"array_id": array_id} if table is tables.cells else {})
         insert_rows(target, table, [row | changed for row in old])
     cells = rows[tables.cells]
-    at = tuple(np.array([cell[key] for cell in cells], np.int64) for key in ("row", "column"))
+    at = tuple(np.array([cell[key] for cell in cells], np.int64) for key in _PLACE)
     mark_cells(target, array_id, (at[0], at[1]), taken=True)
     for part in parts:
         path = part_path(homes[0], part["file"])
@@ -356,7 +361,14 @@ def _copy_object(
     insert_rows(target, tables.as_built, [print_ | new for print_ in prints])
     provenance = rows_of(source, tables.provenance, entry.object_id)
     insert_rows(target, tables.provenance, [row | new | dict(origin or {}) for row in provenance])
-    return True
+    return ""
+
+
+def _held_by(target: Connection, array_id: int, cells: Rows) -> ObjectEntry | None:
+    """Return the object that holds the first of some cells in the receiving database."""
+    numbers, _ = faces_at(target, array_id, *([cell[k] for cell in cells[:1]] for k in _PLACE))
+    query = select(tables.objects.c.name).where(tables.objects.c.object_id.in_(numbers.tolist()))
+    return next((find_object(target, name) for name in target.execute(query).scalars()), None)
 
 
 def _sent_along(homes: tuple[URL, URL], path: Path) -> str:

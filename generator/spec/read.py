@@ -370,4 +370,6 @@ def _without_none(value: Any) -> Any:
         return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
     if isinstance(value, list | tuple):
         return [_without_none(inner) for inner in value]
+    if hasattr(value, "tolist"):  # of numpy
+        return value.tolist()
     return str(value) if isinstance(value, Path) else value

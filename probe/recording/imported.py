@@ -396,7 +396,9 @@ def _table_array(path: Path, image: tuple[int, int]) -> FileArray:
             raise RecordingError(
                 f"it is no table: {bad}", fix="save it as CSV, UTF-8", place=path
             ) from bad
-    head = [] if not lines or _are_numbers(lines[0]) else [name.strip() for name in lines.pop(0)]
+    # pandas names columns 0, 1, 2, ... where they have no names
+    named = lines and (not _are_numbers(lines[0]) or lines[0] == [*map(str, range(len(lines[0])))])
+    head = [name.strip() for name in lines.pop(0)] if named else []
     others: dict[str, NDArray[Any]] = {}
     left: tuple[str, ...] = ()
     if columns := _image_columns(path, head, image):

@@ -16,13 +16,14 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, Engine
+from sqlalchemy import Connection, Engine, select
 
 from encoded_objects.base.compiled import addresses
 from encoded_objects.base.errors import without_password
 from encoded_objects.base.output import count_of
 from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
 from generator.array import FoldedArray, ProductArray
+from generator.database import tables
 from generator.database.as_built import AsBuilt, read_as_built
 from generator.database.cells import held_cells
 from generator.database.open import open_database
@@ -34,7 +35,7 @@ from generator.database.registered import (
     RegisteredStyle,
     RoundFace,
 )
-from generator.database.transaction import of_rows, read_transaction
+from generator.database.transaction import of_rows, place_of, read_transaction
 from probe.surface.polygon import FaceRegion, polygon
 from recognizer.errors import LabError
 from recognizer.touch.as_built import PrintedFace, print_of, usual_print
@@ -151,14 +152,25 @@ class EmbossedArray:
         )  # fmt: skip
 
     def face(self, number: int) -> EncodedFace:
-        """Return a face by its number, from memory or from the database."""
+        """Return a face by its number, from memory or from the database.
+
+        Raises LabError: it is there no longer, or on other cells than when the lab was opened.
+        """
         if number not in self.known:
             object_id = int(self.faces[number, 0])
-            numbers = np.flatnonzero(self.faces[:, 0] == object_id)
+            name = self.names[object_id]
             with read_transaction(self.engine) as connection:
-                wanted = self.faces[numbers, 1].tolist()
-                found = _read_faces(connection, object_id, self.names[object_id], wanted)
-            self.known.update(zip(numbers.tolist(), found, strict=True))
+                found = _read_faces(connection, object_id, name)
+            for mine in self.faces_of(name):
+                one = found.get(int(self.faces[mine, 1]))
+                held = np.full(np.count_nonzero(self.owners == mine), mine)
+                if not one or not np.array_equal(self.at(one.rows, one.columns)[0], held):
+                    raise LabError(
+                        f"'{name}' was removed or made again after the lab was opened",
+                        fix="open the lab again: start the command again",
+                        place=place_of(self.engine.url),
+                    )
+                self.known[mine] = one
         return self.known[number]
 
     def faces_of(self, object_name: str) -> list[int]:
@@ -195,7 +207,7 @@ class Lab:
         for each in self.arrays:
             each.engine.dispose()
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:  # of a notebook, too, so without a password
         objects = {name for each in self.arrays for name in each.names.values()}
         faces = sum(len(each.faces) for each in self.arrays)
         symbols = sum(len(each.keys) for each in self.arrays)
@@ -303,13 +315,13 @@ def radii_of(surfaces: Iterable[Developable]) -> tuple[float, ...]:
 
 
 @of_rows
-def _read_faces(
-    connection: Connection, object_id: int, name: str, wanted: Sequence[int]
-) -> list[EncodedFace]:
-    """Return encoded faces of an object; `wanted` are their numbers in it."""
+def _read_faces(connection: Connection, object_id: int, name: str) -> dict[int, EncodedFace]:
+    """Return encoded faces of an object by their numbers in it; none where it is no longer."""
+    held = select(tables.objects.c.object_id).where(tables.objects.c.name == name)
+    if connection.execute(held).scalar() != object_id:
+        return {}
     prints = (*read_as_built(connection, object_id), *read_as_built(connection))
-    encoded = dict(_encoded_faces(read_object(connection, name), prints))
-    return [encoded[number] for number in wanted]
+    return dict(_encoded_faces(read_object(connection, name), prints))
 
 
 def _encoded_faces(

@@ -361,11 +361,15 @@ def _read_all(
         start = time.process_time()
         answer = read(counts) or NOTHING
         ms.append(1e3 * (time.process_time() - start))
-        if answer is not NOTHING and answer.name not in names:
-            raise ValidationError(
-                f"a reader names '{answer.name}'", fix=f"name one of {', '.join(names)}",
-                place=reader,
-            )  # fmt: skip
+        answer = ReaderAnswer(*answer)  # which a plain tuple may be
+        if answer.name not in (*names, NOTHING.name):
+            cause, fix = f"a reader names '{answer.name}'", f"name one of {', '.join(names)}"
+            raise ValidationError(cause, fix=fix, place=reader)
+        spread = np.eye(3) if answer.covariance is None else np.asarray(answer.covariance)
+        if spread.shape != (3, 3) or np.linalg.det(spread) <= 0:
+            cause = f"a reader gives the covariance {spread.tolist()}"
+            fix = "give 3 x 3 of mm, mm and rad, positive definite, or None"
+            raise ValidationError(cause, fix=fix, place=reader)
         answers.append(answer)
         progress.step("touches")
     unknown = np.full((3, 3), math.nan)
@@ -453,7 +457,7 @@ def table_of(found: Mapping[str, Any]) -> str:
     rows = [
         (
             name, half, _percent(line["right"]), _percent(line["at_rate"]),
-            f"{line['wrong']['count']} ({100 * line['wrong']['high']:.2g} % at most)",
+            f"{line['wrong']['count']} ({_number(100 * line['wrong']['high'])} % at most)",
             _percent(line["refused"]),
             *(_number(line[key]) for key in ("rms_mm", "ratio_mm", "rms_deg", "ratio_deg")),
             _percent(line["inside_95"]), _number(line["normalised"]), _number(line["ms"]),

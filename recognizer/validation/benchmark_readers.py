@@ -15,6 +15,8 @@ A reader gets a world (`ReaderWorld`) once and the counts of one touch at a time
 from __future__ import annotations
 
 import math
+import os
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -81,6 +83,7 @@ def reader_named(name: str) -> BenchmarkReader:
     if name in READERS:
         return READERS[name]
     module, _, function = name.partition(":")
+    sys.path.append(os.getcwd())  # where an installed command does not look
     try:
         found: BenchmarkReader = getattr(import_module(module), function)
     except (ImportError, AttributeError, ValueError) as error:

@@ -15,13 +15,21 @@ from encoded_objects.base.sensor_type_file import sensor_type_named
 from generator.command import run as encode_object
 from probe.recording.imported import import_array
 from recognizer.validation import encoded_set
-from recognizer.validation.benchmark import FIRST, FROZEN, _figures_of, digest_of, run_benchmark
+from recognizer.validation.benchmark import (
+    FIRST,
+    FROZEN,
+    _figures_of,
+    _read_all,
+    digest_of,
+    run_benchmark,
+)
 from recognizer.validation.benchmark_readers import ReaderWorld, network
 from recognizer.validation.campaign import Campaign, series_of
 from recognizer.validation.command import run
 from recognizer.validation.encoded_set import is_extra
 from recognizer.validation.files import columns_of, read_series
 from recognizer.validation.pipeline import validate
+from recognizer.validation.run import TouchProgress
 
 PAGE = Path(__file__).parents[2] / "docs" / "benchmark.md"
 WORLD = "fsr-8x8"
@@ -42,7 +50,9 @@ def made(tmp_path_factory):
     (folder / "my_reader.py").write_text(code)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(encoded_set, "subprocess", HERE)
-        patch.syspath_prepend(str(folder))
+        patch.setattr("generator.pipeline.plates.overview_pdf", lambda *_: b"")  # drawn elsewhere
+        patch.setattr(sys, "path", [one for one in sys.path if one])  # as of an installed command
+        patch.chdir(folder)
         found = run_benchmark(folder, touches=8, worlds=[WORLD], seed=5,
                               readers=["ours", "chance", "my_reader:reader"])  # fmt: skip
     sys.modules.pop("my_reader", None)
@@ -124,11 +134,29 @@ def test_what_is_not_known_is_refused(tmp_path, capsys):
         run_benchmark(tmp_path, readers=["json:none"])
 
 
+def test_answers_of_a_reader_are_tuples_whose_covariance_is_one(made):
+    folder, _ = made
+    touches = dict(np.load(folder / "public" / f"{WORLD}.npz"))
+
+    def read(*answer):
+        return _read_all(lambda counts: answer, WORLD, touches, TouchProgress(), "mine")
+
+    name = str(touches["names"][0])
+    assert (read(name, 1.0, 2.0, 0.0)["answer"] == 0).all()
+    for spread in (np.eye(2), np.zeros((3, 3))):
+        with pytest.raises(EncodedObjectsError, match="covariance"):
+            read(name, 1.0, 2.0, 0.0, 1.0, spread)
+    with pytest.raises(EncodedObjectsError, match="names 'Ball'"):
+        read("Ball", 1.0, 2.0, 0.0)
+
+
 def test_a_campaign_over_worlds(tmp_path, monkeypatch):
     few = {"COPIES": 2, "SMALL_PITCHES": (3.3,), "LAB_OBJECTS": 1, "OTHER_LABS": 1}
     for name, count in few.items():  # each object takes time to make, as does each process
         monkeypatch.setattr(encoded_set, name, count)
     monkeypatch.setattr(encoded_set, "subprocess", HERE)
+    monkeypatch.setattr("recognizer.validation.report.page_of", lambda *_: "")
+    monkeypatch.setattr("generator.pipeline.plates.overview_pdf", lambda *_: b"")
     (tmp_path / "set.yaml").write_text(SET)
     folder = tmp_path / "run"
     result = validate(

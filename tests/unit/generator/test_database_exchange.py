@@ -1,4 +1,4 @@
-"""Objects between labs: the same on the other side or refused by name, and never shared."""
+"""Objects between labs: the same there or refused by name, never shared; damage, everywhere."""
 
 import shutil
 import sqlite3
@@ -11,14 +11,17 @@ import pytest
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
+from generator.cad import encode
+from generator.command import run
 from generator.database.cells import find_array, held_cells, occupied_cells
 from generator.database.exchange import export_objects, import_objects
+from generator.database.lab import lab_key
 from generator.database.open import database_exists, open_database
 from generator.database.read import list_objects, read_object
 from generator.database.register import ObjectRecord, register, remove, restore, retire
 from generator.database.registered import RegisteredPart
 from generator.database.transaction import read_transaction, write_transaction
-from generator.errors import DatabaseError
+from generator.errors import DatabaseError, LabKeyError
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import cube, tetrahedron
 
@@ -155,6 +158,27 @@ def test_a_failed_export_leaves_what_is_there(exported, file):
     assert [path.name for path in file.parent.iterdir()] == ["exchange.db"]
 
 
+def test_an_object_that_is_here_by_another_name_is_known(lab_url, exported):
+    import_objects(lab_url, str(exported), renamed={"Cube": "Theirs"})
+    make(lab_url, "Other", profile="large", solid=cube(60.0))
+    again = ({}, {"Cube": "Third"}, {"Cube": "Theirs"}, {"Cube": "Other"})
+    for renamed in again:
+        done = import_objects(lab_url, str(exported), renamed=renamed)
+        assert (done.copied, done.known, done.refused) == ((), ("Theirs",), ())
+    assert names(lab_url) == ["Other", "Theirs"]
+
+
+def test_a_lab_moves_with_its_key(lab_url, exported):
+    key = "0123-4567-89AB-CDER"
+    import_objects(lab_url, str(exported), lab_key=key.lower())
+    with read_transaction(open_database(lab_url, writable=False)) as connection:
+        assert lab_key(connection) == key
+    assert import_objects(lab_url, str(exported), lab_key=key).known == ("Cube",)
+    for wrong in ("0123-4567-89AB-CDEF", "5AFR-9W3K-2Z3R-HV0H"):
+        with pytest.raises(LabKeyError):
+            import_objects(lab_url, str(exported), lab_key=wrong)
+
+
 def test_a_rehearsed_import_changes_nothing(lab_url, exported):
     make(lab_url, "Other", profile="large", solid=cube(60.0))
     assert import_objects(lab_url, str(exported), dry_run=True).copied == ("Cube",)
@@ -214,3 +238,53 @@ def test_retired_objects_keep_their_cells_and_are_not_made_again(lab_url):
     sound(lab_url)
     with write_transaction(open_database(lab_url)) as connection:
         assert restore(connection, "Cube").retired_utc == ""
+
+
+@pytest.fixture(scope="module")
+def cube_lab(tmp_path_factory):
+    """Return a database that holds a cube."""
+    path = tmp_path_factory.mktemp("lab") / "lab.db"
+    text = "name: Cube\nshape: {cube: 40 mm}\n"
+    encode(text, database=str(path), folder=path.parent, formats=())
+    return path
+
+
+DAMAGED = {
+    "a definition that is no JSON": "UPDATE arrays SET definition = '{'",
+    "a definition nested too deep": f"UPDATE arrays SET definition = '{'[' * 5000}'",
+    "a definition of another type": "UPDATE arrays SET definition = '[]'",
+    "an array that is gone": "DELETE FROM arrays",
+    "an alphabet that is none": "UPDATE alphabets SET definition = 'null'",
+    "a spec that is no JSON": "UPDATE provenance SET spec = ''",
+    "a text where a number was": "UPDATE cells SET x_mm = 'x'",
+    "bytes that are no text": "UPDATE objects SET name = CAST(x'ff' AS TEXT)",
+    "a schema that is no text": "UPDATE sqlite_master SET sql = CAST(x'ff' AS TEXT), "
+    "name = CAST(x'ff' AS TEXT) WHERE name = 'faces'",
+    "a table that is gone": "DROP TABLE faces",
+    "a view": "CREATE VIEW v AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT 1 FROM c) "
+    "SELECT * FROM c",
+    "a trigger": "CREATE TRIGGER t AFTER INSERT ON objects BEGIN DELETE FROM objects; END",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGED)
+def test_a_damaged_database_says_so_at_every_command(damage, cube_lab, tmp_path, capsys):
+    path = tmp_path / "lab.db"
+    shutil.copy(cube_lab, path)
+    with closing(sqlite3.connect(path)) as plain, plain:
+        plain.execute("PRAGMA foreign_keys = OFF")
+        plain.execute("PRAGMA writable_schema = ON")
+        plain.execute(DAMAGED[damage])
+    (tmp_path / "box.yaml").write_text("name: Box\nshape: {cube: 30 mm}\n")
+    box = [str(tmp_path / "box.yaml"), "--dry-run", "-o", str(tmp_path / "out")]
+    codes = set()
+    commands = (["list"], ["show", "Cube"], ["lab"], ["export", str(tmp_path / "o.db")], box)
+    for command in (*commands, ["import", str(path)]):
+        lab = tmp_path / "new.db" if "import" in command else path
+        code = run([*command, "--database", str(lab)])
+        said = capsys.readouterr().err
+        codes.add(code)
+        assert code in (0, 4), said
+        assert code == 0 or (f"{tmp_path}/" in said and "fix: " in said), said
+        assert not list(tmp_path.glob(".*"))
+    assert 4 in codes

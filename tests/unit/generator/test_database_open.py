@@ -16,8 +16,6 @@ from alembic.migration import MigrationContext
 from sqlalchemy import select, text
 
 from generator.array.lab_key import read_lab_key
-from generator.cad import encode
-from generator.command import run
 from generator.database import migrate, tables
 from generator.database.cells import occupied_cells
 from generator.database.lab import lab_key
@@ -126,56 +124,6 @@ def test_a_file_that_is_no_whole_database_is_left_alone(tmp_path, content):
     assert path.read_bytes() == before
 
 
-@pytest.fixture(scope="module")
-def cube_lab(tmp_path_factory):
-    """Return a database that holds a cube."""
-    path = tmp_path_factory.mktemp("lab") / "lab.db"
-    text = "name: Cube\nshape: {cube: 40 mm}\n"
-    encode(text, database=str(path), folder=path.parent, formats=())
-    return path
-
-
-DAMAGED = {
-    "a definition that is no JSON": "UPDATE arrays SET definition = '{'",
-    "a definition nested too deep": f"UPDATE arrays SET definition = '{'[' * 5000}'",
-    "a definition of another type": "UPDATE arrays SET definition = '[]'",
-    "an array that is gone": "DELETE FROM arrays",
-    "an alphabet that is none": "UPDATE alphabets SET definition = 'null'",
-    "a spec that is no JSON": "UPDATE provenance SET spec = ''",
-    "a text where a number was": "UPDATE cells SET x_mm = 'x'",
-    "bytes that are no text": "UPDATE objects SET name = CAST(x'ff' AS TEXT)",
-    "a schema that is no text": "UPDATE sqlite_master SET sql = CAST(x'ff' AS TEXT), "
-    "name = CAST(x'ff' AS TEXT) WHERE name = 'faces'",
-    "a table that is gone": "DROP TABLE faces",
-    "a view": "CREATE VIEW v AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT 1 FROM c) "
-    "SELECT * FROM c",
-    "a trigger": "CREATE TRIGGER t AFTER INSERT ON objects BEGIN DELETE FROM objects; END",
-}
-
-
-@pytest.mark.parametrize("damage", DAMAGED)
-def test_a_damaged_database_says_so_at_every_command(damage, cube_lab, tmp_path, capsys):
-    path = tmp_path / "lab.db"
-    shutil.copy(cube_lab, path)
-    with closing(sqlite3.connect(path)) as plain, plain:
-        plain.execute("PRAGMA foreign_keys = OFF")
-        plain.execute("PRAGMA writable_schema = ON")
-        plain.execute(DAMAGED[damage])
-    (tmp_path / "box.yaml").write_text("name: Box\nshape: {cube: 30 mm}\n")
-    box = [str(tmp_path / "box.yaml"), "--dry-run", "-o", str(tmp_path / "out")]
-    codes = set()
-    commands = (["list"], ["show", "Cube"], ["lab"], ["export", str(tmp_path / "o.db")], box)
-    for command in (*commands, ["import", str(path)]):
-        lab = tmp_path / "new.db" if "import" in command else path
-        code = run([*command, "--database", str(lab)])
-        said = capsys.readouterr().err
-        codes.add(code)
-        assert code in (0, 4), said
-        assert code == 0 or (f"{tmp_path}/" in said and "fix: " in said), said
-        assert not list(tmp_path.glob(".*"))
-    assert 4 in codes
-
-
 def test_a_read_only_place_is_refused_for_writing_alone(unprivileged):
     folder, path = unprivileged, unprivileged / "lab.db"
     open_database(str(path))
@@ -229,6 +177,9 @@ def guarded_server(postgresql_server):
         file.write_text(rules + before)
         connection.execute("CREATE ROLE lab LOGIN PASSWORD 'right'")
         connection.execute("CREATE ROLE guest LOGIN")
+        connection.execute("CREATE ROLE crowd LOGIN CONNECTION LIMIT 0")
+        connection.execute("CREATE DATABASE closed")
+        connection.execute("REVOKE CONNECT ON DATABASE closed FROM PUBLIC")
         connection.execute("SELECT pg_reload_conf()")
         address = postgresql_server.partition("@")[2].partition("/")[0]
         for _ in range(200):  # the server takes the rules over in its own time
@@ -239,8 +190,9 @@ def guarded_server(postgresql_server):
             time.sleep(0.05)
         yield address
         file.write_text(before)
-        connection.execute("DROP ROLE lab")
-        connection.execute("DROP ROLE guest")
+        connection.execute("DROP DATABASE closed")
+        for role in ("lab", "guest", "crowd"):
+            connection.execute(f"DROP ROLE {role}")
         connection.execute("SELECT pg_reload_conf()")
 
 
@@ -256,7 +208,9 @@ def guarded_server(postgresql_server):
         ("postgres:secret@{}/nowhere", "has no database 'nowhere'", "createdb nowhere"),
         ("lab:secret@no.such.host.invalid/x", "there is no host 'no.such.host.invalid'", "host"),
         ("lab:secret@127.0.0.1:99999/x", "invalid port number", "port"),
-        ("guest:secret@{}/postgres", "may not be written", "choose another"),
+        ("guest:secret@{}/postgres", "permission denied for schema public", "docs/lab.md"),
+        ("guest:secret@{}/closed", "may not connect to the database 'closed'", "GRANT CONNECT"),
+        ("crowd:secret@{}/postgres", "takes no more connections now", "in a moment"),
     ],
 )  # fmt: skip
 def test_a_server_that_is_not_reached_says_why(guarded_server, url, cause, fix):
@@ -272,6 +226,51 @@ def test_a_server_that_is_not_reached_says_why(guarded_server, url, cause, fix):
     right = f"postgresql://lab:right@{guarded_server}/postgres"
     with pytest.raises(DatabaseError, match="no objects are registered"):
         open_database(right, writable=False)
+
+
+@pytest.fixture
+def guest_of(postgresql_server):
+    """Return a function that grants a new user rights in a schema; returns the URL of theirs."""
+    import psycopg
+
+    with psycopg.connect(postgresql_server, autocommit=True) as connection:
+        connection.execute("CREATE ROLE reader LOGIN")
+
+        def url(lab, *grants):
+            schema = lab.rpartition("%3D")[2]
+            for grant in (f"USAGE ON SCHEMA {schema}", *grants):
+                connection.execute(f"GRANT {grant.format(schema)} TO reader")
+            return lab.replace("postgres@", "reader@")
+
+        yield url
+        connection.execute("DROP OWNED BY reader")
+        connection.execute("DROP ROLE reader")
+
+
+def test_a_right_that_is_missing_is_named(new_database, guest_of):
+    lab = new_database("postgresql")
+    open_database(lab)
+    theirs = guest_of(lab)
+    for _ in range(2):
+        said = refused(theirs, writable=False)
+        assert "permission denied for table meta" in said
+        assert "docs/lab.md, Rights" in said
+        assert "written" not in said  # they only read
+    open_database(guest_of(lab, "SELECT ON ALL TABLES IN SCHEMA {}"), writable=False)
+    before = of_version(1, new_database("postgresql"))
+    said = refused(guest_of(before, "SELECT ON ALL TABLES IN SCHEMA {}"), writable=False)
+    assert "schema version 1, must be brought to 3" in said
+    assert "opened once by who may write it" in said
+
+
+def test_a_reader_waits_for_a_lock_no_longer_than_it_was_told(new_database):
+    import psycopg
+
+    lab = new_database("postgresql")
+    open_database(lab)
+    with psycopg.connect(lab) as other:
+        other.execute("LOCK TABLE meta IN ACCESS EXCLUSIVE MODE")
+        assert "keep the database locked" in refused(lab, writable=False, wait_s=0.2)
 
 
 # Earlier schema versions; that all their rows are there afterwards, tests/corpora hold.

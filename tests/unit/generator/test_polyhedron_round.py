@@ -222,7 +222,8 @@ def test_the_same_solid_again_keeps_its_cells_and_another_is_refused(tmp_path):
 
 
 def test_settings_are_those_of_a_spec_and_errors_name_them(tmp_path):
-    result = encoded(tmp_path, symbols={"pitch": "8 mm"}, layout="faces", profile="large")
+    pitch = np.float64(8)  # of a notebook
+    result = encoded(tmp_path, symbols={"pitch": pitch}, layout="faces", profile="large")
     assert (result.layout.pitch_mm, result.layout.kind) == (8.0, "faces")
     for given, said in (
         ({"profile": "lagre"}, r"encode\(\):2:10: error: unknown profile 'lagre'"),

@@ -192,6 +192,15 @@ def test_a_table_of_ours_comes_back_with_times_numbers_wrist_and_poses(tmp_path)
         np.testing.assert_array_equal(values, after[name])
 
 
+def test_numbers_of_columns_are_no_image(tmp_path):
+    table = COUNTS[:5].reshape(5, -1)
+    for head, given in ((range(256), table), ([], table)):
+        lines = [",".join(map(str, line)) for line in (head, *given)]
+        (tmp_path / "a.csv").write_text("\n".join(lines))
+        made = import_array(tmp_path / "a.csv", tmp_path / "a.h5", replace=True)
+        np.testing.assert_array_equal(made.block().counts, COUNTS[:5])
+
+
 def test_times_that_are_not_read_are_named(tmp_path):
     np.savez(tmp_path / "a.npz", frames=COUNTS, time=np.arange(70) / 50, rate=np.array([50]))
     names = ["time_s\0", *(f"r{r}c{c}" for r in range(16) for c in range(16))]

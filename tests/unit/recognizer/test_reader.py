@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from recorded import record
 
-from encoded_objects import simulate
+from encoded_objects import encode, simulate
 from encoded_objects.base.errors import UsageError
 from encoded_objects.base.sensor_type import Overlay, SensorType, SensorTypeError
 from encoded_objects.base.sensor_type_file import sensor_type_named
+from generator.command import run
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.contact.tabs import tabs
@@ -19,7 +20,7 @@ from probe.simulate.registered import registered_surface
 from recognizer.errors import LabError, SensorStateError, TouchError
 from recognizer.touch import recognition as cause
 from recognizer.touch.diagnose import diagnose
-from recognizer.touch.lab import open_lab
+from recognizer.touch.lab import Lab, open_lab
 from recognizer.touch.options import Effort, ReaderOptions
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import Cause, RunnerUp, refusal
@@ -152,6 +153,22 @@ def test_a_reader_takes_an_open_lab_and_a_type(reader, given, error, said):
 
 def test_a_reader_takes_the_name_of_a_type(reader):
     assert Reader(reader.lab, "fsr-8x8").sensor == sensor_type_named("fsr-8x8")
+
+
+def test_a_lab_that_was_changed_meanwhile_says_so(tmp_path):
+    url = str(tmp_path / "lab.db")
+    spec = {"name": "Plate", "shape": {"box": [40, 30, 20]}}
+    encode(spec, database=url, formats=())
+    labs = [open_lab(url) for _ in range(2)]
+    encode({**spec, "shape": {"cube": 50}}, database=url, formats=(), replace=True)
+    for lab in labs:
+        with pytest.raises(LabError, match="made again after the lab was opened"):
+            lab.arrays[0].face(0)
+        run(["retire", "Plate", "--free", "--yes", "--database", url])
+
+
+def test_a_lab_shows_no_password():
+    assert "secret" not in repr(Lab("postgresql://lab:secret@host/objects", ()))
 
 
 def test_an_effort_is_of_whole_numbers():
