@@ -154,11 +154,9 @@ def compare(before: Entries, after: Entries) -> tuple[Entries, list[str]]:
     """Return the entries to store, old ones where nothing changed, and lines on what did."""
     new = [name for name in sorted(after) if name not in before]
     gone = [name for name in sorted(before) if name not in after]
-    changed = {
-        name: unlike
-        for name in sorted(after)
-        if name in before and (unlike := list(differences(before[name], after[name])))
-    }
+    both = [name for name in sorted(after) if name in before]
+    apart = {name: list(differences(before[name], after[name])) for name in both}
+    changed = {name: unlike for name, unlike in apart.items() if unlike}
     lines = []
     for said, names in (("new", new), ("gone", gone), ("changed", list(changed))):
         if names:

@@ -5,7 +5,6 @@ import lzma
 import math
 import queue
 import signal
-import socket
 from pathlib import Path
 
 import h5py
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 import zenoh
 from corpora.commands import DATA
+from postgres import free_port
 from programs import started
 from reference.emulated_probe import emulated_port
 from rosbags.highlevel import AnyReader
@@ -167,9 +167,7 @@ def test_images_and_answers_are_kept_as_ros_messages(asked, lab):
 
 def test_what_is_followed_is_published(lab):
     """Over zenoh, to its own client: images and answers of the command."""
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        port = one.getsockname()[1]
+    port = free_port()
     words = ("--port", "sim:lab.db#Cube/F1?x=28&y=31&period=1", "--follow", "--publish",
              f"zenoh://127.0.0.1:{port}/bench")  # fmt: skip
     config = zenoh.Config()

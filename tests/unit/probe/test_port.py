@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from postgres import free_port
 
 from probe.client.client import Client
 from probe.command import run
@@ -86,9 +87,8 @@ IDENT = IdentPacket(0, 0, name="test")
 
 
 def packet(seq, shape=(16, 16)) -> bytes:
-    return encode(
-        FramePacket(seq % 65536, 10_000 * seq, np.full(shape, 7, np.uint16), np.zeros(4, np.uint16))
-    )
+    counts, wrist = np.full(shape, 7, np.uint16), np.zeros(4, np.uint16)
+    return encode(FramePacket(seq % 65536, 10_000 * seq, counts, wrist))
 
 
 def spoilt(seq) -> bytes:
@@ -181,11 +181,9 @@ def test_a_recording_whose_device_goes_says_that_it_ended_early(tmp_path, monkey
     monkeypatch.setattr("probe.command.recorded._SILENT_S", 0.5)
     out = tmp_path / "touch.h5"
     with sending(packet, goes_after=60) as name:
-        url = f"serial://{name}"
-        code = run(["record", url, "-o", str(out), "--seconds", "1"])
+        assert run(["record", f"serial://{name}", "-o", str(out), "--seconds", "1"]) == 3
     said = capsys.readouterr().err
-    assert code == 3
-    assert f"{url}: error: the recording ended early: 0." in said
+    assert f"serial://{name}: error: the recording ended early: 0." in said
     assert "of 1 s" in said
     assert len(Recording(out)) > 30
 
@@ -302,14 +300,11 @@ def sending_images(images):
     return sending(block, greeted=False)
 
 
-def still_image():
-    """Return an image with the marker in it."""
-    image = np.zeros(LENGTH, np.uint8)
-    image[100:102], image[200] = (0xAA, 0x55), 7
-    return image
+STILL = np.zeros((1, LENGTH), np.uint8)
+STILL[0, 100:102], STILL[0, 200] = (0xAA, 0x55), 7  # the marker in it
 
 
-@pytest.mark.parametrize("images", [images_of(9), still_image()[None]], ids=["changing", "still"])
+@pytest.mark.parametrize("images", [images_of(9), STILL], ids=["changing", "still"])
 def test_a_board_is_read_over_a_line(images):
     true = {image.tobytes() for image in images}
     with sending_images(images) as device, Client(f"flexitac://{device}") as client:
@@ -358,18 +353,15 @@ EXAMPLE = Path(__file__).parents[3] / "docs/examples/udp_probe"
 @pytest.fixture
 def udp(tmp_path, monkeypatch):
     """Install the package as pip would, and yield a free port of this machine."""
-    project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]
+    entries = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]["entry-points"]
     info = tmp_path / "udp_probe-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: udp-probe\nVersion: 1.0\n")
-    entries = project["entry-points"][GROUP].items()
-    text = "".join(f"{scheme} = {opener}\n" for scheme, opener in entries)
+    text = "".join(f"{scheme} = {opener}\n" for scheme, opener in entries[GROUP].items())
     (info / "entry_points.txt").write_text(f"[{GROUP}]\n{text}lost = no_such_module:Port\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.syspath_prepend(EXAMPLE)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        return free.getsockname()[1]
+    return free_port()
 
 
 def test_images_of_another_package_are_frames(udp):
