@@ -186,11 +186,12 @@ def with_profile(
 
 def _tree_at(path: Path) -> Tree:
     """Return what a spec file says; raises `SpecError`, also for a model in its place."""
-    from generator.polyhedron.read import MESHES, STEP
+    if path.suffix.lower() not in (".yaml", ".yml") and path.is_file():
+        from generator.polyhedron.read import MESHES, STEP  # costs start-up
 
-    if path.suffix.lower() in (*STEP, *MESHES) and path.is_file():
-        fix = f"encode-object init '{path}' -o '{path.stem}.yaml' writes one"
-        raise SpecError([Problem("this is a model, not a spec", fix, file=str(path))])
+        if path.suffix.lower() in (*STEP, *MESHES):
+            fix = f"encode-object init '{path}' -o '{path.stem}.yaml' writes one"
+            raise SpecError([Problem("this is a model, not a spec", fix, file=str(path))])
     return read_tree(path, SPEC)
 
 
