@@ -18,6 +18,7 @@ from pathlib import Path
 import httpx
 from bench_page import running
 from hostile_recordings import write_zeros
+from programs import wait_for
 
 PATIENCE_S = 20.0  #: for a server that does not end, or answer
 LONG = 1_900_000  #: frames, which take 20 s of CPU to read
@@ -217,10 +218,8 @@ def held(root: Path, name: str, number: signal.Signals, seconds: float) -> dict[
         address, process = stack.enter_context(running(*words, folder=folder, errors=errors))
         load = Load(address.split("/")[2], folder)
         stack.callback(load.close)
-        end_s = time.monotonic() + PATIENCE_S
-        while name not in EMPTY and not httpx.get(address + "api/lab").json()["encodings"]:
-            assert time.monotonic() < end_s
-            time.sleep(0.1)
+        if name not in EMPTY:
+            wait_for(lambda: httpx.get(address + "api/lab").json()["encodings"], PATIENCE_S)
         meter = Meter(process.pid)
         stack.callback(meter.ended.set)
         LOADS[name](load)

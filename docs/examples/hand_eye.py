@@ -3,7 +3,7 @@
 For each touch: T_base_flange T_flange_sensor = T_base_object T_object_probe, where the controller
 says the first (here metres and quaternions) and the answer of the touch the last. A touch measures
 x, y and the turn on its face well. How deep the tips sink in and how askew the sensor lies it does
-not measure: the depth cannot be told from where the sensor ends, and is assumed.
+not measure: depth and the end of the sensor look the same, so that the depth is assumed.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ def pose(shift: ArrayLike, rotation: Rotation) -> np.ndarray:
     return T
 
 
-def placed(six: np.ndarray) -> np.ndarray:
+def pose_of(six: np.ndarray) -> np.ndarray:
     """Return the pose of a shift (mm) and a rotation vector (rad)."""
     return pose(six[:3], Rotation.from_rotvec(six[3:]))
 
@@ -42,7 +42,7 @@ for face in ("F2", "F3", "F4", "F6"):
                          seed=int(rng.integers(1000)))  # fmt: skip
         held = T_base_object @ touch.truth()["touches"][0]["T_object_probe"]
         flange = (
-            held @ np.linalg.inv(T_flange_sensor) @ placed(rng.normal(0, [0.1] * 3 + [5e-4] * 3))
+            held @ np.linalg.inv(T_flange_sensor) @ pose_of(rng.normal(0, [0.1] * 3 + [5e-4] * 3))
         )
         said.append((flange[:3, 3] / 1000, Rotation.from_matrix(flange[:3, :3]).as_quat()))
         images.append(touch.counts)
@@ -58,7 +58,7 @@ pairs = [
 
 def misfit(unknown: np.ndarray) -> np.ndarray:
     """Return how far the two ways around differ at every touch, in standard deviations."""
-    sensor, part = placed(unknown[:6]), placed(unknown[6:])
+    sensor, part = pose_of(unknown[:6]), pose_of(unknown[6:])
     found = []
     for T_base_flange, T_object_probe in pairs:
         off = np.linalg.inv(part @ T_object_probe) @ T_base_flange @ sensor
@@ -76,7 +76,7 @@ for turn in range(0, 360, 30):  # roughly: the sensor's z is the flange's, the o
     ]))  # fmt: skip
 nearest = min(guesses, key=lambda unknown: np.linalg.norm(misfit(unknown)))
 best = least_squares(misfit, nearest, loss="soft_l1", x_scale="jac")
-off = np.linalg.inv(T_flange_sensor) @ placed(best.x[:6])
+off = np.linalg.inv(T_flange_sensor) @ pose_of(best.x[:6])
 turned = np.degrees(np.linalg.norm(Rotation.from_matrix(off[:3, :3]).as_rotvec()))
 print(f"{len(pairs)} of {len(images)} touches answered; T_flange_sensor is off by")
 print(f"{np.hypot(*off[:2, 3]):.2f} mm across, {off[2, 3]:.2f} mm along, {turned:.2f} degrees")

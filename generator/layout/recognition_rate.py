@@ -96,10 +96,14 @@ class PartRate:
         return {name: getattr(self, name) for name in ("at_once", "within_three", "encoded")}
 
     @property
+    def touched(self) -> float:
+        """Return the share of the surface that is touched: of a tag its encoded side."""
+        return self.encoded if self.one_side else 1.0
+
+    @property
     def text(self) -> str:
         """Say all of it."""
-        side = self.encoded if self.one_side else 1.0
-        later = ""
+        side, later = self.touched, ""
         if self.within_three is not None:
             later = f", {percent(self.within_three / side)} within three"
         if self.one_side:

@@ -187,7 +187,8 @@ def overhangs(plan: ObjectPlan, layout: Layout) -> Overhangs:
         needed += f", {upright} symbols stand out sideways"
     flat = not (polyhedron.surfaces or polyhedron.blank) and (over or upright)
     spec, better = plan.spec, ""
-    with suppress(SolidError):  # panels would be too small for their wall
-        if flat and plain_panels(polyhedron, spec.wall_mm, plan.printer, spec.gap_mm, spec.name):
+    if flat:
+        with suppress(SolidError):  # panels would be too small for their wall
+            plain_panels(polyhedron, spec.wall_mm, plan.printer, spec.gap_mm, spec.name)
             better = "; with  parts: panels  nothing hangs over"
     return Overhangs(f"{lies}, {needed}{better}", over)

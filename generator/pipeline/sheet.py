@@ -109,9 +109,9 @@ def build_sheet(
         title = f"Check by {'three touches' if len(checks) == 3 else 'touch'}"
         text = _CHECK.format(force=LIGHT_N * force_share(plan.spec.sensor)) + _MIXED * panelled
         if promise is not None:
-            side = promise.encoded if promise.one_side else 1.0
             where = "on its encoded side" if promise.one_side else "anywhere"
-            text += f" {percent(promise.at_once / side)} of touches {where} are answered at once."
+            share = percent(promise.at_once / promise.touched)
+            text += f" {share} of touches {where} are answered at once."
         sections.append(Section(title, text, ("", "touch", "must answer"), checks))
     return sheet_html(f"{plan.spec.name}: build sheet", sections)
 

@@ -24,6 +24,7 @@ from generator.spec.problem import SPEC, SpecError, mark_of
 from generator.spec.resolve import folder_name, resolve
 from generator.spec.resolved import AUTO, ObjectSpec, ShapeSpec
 from generator.spec.settings import Defaults, NamedSettings, ObjectSettings, SharedSettings
+from generator.spec.shape import is_model
 
 OBJECTS_MAX = 10_000
 PROBLEMS_SHOWN = 25
@@ -186,12 +187,9 @@ def with_profile(
 
 def _tree_at(path: Path) -> Tree:
     """Return what a spec file says; raises `SpecError`, also for a model in its place."""
-    if path.suffix.lower() not in (".yaml", ".yml") and path.is_file():
-        from generator.polyhedron.read import MESHES, STEP  # costs start-up
-
-        if path.suffix.lower() in (*STEP, *MESHES):
-            fix = f"encode-object init '{path}' -o '{path.stem}.yaml' writes one"
-            raise SpecError([Problem("this is a model, not a spec", fix, file=str(path))])
+    if is_model(path) and path.is_file():
+        fix = f"encode-object init '{path}' -o '{path.stem}.yaml' writes one"
+        raise SpecError([Problem("this is a model, not a spec", fix, file=str(path))])
     return read_tree(path, SPEC)
 
 

@@ -5,6 +5,7 @@ What only geometry can tell (closed, planar, oriented) is checked where the poly
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -44,6 +45,15 @@ Scale = Annotated[
     BeforeValidator(scale_factor),
     WithJsonSchema({"type": "number", "minimum": SCALES[0], "maximum": SCALES[1]}),
 ]
+
+
+def is_model(path: Path) -> bool:
+    """Return whether a file is a model by its ending."""
+    if path.suffix.lower() in ("", ".yaml", ".yml"):
+        return False
+    from generator.polyhedron.read import MESHES, STEP  # costs start-up
+
+    return path.suffix.lower() in (*STEP, *MESHES)
 
 
 def face_loops(value: Any) -> tuple[tuple[int, ...], ...]:

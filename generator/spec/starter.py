@@ -8,7 +8,7 @@ from pathlib import Path
 
 from encoded_objects.base.document import Problem, suggest
 from generator.spec.problem import SpecError
-from generator.spec.shape import EXAMPLES, OTHER_NAMES
+from generator.spec.shape import EXAMPLES, OTHER_NAMES, is_model
 
 _POLYHEDRON = """shape:
   polyhedron:
@@ -78,10 +78,8 @@ def starter(shape: str, file: str = "", model: str = "") -> str:
 
 def starter_named(shape: str, file: Path | None = None) -> tuple[str, str]:
     """Return the kind of a shape or a model, and a spec `file`; raises `SpecError` for neither."""
-    from generator.polyhedron.read import MESHES, STEP
-
     name = file.name if file else ""
-    if Path(shape).suffix.lower() in (*STEP, *MESHES):
+    if is_model(Path(shape)):
         return "file", starter("file", name, os.path.relpath(shape, file.parent if file else "."))
     word = shape.lower().replace("-", "_").replace(" ", "_")
     kind = OTHER_NAMES.get(word, word)

@@ -198,7 +198,7 @@ def _answers(
     if belief is not None and options.recording is not None:
         touches = refuse_single(touches, source.place, touches_for(reader))
     warned = ""
-    placed: list[tuple[Signal, int]] = []  # touches of a scan whose pose is known
+    posed: list[tuple[Signal, int]] = []  # touches of a scan whose pose is known
     last: Answer | None = None  # that answers
     for count, touch in enumerate(touches, start=1):
         if interrupted.is_set():  # a touch that is cut short is none
@@ -210,7 +210,8 @@ def _answers(
             signal = reader.signal(touch.counts, calibration=source.calibration)
             pose = pose_during(touch, count, by_touch, options.joint_error, source.place)
             found = belief.add(signal, pose, seq=touch.seq)
-            placed += [(signal, touch.seq)] if pose is not None else []
+            if pose is not None and not options.follow:  # which has no end
+                posed.append((signal, touch.seq))
         joints = by_touch[count - 1] if len(by_touch) >= count else options.joints_deg
         in_base, trouble = _object_in_base(touch, found, joints, options.joint_error)
         answer = Answer(touch, found, in_base, None if belief is None else belief.touches)
@@ -226,13 +227,14 @@ def _answers(
         until_answered = belief is not None and options.port and not options.follow
         if count == most or (found and until_answered):
             return
-    if belief is not None and placed and not belief.answer:
-        alone = belief_for(reader, method)
-        for signal, seq in placed:
-            alone.add(signal, None, seq=seq)
-        if alone.answer:
-            message(POSES.format(object=alone.answer.object, face=alone.answer.face))
-    if belief is None or not belief.touches or found or not belief.answer:
+    if belief is None or not belief.touches or found:
+        return
+    if not belief.answer:
+        without = belief_for(reader, method)
+        for signal, seq in posed:
+            without.add(signal, None, seq=seq)
+        if without.answer:
+            message(POSES.format(object=without.answer.object, face=without.answer.face))
         return
     # the answer of the scan, though its last touch could not be read
     if last is not None and last.found is belief.answer:

@@ -16,18 +16,23 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, Engine, select
+from sqlalchemy import Connection, Engine
 
 from encoded_objects.base.compiled import addresses
 from encoded_objects.base.errors import without_password
 from encoded_objects.base.output import count_of
 from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
 from generator.array import FoldedArray, ProductArray
-from generator.database import tables
 from generator.database.as_built import AsBuilt, read_as_built
 from generator.database.cells import held_cells
 from generator.database.open import open_database
-from generator.database.read import make_array, read_object, read_styles, read_surfaces
+from generator.database.read import (
+    find_object,
+    make_array,
+    read_object,
+    read_styles,
+    read_surfaces,
+)
 from generator.database.registered import (
     Developable,
     RegisteredObject,
@@ -161,9 +166,10 @@ class EmbossedArray:
             name = self.names[object_id]
             with read_transaction(self.engine) as connection:
                 found = _read_faces(connection, object_id, name)
+            cells = np.bincount(self.owners[:-1], minlength=len(self.faces))
             for mine in self.faces_of(name):
                 one = found.get(int(self.faces[mine, 1]))
-                held = np.full(np.count_nonzero(self.owners == mine), mine)
+                held = np.full(cells[mine], mine)
                 if not one or not np.array_equal(self.at(one.rows, one.columns)[0], held):
                     raise LabError(
                         f"'{name}' was removed or made again after the lab was opened",
@@ -317,8 +323,8 @@ def radii_of(surfaces: Iterable[Developable]) -> tuple[float, ...]:
 @of_rows
 def _read_faces(connection: Connection, object_id: int, name: str) -> dict[int, EncodedFace]:
     """Return encoded faces of an object by their numbers in it; none where it is no longer."""
-    held = select(tables.objects.c.object_id).where(tables.objects.c.name == name)
-    if connection.execute(held).scalar() != object_id:
+    entry = find_object(connection, name)
+    if entry is None or entry.object_id != object_id:
         return {}
     prints = (*read_as_built(connection, object_id), *read_as_built(connection))
     return dict(_encoded_faces(read_object(connection, name), prints))

@@ -24,7 +24,7 @@ from recognizer.touch.source import source_of
 if TYPE_CHECKING:
     from probe.calibration import Calibration
 
-_LARGE = 1e100  #: no reading; squares of smaller ones, and of more than one part of it, are numbers
+_LARGE = 1e100  #: no reading is as large, nor as small as 1 over it: squares stay in range
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

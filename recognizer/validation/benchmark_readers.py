@@ -83,7 +83,8 @@ def reader_named(name: str) -> BenchmarkReader:
     if name in READERS:
         return READERS[name]
     module, _, function = name.partition(":")
-    sys.path.append(os.getcwd())  # where an installed command does not look
+    if (here := os.getcwd()) not in sys.path:  # where an installed command does not look
+        sys.path.append(here)
     try:
         found: BenchmarkReader = getattr(import_module(module), function)
     except (ImportError, AttributeError, ValueError) as error:

@@ -1,7 +1,6 @@
 """Parts made through the page of `open-bench`, in a real browser: as by the command, or refused."""
 
 import json
-import time
 from urllib.parse import parse_qsl
 
 import httpx
@@ -9,6 +8,7 @@ import pytest
 from bench_loads import LARGE, family
 from bench_page import downloaded, made, making, opened_to_make, running, until
 from playwright.sync_api import expect
+from programs import wait_for
 
 from generator.command import run as encode_object
 from recognizer.bench import encode_object as bench_commands
@@ -167,10 +167,7 @@ def test_it_ends_with_the_page_that_waits_for_it(own):
     ask(address, CUBE)
     with pytest.raises(httpx.ReadTimeout):
         ask(address, LARGE, path="make", timeout=2)
-    end_s = time.monotonic() + 10.0
-    while len(family(process.pid)) > 2:  # the server, and a process that waits for the next
-        assert time.monotonic() < end_s
-        time.sleep(0.05)
+    wait_for(lambda: len(family(process.pid)) <= 2, 10)  # the server, one that waits for the next
 
 
 def test_a_part_of_very_many_symbols_is_not_drawn(monkeypatch):
