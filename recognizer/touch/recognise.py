@@ -121,7 +121,7 @@ def _search_twice(touch: TouchImages, seq: int) -> tuple[Recognition, list[Verif
     judged = _judge(touch.reader, first, answer)
     best = first[0] if first else None
     if not may_find_more(touch.reader, touch.signal, answer, judged, best):
-        if judged and best is not None and is_nearly_chance(judged, best.evidence):
+        if judged and is_nearly_chance(judged):
             return _confirm(touch, judged, first)
         return judged, first
     second = verify_hypotheses(touch, options.thorough)

@@ -25,7 +25,6 @@ from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, Recognition
 from recognizer.touch.signal import Signal, mean_of_strongest, quantile, sorted_around
-from recognizer.touch.verdict import Evidence
 
 PRESSED = 0.15  #: share of the strongest readings from which a tactel is pressed
 AROUND = 5  #: tactels, side of a square in which strokes and gaps lie
@@ -42,9 +41,8 @@ BARE = 0.25
 FINEST, COARSEST = 3.1, 5.0  #: tactels, pitches between which gaps were measured
 LEAST_BORDERS = LEAST_SHARE**2  #: share of places that a border of two lines leaves
 INK = 0.44  #: share of a cell's tactels that its symbol presses, and some around it
-SURE_RATIO = 20.0  #: nats from which a place's symbols are there beyond doubt
 DOUBT = 1e-3  #: of an answer that a better fit may bring below the limit
-NEARLY_CHANCE = 1e-5  #: doubt above which an answer by less than `SURE_RATIO` is confirmed
+NEARLY_CHANCE = 1e-5  #: doubt above which an answer is confirmed
 
 
 def may_find_more(
@@ -63,7 +61,7 @@ def may_find_more(
         return True
     if reader.sensor.overlay.kind != "tab" or any(each.radii_mm for each in reader.lab.arrays):
         # a round face presses few tactels; an answer that chance nearly allows needs confirmation
-        return not judged or judged.doubt is None or judged.doubt > NEARLY_CHANCE
+        return not judged or judged.doubt is None or is_nearly_chance(judged)
     if answer:
         return judged.reason == BY_CHANCE and judged.doubt is not None and judged.doubt <= DOUBT
     inliers = best.evidence.inliers
@@ -72,11 +70,9 @@ def may_find_more(
     return _may_show_symbols(reader, signal)
 
 
-def is_nearly_chance(judged: Recognition, evidence: Evidence) -> bool:
+def is_nearly_chance(judged: Recognition) -> bool:
     """Return whether a wide search has to confirm an answer, as chance nearly allows it."""
-    if judged.doubt is None or judged.doubt <= NEARLY_CHANCE:
-        return False
-    return evidence.log_likelihood_ratio < SURE_RATIO
+    return judged.doubt is not None and judged.doubt > NEARLY_CHANCE
 
 
 def shows_strokes(reader: PreparedLab, signal: Signal, least: float = GAPS) -> bool:

@@ -157,14 +157,13 @@ def reads(small, monkeypatch):
           for doubt, tries in ((0.0, 1), (1e-5, 1))),
         *(([one(inliers=n), rival()], [one(inliers=n), rival()], {"doubt": 1.01e-4},
            (BY_CHANCE, 40.0, 1.01e-4, 2, 1)) for n in (16, 10)),
-        # what chance nearly allows is looked at again, unless much speaks for it
+        # what chance nearly allows is looked at again
         ([one(), rival()], [one()], {"doubt": (1.01e-5, 1e-3)}, ("", 40.0, 1.01e-5, 2, 0)),
         ([one(), rival()], [one()], {"doubt": (1e-4, 1e-3)}, ("", 40.0, 1e-4, 2, 0)),
         ([one(), rival()], [one(), rival()], {"doubt": (1e-4, 1.01e-3)},
          (BY_CHANCE, 40.0, 1.01e-3, 2, 1)),
         ([one(), rival()], [one("there")], {"doubt": 1e-4}, (AMBIGUOUS, 0.0, None, 2, 1)),
         ([one(), rival()], [], {"doubt": 1e-4}, (AMBIGUOUS, 0.0, None, 2, 1)),
-        ([one(log_likelihood_ratio=20.0), rival()], [], {"doubt": 1e-4}, ("", 40.0, 1e-4, 1, 0)),
         # of a plain place the border counts, never more than symbols alone do
         *(([one(**changed), rival(by)], [one(**changed), rival(by)],
            {"doubt": alone, "by_border": border}, (reason, -by, told, 2, n))
