@@ -222,6 +222,8 @@ def main() -> int:
     """Run what is left and print the table."""
     asked = runner.asked(__doc__, output=True, touches=1_000_000, jobs=1, cluster="",
                          worlds=[*WORLDS], table=False)  # fmt: skip
+    if unknown := set(asked.worlds) - set(WORLDS):
+        raise SystemExit(f"no world {', '.join(sorted(unknown))}; there are {', '.join(WORLDS)}")
     asked.output = asked.output.absolute()
     summary = asked.output / SUMMARY
     finished = json.loads(summary.read_text()) if summary.exists() else {}
