@@ -66,6 +66,8 @@ def main(
         Follows "interrupted" ("; go on with --resume").
     """
     signal.signal(signal.SIGTERM, _end)
+    if signal.getsignal(signal.SIGHUP) == signal.SIG_DFL:  # of a terminal that closes; not nohup
+        signal.signal(signal.SIGHUP, lambda *_: signal.raise_signal(signal.SIGTERM))
     _open_closed_streams()
     _spare_start()
     if isinstance(sys.stdout, io.TextIOWrapper):
