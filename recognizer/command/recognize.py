@@ -137,7 +137,7 @@ def _print_answers(
             if not answer.found and not scan and answer.found.reason != NO_CONTACT:
                 refused.append(answer.touch)
                 if len(refused) == TRIED and not answered:
-                    _hint_wiring(learning.reader, source, refused)
+                    _hint_wiring(learning.reader, source, refused, options.flip)
             unchecked = answer.found and answer.found.mounting == UNCHECKED
             if unchecked and not (hinted or as_json or simulated):
                 message(MOUNTING)
@@ -159,7 +159,7 @@ def _print_answers(
             out.flush()
     learning.end()
     if refused and not answered and len(refused) < TRIED and not interrupted.is_set():
-        _hint_wiring(learning.reader, source, refused)
+        _hint_wiring(learning.reader, source, refused, options.flip)
     if options.plot is not None and kept:
         _draw_all(learning.reader, source, kept, options.plot, interrupted)
     if options.as_json and not lines:
@@ -304,13 +304,13 @@ def _rewired(
     return (wiring.frame(frame, source.sensor.full) for frame in frames)
 
 
-def _hint_wiring(reader: Reader, source: TouchSource, refused: list[TouchImage]) -> None:
-    """Say how the sensor seems to be wired, if refused touches show it."""
+def _hint_wiring(reader: Reader, source: TouchSource, refused: list[TouchImage], flip: str) -> None:
+    """Say how the sensor seems to be wired, if refused touches show it after the given changes."""
     from recognizer.sensor.wiring import wiring_hint
 
     hint = wiring_hint(reader, refused, calibration=source.calibration)
     if hint:
-        message(hint)
+        message(f"{hint}; after the changes of --flip {flip}: give both" if flip else hint)
 
 
 def _watched(
