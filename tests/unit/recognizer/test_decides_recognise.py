@@ -282,7 +282,7 @@ def first(count, value, other=1.0):
     [
         ({}, False),
         # of 100 pressed tactels so many so far beyond the face
-        ({"beyond": 15}, True), ({"beyond": 14}, False), ({"beyond": 15, "mm": 1.51}, True),
+        ({"beyond": 3}, True), ({"beyond": 2}, False), ({"beyond": 15, "mm": 1.51}, True),
         ({"beyond": 15, "mm": 1.5}, False), ({"beyond": 15, "round_": "a cylinder"}, False),
         ({"beyond": 15, "noise": 0.0334}, True),
         # what reads little is not pressed; what is half trusted is pressed half
@@ -291,6 +291,8 @@ def first(count, value, other=1.0):
         ({"beyond": 15, "trust": first(15, 0.19)}, False),
         ({"beyond": 15, "trust": first(15, 0.21)}, True),
         ({"beyond": 15, "forces": first(12, 2.0), "trust": first(12, 0.25, 0.3)}, True),
+        # of 20 symbols that are felt, so many more are not
+        ({"inliers": 20, "worn": 7}, True), ({"inliers": 20, "worn": 6}, False),
         # symbols that explain little leave much, but soft ones explain little for noise
         ({"log_likelihood_ratio": 24.9, "explained": 0.859}, True),
         ({"log_likelihood_ratio": 25.0, "explained": 0.859}, False),
