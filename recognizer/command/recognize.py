@@ -310,7 +310,8 @@ def _hint_wiring(reader: Reader, source: TouchSource, refused: list[TouchImage],
 
     hint = wiring_hint(reader, refused, calibration=source.calibration)
     if hint:
-        message(f"{hint}; after the changes of --flip {flip}: give both" if flip else hint)
+        again = f"; this is after --flip {flip}: give both, or none of two that are the same"
+        message(hint + again if flip else hint)
 
 
 def _watched(
