@@ -72,7 +72,7 @@ def until(page, wanted):
     """Wait until an expression holds in the page."""
     end_s = time.monotonic() + PATIENCE_S
     while not page.evaluate(wanted):
-        assert time.monotonic() < end_s, wanted
+        assert time.monotonic() < end_s, f"{wanted}: {page.evaluate('JSON.stringify(bench)')}"
         time.sleep(0.05)
 
 
