@@ -182,8 +182,8 @@ def family(pid: int) -> list[int]:
     """Return a process and all that it has begun."""
     known = [pid]
     for one in known:
-        for task in Path(f"/proc/{one}/task").glob("*/children"):
-            with suppress(OSError):
+        with suppress(OSError):  # it has ended meanwhile
+            for task in Path(f"/proc/{one}/task").glob("*/children"):
                 known += map(int, task.read_text().split())
     return known
 

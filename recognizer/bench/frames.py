@@ -204,7 +204,7 @@ class FrameHandler:
         return self._recorder is not None or self.guide is not None
 
     def take(self, frames: list[Frame]) -> None:
-        """Take frames in their order; the last one is shown and read."""
+        """Take frames in their order; the last one is shown, and all wait to be read."""
         known = [frame for frame in frames if frame.counts.shape == self._sensor.shape]
         if len(known) < len(frames) and self._refused_shape != frames[-1].counts.shape:
             self._refused_shape = frames[-1].counts.shape
@@ -215,6 +215,8 @@ class FrameHandler:
             )
         if not known:
             return
+        received_ms = time.time() * 1e3
+        recording, began_ns = self.replayed
         for came in known:
             self._record(came)
             frame = self.wiring.frame(came, self._sensor.full)
@@ -222,7 +224,11 @@ class FrameHandler:
                 self.guide.guide.take([frame])
             for notice in self.state.take(frame):
                 self._note(notice)
-        received_ms = time.time() * 1e3
+            at_s = 1e-9 * (frame.t_ns - began_ns) if recording else 0.0
+            load = self.guide is not None
+            self._recognition.offer(
+                PendingFrame(frame, self.state.calibration, received_ms, load, recording, at_s)
+            )
         values, newtons, notice = self.state.values(frame)
         if notice:
             self._note(notice)
@@ -232,12 +238,6 @@ class FrameHandler:
             values, self._sensor, bias, newtons, frame.seq, frame.t_ns * 1e-9, received_ms
         )
         self._broker.publish("frame", shown.as_bytes)
-        recording, began_ns = self.replayed
-        at_s = 1e-9 * (frame.t_ns - began_ns) if recording else 0.0
-        load = self.guide is not None
-        self._recognition.offer(
-            PendingFrame(frame, self.state.calibration, received_ms, load, recording, at_s)
-        )
 
     def newest(self) -> tuple[Frame, Array, str]:
         """Return the newest frame, its readings, and their unit; refused if none came yet."""

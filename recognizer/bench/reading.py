@@ -1,8 +1,9 @@
 """Frames -> answers, mosaics and one belief of a scan, in a thread of its own.
 
-The newest frame wins. It is read as soon as the touch is steady, and again when it has changed:
+A touch is read as soon as it is steady, and again when it has changed, by the newest frame then:
 the page wants an answer at once, so one steady frame is enough (`recognizer.touch.source`
-averages many). A touch that was not answered is read again, and one that never comes to rest is
+averages many). Frames wait while one is read, so that a touch that came and went meanwhile is
+read, too. A touch that was not answered is read again, and one that never comes to rest is
 read after a while. Its answer is published at once; then the first answered frame of a touch goes
 into the mosaic of its face, the first one read into the scan. Loads of a calibration are no
 touches, nor what is left of the last of them. Thesis 4.3, 6.3.
@@ -13,7 +14,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -48,6 +49,7 @@ FACES = 24  #: mosaics that are kept
 MOSAIC_TOUCHES = 300  #: of one mosaic; more cost time and show nothing new
 LIKELIEST = 4  #: places of a step of a scan that pages get
 STEPS = 60  #: newest steps of a scan that are kept
+WAITING = 1024  #: newest frames that wait to be read; a recording brings up to 512 at a time
 
 Phase = Literal["none", "felt", "moving", "read", "again", "held"]
 """none: nothing is touched. felt: a touch has begun that was not read yet. moving: it differs from
@@ -65,10 +67,10 @@ class ReadTrigger:
     _read_s: float = 0.0
     _answered: bool = False
 
-    def phase(self, forces: Array, *, contact: bool, now_s: float) -> Phase:
+    def phase(self, forces: Array, *, contact: bool, now_s: float, newest: bool = True) -> Phase:
         """Return what a frame is, by its forces (rows, columns) over the background.
 
-        `now_s` is any clock, s.
+        `now_s` is any clock, s. What was read is read again by the newest frame alone.
         """
         before, self._before = self._before, forces if contact else None
         if not contact:
@@ -86,8 +88,9 @@ class ReadTrigger:
         elif now_s - self._since_s < RESTLESS_S:
             return "felt" if self._read is None else "moving" if changed else "held"
         if changed:
-            return "read"
-        return "again" if not self._answered and now_s - self._read_s > AGAIN_S else "held"
+            return "read" if newest or self._read is None else "moving"
+        due = newest and not self._answered and now_s - self._read_s > AGAIN_S
+        return "again" if due else "held"
 
     def read(self, forces: Array, *, answered: bool, now_s: float) -> None:
         """Remember the frame that was read."""
@@ -222,7 +225,7 @@ class RecognitionThread:
         self.reader: Reader | None = None
         self._broker = broker
         self._news = threading.Condition()
-        self._pending: PendingFrame | None = None
+        self._pending: deque[PendingFrame] = deque(maxlen=WAITING)
         self._stop = self._reload = False
         self._trigger = ReadTrigger()
         self.touches = TouchLog(broker)
@@ -236,9 +239,9 @@ class RecognitionThread:
         self._thread.start()
 
     def offer(self, pending: PendingFrame) -> None:
-        """Put a frame in the place of the one that waits."""
+        """Let a frame wait behind others."""
         with self._news:
-            self._pending = pending
+            self._pending.append(pending)
             self._news.notify()
 
     def use_state(self, state: SensorState | None) -> None:
@@ -268,14 +271,15 @@ class RecognitionThread:
         while True:
             with self._news:
                 self._news.wait_for(lambda: self._pending or self._stop or self._reload)
-                pending, self._pending = self._pending, None
+                pending = self._pending.popleft() if self._pending else None
+                newest = not self._pending
                 reload_, self._reload = self._reload, False
                 if self._stop:
                     return
             if reload_:
                 self._prepare()
             if pending is not None:
-                self._read(pending)
+                self._read(pending, newest=newest)
 
     def _prepare(self) -> None:
         if not self.database:
@@ -293,12 +297,12 @@ class RecognitionThread:
     def _publish(self, state: str, **more: Any) -> None:
         self._broker.publish("reader", {"state": state, **more})
 
-    def _read(self, pending: PendingFrame) -> None:
+    def _read(self, pending: PendingFrame, *, newest: bool) -> None:
         signal = _signal(pending, self.reader, self.sensor)
         now_s = time.monotonic()
         self._loaded = pending.load or (self._loaded and signal.contact)
         contact = signal.contact and not self._loaded
-        phase = self._trigger.phase(signal.forces, contact=contact, now_s=now_s)
+        phase = self._trigger.phase(signal.forces, contact=contact, now_s=now_s, newest=newest)
         self._follow(phase, pending)
         if phase not in ("read", "again") or self.reader is None:
             return

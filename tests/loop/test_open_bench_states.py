@@ -3,11 +3,22 @@
 import re
 import signal
 import sqlite3
+import time
 from contextlib import ExitStack, closing
+from itertools import islice
 
 import httpx
 from bench_page import PATIENCE_MS, rest, running, shown, touched, until
 from playwright.sync_api import expect
+from programs import PATIENCE_S
+
+from encoded_objects.base.sensor_type import SensorType
+from probe.contact.contract import Touch
+from probe.simulate.registered import registered_surface
+from recognizer.bench.broker import Broker
+from recognizer.bench.frames import FrameHandler
+from recognizer.bench.reading import RecognitionThread
+from recognizer.bench.simulated import PressSequence, SimulationSettings
 
 
 def process_of(lab, port=0):
@@ -109,3 +120,23 @@ def test_a_token_is_asked_for_and_a_port_that_is_gone_for_good_is_named(served, 
         shown(page, "Cube")
         assert touched(page).startswith("Cube")
         page.close()
+
+
+def test_touches_that_came_and_went_while_the_reader_was_busy_are_read(lab):
+    sensor, database = SensorType(), str(lab / "lab.db")
+    presses = PressSequence(sensor, SimulationSettings(hold_s=0.1))
+    frames, scene = presses.frames(), registered_surface(database, "Cube", "F1")
+    waiting = []
+    for x_mm in (24.0, 36.0):
+        presses.touch(scene, Touch(x_mm, 30.0, 0.3, 60.0))
+        waiting += islice(frames, 60)
+    thread = RecognitionThread(database, sensor, Broker())
+    FrameHandler(sensor, Broker(), thread, print).take(waiting)  # while it reads the database
+    end_s = time.monotonic() + PATIENCE_S
+    while len(thread.touches.all()) < 2 or thread.touches.all()[-1]["contact"]:
+        assert time.monotonic() < end_s, thread.touches.all()
+        time.sleep(0.05)
+    thread.close()
+    answers = [one["answer"] for one in thread.touches.all()]
+    assert [one["face"] for one in answers] == ["F1", "F1"]
+    assert [round(one["place"]["x_mm"]) for one in answers] == [24, 36]
