@@ -74,9 +74,9 @@ WORLDS = {
     "own": World(0.0002, 300, makes=True),
     "small": World(0.0002, 300, spec="small", makes=True),
     "members": World(0.03, 309, ("--kinds", MEMBERS), makes=True),
-    "mujoco": World(0.0015, 310, MUJOCO),
-    "drake": World(0.001, 328, ("--engine", "drake", *KNOWN)),
-    "small-mujoco": World(0.0006, 311, MUJOCO, "small"),
+    "mujoco": World(0.007, 310, MUJOCO),
+    "drake": World(0.01, 328, ("--engine", "drake", *KNOWN)),
+    "small-mujoco": World(0.0031, 311, MUJOCO, "small"),
     "printed-none": World(0.03, 41, _printed("none")),
     "printed-usual": World(0.06, 41, _printed("usual")),
     "printed-bad": World(0.03, 41, _printed("bad")),
@@ -101,7 +101,7 @@ WORLDS = {
     "registered": World(0.021, 319, ("--surfaces", "database")),
     "anything": World(0.0225, 320, ("--kinds", "blank,foreign")),
     **{f"own-{k}": World(0.06, 300 + k) for k in range(1, 6)},
-    **{f"small-{k}": World(0.0725, 300 + k, spec="small") for k in range(1, 3)},
+    **{f"small-{k}": World(0.064, 300 + k, spec="small") for k in range(1, 3)},
 }
 
 
