@@ -113,9 +113,11 @@ ROOT = math.sqrt(2)
 def test_how_far_a_point_lies_inside_an_outline(loops, points):
     turned = [one[1:] + one[:1] for one in loops]
     for way in (loops, loops[::-1], [one[::-1] for one in loops], turned):
-        outline = SimpleNamespace(polygon_mm=tuple(np.array(loop, float) for loop in way))
-        found = [inside_mm(outline, x, y) for x, y, _ in points]
-        assert found == pytest.approx([inside for *_, inside in points])
+        for aside, up in ((0.0, 0.0), (-3.0, 7.0)):  # frames lie anywhere
+            at = [np.add(loop, [aside, up]) for loop in way]
+            outline = SimpleNamespace(polygon_mm=tuple(at))
+            found = [inside_mm(outline, x + aside, y + up) for x, y, _ in points]
+            assert found == pytest.approx([inside for *_, inside in points])
 
 
 JOINTS = np.radians([20.0, -40.0, 70.0, -25.0, 15.0])
