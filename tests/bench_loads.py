@@ -184,7 +184,8 @@ def family(pid: int) -> list[int]:
     for one in known:
         with suppress(OSError):  # it has ended meanwhile
             for task in Path(f"/proc/{one}/task").glob("*/children"):
-                known += map(int, task.read_text().split())
+                with suppress(OSError):  # a thread of it
+                    known += map(int, task.read_text().split())
     return known
 
 
