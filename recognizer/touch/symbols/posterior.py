@@ -70,7 +70,7 @@ SIZE = 0.95
 #: More by this over the number of tactels that press on symbols: residuals of few say less of what
 #: is wrong with the template there. 2,000 touches of large and small faces, seed 5353.
 FEW_TACTELS = 40.0
-BLURRED_SIZE = 2.5  #: more by this, for the share that readings hold of their neighbours ...
+BLURRED_SIZE = 2.5  #: more by this, for the share that tabs' readings hold of their neighbours ...
 USUAL_BLUR = 0.12  #: ... beyond this
 #: More for each unit by which the squared distance of the form (stroke excess, cross-talk,
 #: exponent) from what was known beforehand, in deviations, exceeds the usual ...
@@ -135,7 +135,7 @@ def fit_posterior(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -
     pose, gain, more, now, normal = found or fit_steps(image, pose, gain, labels_at)
     inverse = invert_normal(normal)
     rows = [0, 1, 2, POSE - 1]
-    covariance = _size(pose, more) * inverse[rows][:, rows]
+    covariance = _size(image, pose, more) * inverse[rows][:, rows]
     scatter = TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
     return PosePosterior(pose, gain, covariance, scatter, (float(more[1]), float(more[2])))
 
@@ -262,17 +262,18 @@ def precision_of(image: Image) -> Array:
     return np.concatenate([prior_precision(image), more])
 
 
-def _size(pose: Array, more: Array) -> float:
+def _size(image: Image, pose: Array, more: Array) -> float:
     """Return by how much the covariance is wider than least squares give.
 
-    Readings with a large share of each other share it in a way that no second difference describes.
-    And where strokes are far from their prior form, more of the template is wrong than the fitted
+    Readings with a large share of each other share it in a way that no second difference describes;
+    under a pad or a gel, which smears, that is the usual share of its template and no error. And
+    where strokes are far from their prior form, more of the template is wrong than the fitted
     part of it: the rest moves all symbols alike and leaves no residual (`docs/recognizer.md`, "How
     sure it is").
     """
     cross_talk = CROSS_TALK * (1 + float(pose[4]))
     cross_talk += 2 * float(more[1:].sum())
-    blurred = BLURRED_SIZE * max(0.0, cross_talk - USUAL_BLUR)
+    blurred = BLURRED_SIZE * max(0.0, cross_talk - USUAL_BLUR) if image.pressing.hardens else 0.0
     away = pose[3 : POSE - 1] / np.array(FORM_SD)
     strange = max(0.0, float(away @ away) - USUAL_FORM)
     return (SIZE + blurred) * (1 + FORM_SIZE * strange)
