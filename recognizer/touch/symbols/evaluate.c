@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "scene.h"
+#include "touch_data.h"
 
 static const double LOG4 = 1.3862943611198906; /* log(1 + 3) */
 
@@ -55,7 +55,7 @@ static inline double force_of(int64_t hardens, double deepest, double beyond, do
     return 1.0 / (w * w) - w + larger(depth - deepest, 0.0) * beyond;
 }
 
-static inline double slope_of(const Scene *s, double depth) {
+static inline double slope_of(const TouchData *s, double depth) {
     double slope = s->hardens ? stiffness(smaller(depth, s->deepest)) : 3.0;
     return depth > 0 ? slope : 0.0;
 }
@@ -83,7 +83,7 @@ enum { ROWS = 12 };
 
 static int64_t whole_fours(int64_t n) { return (n + 3) / 4 * 4; }
 
-static Work new_work(const Scene *s) {
+static Work new_work(const TouchData *s) {
     Work w = {0};
     int64_t n = s->n, wide = whole_fours(n), q = s->q;
     w.psi = malloc((18 * n + q * n + n * (q + 1) + 2 * ROWS * wide) * sizeof(double));
@@ -133,7 +133,7 @@ static void free_work(Work *w) {
 }
 
 /* Depths under a gain, and what they press, (n,); returns the least plateau over the scale. */
-static double press_plane(const Scene *s, Work *w, int64_t i, const double *g) {
+static double press_plane(const TouchData *s, Work *w, int64_t i, const double *g) {
     const double *drop = s->falls ? s->drop + (s->falls > 1 ? i : 0) * s->n : NULL;
     const double *plane = s->plane, beyond = stiffness(s->deepest), deepest = s->deepest;
     double most = 0.0;
@@ -150,7 +150,7 @@ static double press_plane(const Scene *s, Work *w, int64_t i, const double *g) {
 }
 
 /* What some candidate has makes all of them work it out. */
-static void look_at_gains(const Scene *s, Work *w, const double *gain) {
+static void look_at_gains(const TouchData *s, Work *w, const double *gain) {
     w->any_bare = w->is_loud = 0;
     for (int64_t i = 0; i < s->b && !(w->any_bare && (w->is_loud || s->noise == 0.0)); i++) {
         const double *g = gain + 4 * i;
@@ -165,7 +165,7 @@ static void look_at_gains(const Scene *s, Work *w, const double *gain) {
 }
 
 /* The image under the gain g (4,) of candidate i. */
-static void normalize(const Scene *s, Work *w, int64_t i, const double *g) {
+static void normalize(const TouchData *s, Work *w, int64_t i, const double *g) {
     double least = press_plane(s, w, i, g), scale = exp(g[0]), sum = 0.0;
     double usual = g[1] * w->mean[0] + g[2] * w->mean[1] + g[3] * w->mean[2];
     double full = s->full_press * larger(usual, 1e-9);
@@ -183,14 +183,14 @@ static void normalize(const Scene *s, Work *w, int64_t i, const double *g) {
     w->measure = -sum;
 }
 
-static inline int64_t grid(const Scene *s, double offset) {
+static inline int64_t grid(const TouchData *s, double offset) {
     const double shift = 6755399441055744.0; /* adding it rounds to whole numbers */
     double at = ((offset + s->half) / s->step + shift) - shift;
     return (int64_t)smaller(larger(at, -1.0), (double)s->size) + 1;
 }
 
 /* Column and upward row of the cell under each tactel, and where that is in its template. */
-static void find_cells(const Scene *s, Work *w, const double *pose) {
+static void find_cells(const TouchData *s, Work *w, const double *pose) {
     double c = cos(pose[2]) * (1 + pose[6]), n = sin(pose[2]) * (1 + pose[6]);
     for (int64_t t = 0; t < s->n; t++) {
         double x = s->points[2 * t], y = s->points[2 * t + 1], offset[2];
@@ -206,10 +206,10 @@ static void find_cells(const Scene *s, Work *w, const double *pose) {
     }
 }
 
-static inline int64_t symbols(const Scene *s, const Work *w) { return w->known ? 1 : s->q; }
+static inline int64_t symbols(const TouchData *s, const Work *w) { return w->known ? 1 : s->q; }
 
 /* psi of each symbol at each tactel and its slopes, for what is fitted of form and gain. */
-static void look_up(const Scene *s, Work *w, const double *pose) {
+static void look_up(const TouchData *s, Work *w, const double *pose) {
     const float form[3] = {(float)pose[3], (float)pose[4], (float)pose[5]}, log4 = (float)LOG4;
     int64_t n = s->n;
     for (int64_t t = 0; t < n; t++) w->face[t] = (float)w->bare[t];
@@ -241,13 +241,13 @@ static void look_up(const Scene *s, Work *w, const double *pose) {
 }
 
 /* What the noise of readings adds to the square of a spread at a value of psi. */
-static inline double readings(const Scene *s, double value, double plateau, double unit) {
+static inline double readings(const TouchData *s, double value, double plateau, double unit) {
     double share = 3.0 / LOG4 * exp(-LOG4 * value) * (s->noise / plateau) / unit;
     return share * share;
 }
 
 /* Score of a tactel that reads the bare face, or nothing, at a value of psi. */
-static inline double bare_score(const Scene *s, const Work *w, int64_t t, double value) {
+static inline double bare_score(const TouchData *s, const Work *w, int64_t t, double value) {
     double unit = w->unit[t], square = s->quiet * s->quiet + value * value;
     if (w->is_loud) square += readings(s, value, w->plateau[t], unit);
     double away = (w->psi[t] - value) / unit;
@@ -255,7 +255,7 @@ static inline double bare_score(const Scene *s, const Work *w, int64_t t, double
 }
 
 /* Scores of each symbol at each tactel, and of none; noise: deviation of psi on a covered one. */
-static void score(const Scene *s, Work *w, double noise) {
+static void score(const TouchData *s, Work *w, double noise) {
     const float quiet = (float)(s->quiet * s->quiet), aside = (float)(s->displaced * s->displaced);
     const double alone = s->quiet * s->quiet, usual = log(sqrt(alone));
     int64_t n = s->n;
@@ -289,7 +289,7 @@ static void score(const Scene *s, Work *w, double noise) {
 
 /* labels (n,) of what fits best in the cell under each tactel, -1: no symbol. Cells are few, and
    mostly that of the tactel before. */
-static void choose(const Scene *s, Work *w) {
+static void choose(const TouchData *s, Work *w) {
     const int64_t *cells = w->cells, wide = s->q + 1;
     int64_t known = 0, k = 0;
     for (int64_t t = 0; t < s->n; t++) {
@@ -315,7 +315,7 @@ static void choose(const Scene *s, Work *w) {
 }
 
 /* Labels (n,) of what cells show, -1 beyond the table. */
-static void read_labels(const Scene *s, Work *w, const int8_t *given, const int64_t *corner) {
+static void read_labels(const TouchData *s, Work *w, const int8_t *given, const int64_t *corner) {
     for (int64_t t = 0; t < s->n; t++) {
         int64_t x = w->cells[2 * t] - corner[0], y = w->cells[2 * t + 1] - corner[1];
         int inside = x >= 0 && x < s->wide && y >= 0 && y < s->high;
@@ -324,7 +324,7 @@ static void read_labels(const Scene *s, Work *w, const int8_t *given, const int6
 }
 
 /* psi and slopes (6, n) of what is shown, of the bare face where that is nothing. */
-static void value_shown(const Scene *s, Work *w) {
+static void value_shown(const TouchData *s, Work *w) {
     int64_t n = s->n;
     double *v = w->shown;
     for (int64_t t = 0; t < n; t++) {
@@ -345,7 +345,7 @@ static void value_shown(const Scene *s, Work *w) {
 }
 
 /* Spread of psi about what is shown, in units of the noise. */
-static inline double deviation(const Scene *s, const Work *w, int64_t t, double unit) {
+static inline double deviation(const TouchData *s, const Work *w, int64_t t, double unit) {
     const double *v = w->shown + t;
     double x = v[s->n], y = v[2 * s->n], square = s->quiet * s->quiet + v[0] * v[0];
     square += s->displaced * s->displaced * (x * x + y * y);
@@ -355,7 +355,7 @@ static inline double deviation(const Scene *s, const Work *w, int64_t t, double 
 
 /* Forces (n,) of what is shown, what changes with pose and gain (11, n), and by how much forces
    change with psi (n,). */
-static void press_shown(const Scene *s, Work *w, const double *pose, const double *gain) {
+static void press_shown(const TouchData *s, Work *w, const double *pose, const double *gain) {
     const double c = cos(pose[2]), r = sin(pose[2]), scale = exp(gain[0]), *points = s->points;
     const int64_t n = s->n, wide = whole_fours(n);
     double *by = w->by_psi, *rows = w->rows, *v = w->shown;
@@ -385,7 +385,7 @@ static void press_shown(const Scene *s, Work *w, const double *pose, const doubl
 typedef struct { const int8_t *given; const int64_t *corner; } Shown;
 
 /* See the image as candidate i does; returns its log-likelihood. */
-static double explain(const Scene *s, Work *w, Shown shown, int64_t i, const double *pose,
+static double explain(const TouchData *s, Work *w, Shown shown, int64_t i, const double *pose,
                       const double *gain) {
     double sum = 0.0, level = 0.0;
     w->known = shown.given != NULL;
@@ -407,7 +407,7 @@ static double explain(const Scene *s, Work *w, Shown shown, int64_t i, const dou
 }
 
 /* Normal matrix (11, 11) and right-hand side (11,) of the candidate that was seen last. */
-static void linear_system(const Scene *s, Work *w, const double *pose, const double *gain,
+static void linear_system(const TouchData *s, Work *w, const double *pose, const double *gain,
                           double *normal, double *right) {
     int64_t wide = whole_fours(s->n);
     double *rows = w->rows, *weighed = w->rows + ROWS * wide; /* the last row: what is left */
@@ -452,7 +452,7 @@ static void linear_system(const Scene *s, Work *w, const double *pose, const dou
 }
 
 /* See the image as the one lattice does whose cells show what is given. */
-static Work see_given(const Scene *s, const int8_t *given, const int64_t *corner,
+static Work see_given(const TouchData *s, const int8_t *given, const int64_t *corner,
                       const double *pose, const double *gain) {
     Work w = new_work(s);
     look_at_gains(s, &w, gain);
@@ -464,7 +464,7 @@ static Work see_given(const Scene *s, const int8_t *given, const int64_t *corner
     return w;
 }
 
-void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const double *pose,
+void linearize(const TouchData *s, const int8_t *given, const int64_t *corner, const double *pose,
                const double *gain, int64_t wide, Linearized at) {
     Work w = see_given(s, given, corner, pose, gain);
     const int64_t n = s->n, row = n * sizeof(double);
@@ -480,7 +480,7 @@ void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const
 
 /* The share of the variance of psi that labels (high, wide) from `corner` on explain where they
    stand: what `explained.explained_share` says. */
-double explained_share(const Scene *s, const int8_t *given, const int64_t *corner,
+double explained_share(const TouchData *s, const int8_t *given, const int64_t *corner,
                        const double *pose, const double *gain, double hidden, double above) {
     Work w = see_given(s, given, corner, pose, gain);
     double weight = 0.0, sum = 0.0, whole = 0.0, left = 0.0, alone = 0.0;
@@ -504,7 +504,7 @@ double explained_share(const Scene *s, const int8_t *given, const int64_t *corne
 }
 
 /* The lattice a damped step further. */
-static void move(const Scene *s, const double *normal, const double *right, double damping,
+static void move(const TouchData *s, const double *normal, const double *right, double damping,
                  const double *pose, const double *gain, double *to_pose, double *to_gain) {
     double A[UNKNOWNS][UNKNOWNS], step[UNKNOWNS];
     memcpy(A, normal, sizeof A);
@@ -518,7 +518,7 @@ static void move(const Scene *s, const double *normal, const double *right, doub
 /* Move candidates by damped steps, `steps` at most; pose and gain (b, 7), (b, 4) are where they begin
    and end. Normal matrices and right-hand sides are worked out where a step begins, and in the end
    if `told`. */
-void refine(const Scene *s, int64_t steps, int64_t told, const int8_t *given, const int64_t *corner,
+void refine(const TouchData *s, int64_t steps, int64_t told, const int8_t *given, const int64_t *corner,
             double *pose, double *gain, double *value, double *normal, double *right) {
     const int64_t square = UNKNOWNS * UNKNOWNS;
     Work w = new_work(s);
@@ -563,7 +563,7 @@ void refine(const Scene *s, int64_t steps, int64_t told, const int8_t *given, co
 
 /* Sums over the cells of one candidate, columns and then rows rising: names (m, 2), scores
    (m, q + 1), tactels that look at them by how hard they press (m,). Returns m. */
-static int64_t sum_cells(const Scene *s, const Work *w, int64_t *names, double *scores,
+static int64_t sum_cells(const TouchData *s, const Work *w, int64_t *names, double *scores,
                          double *seen) {
     int64_t known = 0, wide = s->q + 1;
     for (int64_t t = 0; t < s->n; t++) {
@@ -590,7 +590,7 @@ static int64_t sum_cells(const Scene *s, const Work *w, int64_t *names, double *
 /* What `fit.score_cells` needs of candidates of which `best` is the likeliest. Out: count (b,) of
    cells, names (b, n, 2), scores (b, n, q + 1), seen (b, n), level (b,), left (b, n) residuals.
    Returns the noise, `least` or more. */
-double score_cells(const Scene *s, int64_t best, double least, double *pose, double *gain,
+double score_cells(const TouchData *s, int64_t best, double least, double *pose, double *gain,
                    int64_t *count, int64_t *names, double *scores, double *seen, double *level,
                    double *left) {
     Work w = new_work(s);

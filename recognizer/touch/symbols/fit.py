@@ -221,11 +221,11 @@ def refine_lattices(
     labels = corner = None
     if labels_at is not None:
         labels, corner = label_tables(image, whole, steps, labels_at)
-    scene = image.scene.of_lattices(count, labels, prior_precision(image))
+    data = image.data.of_lattices(count, labels, prior_precision(image))
     value, right = np.empty(count), np.zeros((count, UNKNOWNS))
     normal = np.zeros((count, UNKNOWNS, UNKNOWNS))
     kernels().refine(
-        ctypes.addressof(scene), steps, int(with_normal),
+        ctypes.addressof(data), steps, int(with_normal),
         *addresses(labels, corner, whole, gain, value, normal, right),
     )  # fmt: skip
     return Lattices(whole, gain, value, normal, right)
@@ -259,13 +259,13 @@ def score_cells(
     The likeliest lattice's residuals give the noise of the scores.
     """
     count, tactels, order = len(lattices.pose), len(image.forces), image.template.order
-    scene = image.scene.of_lattices(count)
+    data = image.data.of_lattices(count)
     pose, gain = np.ascontiguousarray(lattices.pose), np.ascontiguousarray(lattices.gain)
     numbers, cells = np.empty(count, np.int64), np.empty((count, tactels, 2), np.int64)
     sums, seen = np.empty((count, tactels, order + 1)), np.empty((count, tactels))
     level, left = np.empty(count), np.empty((count, tactels))
     noise: float = kernels().score_cells(
-        ctypes.addressof(scene), int(np.argmax(lattices.value)), LEAST_NOISE,
+        ctypes.addressof(data), int(np.argmax(lattices.value)), LEAST_NOISE,
         *addresses(pose, gain, numbers, cells, sums, seen, level, left),
     )  # fmt: skip
     covariance = np.full((count, 3, 3), math.nan)

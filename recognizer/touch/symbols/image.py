@@ -31,7 +31,7 @@ from recognizer.touch.symbols.kernels import (
     LEAST_GAIN,
     LEAST_PRESS,
     STEEPEST,
-    Scene,
+    TouchData,
 )
 from recognizer.touch.symbols.template import PSI, ResponseTemplate, psi
 
@@ -144,7 +144,7 @@ class Image:
     cell_share: float = 1.0
 
     @cached_property
-    def scene(self) -> Scene:
+    def data(self) -> TouchData:
         """The image as the compiled loops take it, without lattices."""
         arrays = {
             "points": (self.points_mm, np.float64), "forces": (self.forces, np.float64),
@@ -153,7 +153,7 @@ class Image:
             "rimmed": (self.template.rimmed, np.float32),
         }  # fmt: skip
         template, pressing = self.template, self.pressing
-        return Scene.of_image(
+        return TouchData.of_image(
             arrays, n=len(self.forces), q=template.order, size=template.size,
             hardens=int(pressing.hardens), falls=0 if self.falls is None else len(self.falls),
             symbol=pressing.symbol, deepest=pressing.deepest, pitch=template.pitch_mm,

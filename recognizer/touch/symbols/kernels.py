@@ -62,8 +62,8 @@ DEEPEST_GAIN = 0.9  #: heights, the largest depth
 ALL = UNKNOWNS + 3  #: and offset, blur across rows and across columns (`posterior`)
 
 
-class Scene(ctypes.Structure):
-    """`Scene` of scene.h."""
+class TouchData(ctypes.Structure):
+    """`TouchData` of touch_data.h."""
 
     held: tuple[NDArray[Any], ...]  # arrays that it points to
 
@@ -87,14 +87,14 @@ class Scene(ctypes.Structure):
     @classmethod
     def of_image(
         cls, arrays: Mapping[str, tuple[NDArray[Any] | None, type]], **given: Any
-    ) -> Scene:
-        """Return the scene of an image: its arrays with their kinds, and its own numbers."""
+    ) -> TouchData:
+        """Return the data of an image: its arrays with their kinds, and its own numbers."""
         held: dict[str, NDArray[Any]] = {
             name: np.ascontiguousarray(array, kind)
             for name, (array, kind) in arrays.items()
             if array is not None
         }
-        scene = cls(
+        data = cls(
             least_gain=LEAST_GAIN, full_press=FULL_PRESS, least_press=LEAST_PRESS,
             steepest=STEEPEST, quiet=QUIET, displaced=DISPLACED_MM, loud=LOUD, most=MOST_NATS,
             first=FIRST_NOISE, far=FAR, grazed=GRAZED, tie=TIE_NATS, damping=DAMPING,
@@ -102,24 +102,24 @@ class Scene(ctypes.Structure):
             deepest_gain=DEEPEST_GAIN, least=LEAST_DIAGONAL, largest=LARGEST_STEP, **given,
             **dict(zip(held, addresses(*held.values()), strict=True)),
         )  # fmt: skip
-        scene.held = tuple(held.values())
-        return scene
+        data.held = tuple(held.values())
+        return data
 
     def of_lattices(
         self,
         count: int,
         labels: NDArray[np.int8] | None = None,
         precision: NDArray[np.float64] | None = None,
-    ) -> Scene:
-        """Return the scene of so many lattices, with tables (b, high, wide) of their labels."""
-        scene = Scene.from_buffer_copy(self)
-        scene.held = self.held
-        scene.b = count
+    ) -> TouchData:
+        """Return the data of so many lattices, with tables (b, high, wide) of their labels."""
+        data = TouchData.from_buffer_copy(self)
+        data.held = self.held
+        data.b = count
         if labels is not None:
-            scene.high, scene.wide = labels.shape[1:]
+            data.high, data.wide = labels.shape[1:]
         if precision is not None:
-            scene.precision[:] = precision.tolist()
-        return scene
+            data.precision[:] = precision.tolist()
+        return data
 
 
 class Steps(ctypes.Structure):

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "scene.h"
+#include "touch_data.h"
 
 enum { OFFSET = UNKNOWNS, UP, ALONG, ALL }; /* unknowns of a sensor after those of a lattice */
 
@@ -41,7 +41,7 @@ static void second_differences(int64_t rows, int64_t columns, const double *imag
 }
 
 /* See the image about the lattice at which it stands; scratch: (7, wide). */
-static void look(const Scene *s, const Steps *how, const int8_t *given, const int64_t *corner,
+static void look(const TouchData *s, const Steps *how, const int8_t *given, const int64_t *corner,
                  int64_t wide, double *scratch, Image *at) {
     double *values = scratch, *forces = scratch + 3 * wide, *unit = forces + wide;
     double *up = unit + wide, *along = up + wide, *jacobian = at->jacobian, *more = at->more;
@@ -98,7 +98,7 @@ static int factor(double A[ALL][ALL], double unseen, double L[ALL][ALL], double 
 }
 
 /* One over the variance of each tactel (wide,), less for what lies far out. */
-static void weigh(const Scene *s, const Steps *how, int64_t wide, const Image *at,
+static void weigh(const TouchData *s, const Steps *how, int64_t wide, const Image *at,
                   const double *now, double *variance, double *weights) {
     for (int64_t t = 0; t < s->n; t++) {
         double left = at->left[t];
@@ -159,7 +159,7 @@ static void leverages(int64_t wide, const double *jacobian, double L[ALL][ALL],
 
 /* Fit the variances `now` (2,); scratch: (17, wide). Returns 0 where a normal matrix shows too little
    to be inverted so. */
-static int fit_spread(const Scene *s, const Steps *how, int64_t wide, const Image *at,
+static int fit_spread(const TouchData *s, const Steps *how, int64_t wide, const Image *at,
                       double *scratch, double *now) {
     double *weights = scratch, *variance = scratch + wide, *taken = variance + wide;
     for (int64_t round = 0; round < how->rounds; round++) {
@@ -185,7 +185,7 @@ static int fit_spread(const Scene *s, const Steps *how, int64_t wide, const Imag
 }
 
 /* Log-likelihood of what is left over and of the unknowns, nats, up to a constant. */
-static double likelihood(const Scene *s, const Steps *how, int64_t wide, const Image *at,
+static double likelihood(const TouchData *s, const Steps *how, int64_t wide, const Image *at,
                          const double *now) {
     double loss = 0.0;
     for (int64_t t = 0; t < s->n; t++) {
@@ -198,7 +198,7 @@ static double likelihood(const Scene *s, const Steps *how, int64_t wide, const I
 }
 
 /* The lattice a damped step further, not yet looked at. */
-static void move(const Scene *s, const Steps *how, int64_t wide, const Image *at,
+static void move(const TouchData *s, const Steps *how, int64_t wide, const Image *at,
                  const double *weighed, double A[ALL][ALL], double damping, Image *to) {
     double step[ALL];
     for (int k = 0; k < ALL; k++) {
@@ -219,7 +219,7 @@ static void move(const Scene *s, const Steps *how, int64_t wide, const Image *at
 /* Fit a lattice that shows labels (high, wide) from `corner` on. pose (7,), gain (4,): where it
    begins and ends; in the end more (3,), variances now (2,), and the normal matrix (14, 14). Returns
    0, with nothing told, where the image shows too little. */
-int fit_posterior(const Scene *s, const Steps *how, const int8_t *given, const int64_t *corner,
+int fit_posterior(const TouchData *s, const Steps *how, const int8_t *given, const int64_t *corner,
                   double *pose, double *gain, double *more, double *now, double *normal) {
     const int64_t wide = (s->n + 7) / 8 * 8, each = (1 + 2 + ALL) * wide;
     double *scratch = calloc((3 + ALL) * wide + 2 * each, sizeof(double));

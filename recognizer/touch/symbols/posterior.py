@@ -147,7 +147,7 @@ _Fitted = tuple[Array, Array, Array, Array, Array]
 
 def _fit_compiled(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -> _Fitted | None:
     labels, corner = label_tables(image, pose[None], STEPS, labels_at)
-    scene = image.scene.of_lattices(1, labels)
+    data = image.data.of_lattices(1, labels)
     aside = np.ascontiguousarray(np.broadcast_to(image.aside, len(image.forces)), np.float64)
     least, most = step_bounds(image)
     known = precision_of(image)
@@ -160,7 +160,7 @@ def _fit_compiled(image: Image, pose: Array, gain: Array, labels_at: LabelsAt) -
     pose, gain = np.array(pose, np.float64), np.array(gain, np.float64)
     more, now, normal = np.empty(3), np.empty(2), np.empty((len(known), len(known)))
     seen = kernels().fit_posterior(
-        ctypes.addressof(scene), ctypes.addressof(steps),
+        ctypes.addressof(data), ctypes.addressof(steps),
         *addresses(labels, corner, pose, gain, more, now, normal),
     )  # fmt: skip
     return (pose, gain, more, now, normal) if seen else None
@@ -329,9 +329,9 @@ def explained_share(image: Image, pose: Array, gain: Array, labels_at: LabelsAt)
     (4,) are those of one lattice.
     """
     labels, corner = label_tables(image, pose[None], 0, labels_at)
-    scene = image.scene.of_lattices(1, labels)
+    data = image.data.of_lattices(1, labels)
     pose, gain = np.array(pose, np.float64), np.array(gain, np.float64)
     share: float = kernels().explained_share(
-        ctypes.addressof(scene), *addresses(labels, corner, pose, gain), HIDDEN, ABOVE
+        ctypes.addressof(data), *addresses(labels, corner, pose, gain), HIDDEN, ABOVE
     )
     return share

@@ -2,8 +2,8 @@
 
    Names, units and frames are those of the Python that calls them. Arrays are C-contiguous. */
 
-#ifndef SCENE_H
-#define SCENE_H
+#ifndef TOUCH_DATA_H
+#define TOUCH_DATA_H
 
 #include <math.h>
 #include <stdint.h>
@@ -17,16 +17,16 @@ typedef struct {
     double symbol, deepest;     /* Pressing */
     double pitch, half, step;   /* ResponseTemplate, mm */
     double noise;               /* of the readings */
-    double least_gain, full_press, least_press, steepest;       /* GainSettings */
-    double quiet, displaced, loud, most, first, far, grazed, tie;   /* NoiseSettings */
-    double damping, easier, harder, settled, shallower, deepest_gain; /* RefineSettings */
+    double least_gain, full_press, least_press, steepest;       /* gains: kernels.py */
+    double quiet, displaced, loud, most, first, far, grazed, tie;   /* noise: kernels.py */
+    double damping, easier, harder, settled, shallower, deepest_gain; /* steps: kernels.py */
     double least[UNKNOWNS], largest[UNKNOWNS], limits[4];
     double precision[UNKNOWNS], usual_scale;    /* what is known beforehand; log of the scale */
     const double *points, *forces, *trust, *plane;  /* Image: (n, 2), (n,), (n,), (n, 3) */
     const uint8_t *loaded;      /* (n,) */
     const double *drop;         /* (falls, n), or NULL */
     const float *rimmed;        /* ResponseTemplate, (size + 2, size + 2, q, 6) */
-} Scene;
+} TouchData;
 
 typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
 
@@ -39,7 +39,7 @@ static inline double bounded(double value, double least, double most) {
 }
 
 /* How far unknown k of a lattice lies from what is known of it beforehand. */
-static inline double departure(const Scene *s, int k, const double *pose, const double *gain) {
+static inline double departure(const TouchData *s, int k, const double *pose, const double *gain) {
     return k < 3 || k > 7 ? 0.0 : k < 7 ? pose[k] : gain[0] - s->usual_scale;
 }
 
@@ -69,7 +69,7 @@ static inline void solve(int k, double A[k][k], double b[k]) {
 }
 
 /* The lattice a step (11,) further. */
-static inline void take_step(const Scene *s, const double *step, const double *pose,
+static inline void take_step(const TouchData *s, const double *step, const double *pose,
                              const double *gain, double *to_pose, double *to_gain) {
     for (int k = 0; k < 7; k++) to_pose[k] = pose[k] + step[k];
     for (int k = 0; k < 4; k++) {
@@ -91,7 +91,7 @@ typedef struct {
 } Linearized;
 
 /* The image about a lattice whose cells show what is given: labels (high, wide) from `corner` on. */
-void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const double *pose,
+void linearize(const TouchData *s, const int8_t *given, const int64_t *corner, const double *pose,
                const double *gain, int64_t wide, Linearized at);
 
 #endif
