@@ -49,7 +49,7 @@ def version(name: str, *, as_json: bool, **parts: str) -> None:
 def error(problem: EncodedObjectsError, *, as_json: bool) -> None:
     """Say what is wrong: to stderr, or as JSON to stdout."""
     if as_json:
-        write_json({"error": problem.as_json()})
+        write_json({"error": problem.as_json()}, line=True)  # where results are lines, too
     else:
         message(problem.as_text(), "error:", "red")
 
