@@ -1,6 +1,6 @@
 """One campaign over all worlds and kinds, a million touches, that can be stopped and resumed.
 
-    python tests/campaigns/million.py -o out/million -j 2            # about four hours
+    python tests/campaigns/million.py -o out/million -j 2            # about six hours
     python tests/campaigns/million.py -o out/million -j 2            # again: goes on where it was
     python tests/campaigns/million.py -o out/million --touches 5000  # the same in small
     python tests/campaigns/million.py -o out/million --cluster HOST:PORT  # on workers of a cluster
