@@ -88,11 +88,12 @@ def _fault(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> tuple[st
         return cause, f"set height to {least} or more"
     top = style.stroke_mm - 2 * style.chamfer_mm * (1 - math.tan(style.draft_rad))
     if top < printer.stroke_min_mm / 2:
+        most = (style.stroke_mm - printer.stroke_min_mm / 2) / 2
         cause = (
             f"a chamfer of {style.chamfer_mm:g} mm leaves {max(top, 0.0):.2g} mm of the stroke's "
             f"top, but {printer.name} needs {printer.stroke_min_mm / 2:g} mm"
         )
-        return cause, ""
+        return cause, f"set chamfer to {math.floor(100 * most) / 100:g} mm or less"
     footprint_half_mm(alphabet, style)
     between = gap_between_mm(alphabet, style)
     if between < printer.gap_min_mm:
@@ -114,9 +115,9 @@ def _fault(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> tuple[st
 
 
 def _ways_out(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> str:
-    """Return the nearest chamfer, strokes and pitch that pass, as an instruction."""
+    """Return the nearest strokes and pitches that pass, as an instruction."""
     ways = []
-    for name, direction in (("chamfer", -1), ("stroke", -1), ("stroke", 1), ("pitch", 1)):
+    for name, direction in (("stroke", -1), ("stroke", 1), ("pitch", 1)):
         field = f"{name}_mm"
         given = getattr(style, field)
         for steps in range(1, 16):  # of 5 %
@@ -126,6 +127,4 @@ def _ways_out(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> str:
             if is_printable(alphabet, replace(style, **{field: value}), printer):
                 ways.append(f"{name} to {value:g} mm")
                 break
-    if ways:
-        return "set " + ", or ".join(ways)
-    return "set chamfer, draft or height to less, or pitch to more"
+    return "set " + ", or ".join(ways) if ways else "set draft or height to less, or pitch to more"
