@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain
 
@@ -26,6 +26,7 @@ from generator.alphabet.strokes import Glyph
 from generator.errors import AlphabetError
 from generator.plane.polygon import edges_cross, keeps_edges, signed_area
 
+TIGHT_FIX = "set stroke, draft or height to less, or pitch to more"  #: where strokes have no room
 SHORTEST_EDGE = 0.01  #: of the stroke: an edge shorter than this is refused as collapsed
 LEAST_CHAMFER_MM = 0.01  #: a smaller one cannot be seen, and its sides would be slivers
 FOOT_MARGIN = 0.005  #: of the pitch: free around the footprint, for triangulation
@@ -151,14 +152,20 @@ def outline(glyph: Glyph, unit_mm: float, style: SymbolStyle, *, place: str = ""
 
     `unit_mm` is the distance of neighbouring nodes; the style's pitch is not used; errors name
     `place`. Raises `AlphabetError` if a number is out of range, an edge collapses, or strokes meet
-    at the foot that stand apart at the top, with a draft or chamfer that works.
+    at the foot that stand apart at the top.
     """
-    _check_numbers(style, place)
+    check_numbers(style, place)
     lines = _stroke_lines(glyph, unit_mm, style.stroke_mm, place)
     steps = _steps(style)
     if _regular(lines, [d for _, d in steps], style.stroke_mm):
         return _tiers(lines, steps)
-    raise _collapse(glyph, unit_mm, style, place)
+    raise AlphabetError(
+        f"stroke {style.stroke_mm:g} mm makes an edge or a gap of symbol '{glyph.name}' collapse "
+        f"at pitch {style.pitch_mm:g} mm, height {style.height_mm:g} mm, "
+        f"draft {math.degrees(style.draft_rad):.3g} degrees, chamfer {style.chamfer_mm:g} mm",
+        fix=TIGHT_FIX,
+        place=place,
+    )
 
 
 @lru_cache(maxsize=256)
@@ -200,15 +207,9 @@ def footprint_half_mm(alphabet: Alphabet, style: SymbolStyle) -> float:
     half += FOOT_MARGIN * style.pitch_mm
     if half < style.pitch_mm / 2:
         return half
-    solid = style.stroke_mm / 2 + style.draft_mm
-    free = 0.5 - alphabet.reach - FOOT_MARGIN
-    fix = f"set pitch to {math.ceil(solid / free * 100) / 100 + 0.01:g} mm or more"
-    if free * style.pitch_mm > style.draft_mm:
-        widest = 2 * (free * style.pitch_mm - style.draft_mm)
-        fix += f", or stroke to {(math.floor(widest * 100) - 1) / 100:g} mm or less"
     raise AlphabetError(
         f"symbols with a foot of {2 * half:.3g} mm touch at a pitch of {style.pitch_mm:g} mm",
-        fix=fix,
+        fix=TIGHT_FIX,
         place=f"alphabet {alphabet.name}",
     )
 
@@ -222,8 +223,8 @@ def _steps(style: SymbolStyle) -> list[tuple[float, float]]:
     return [(0.0, h * slope), (h, 0.0)]
 
 
-def _check_numbers(style: SymbolStyle, place: str) -> None:
-    """Refuse sizes that are no symbol at all."""
+def check_numbers(style: SymbolStyle, place: str) -> None:
+    """Refuse sizes that are no symbol at all; errors name `place`."""
     for name, value in (
         ("pitch", style.pitch_mm),
         ("height", style.height_mm),
@@ -278,37 +279,3 @@ def _regular(lines: list[Lines], distances: list[float], stroke_mm: float) -> bo
         if edges_cross(rings):
             return False
     return True
-
-
-def _collapse(glyph: Glyph, unit_mm: float, style: SymbolStyle, place: str) -> AlphabetError:
-    """Return the error for a glyph whose tiers are not regular, with what would work."""
-
-    def works(trial: SymbolStyle) -> bool:
-        lines = _stroke_lines(glyph, unit_mm, trial.stroke_mm, place)
-        return _regular(lines, [d for _, d in _steps(trial)], trial.stroke_mm)
-
-    cause = (
-        f"stroke {style.stroke_mm:g} mm makes an edge or a gap of symbol '{glyph.name}' collapse "
-        f"at pitch {style.pitch_mm:g} mm, height {style.height_mm:g} mm, "
-        f"draft {math.degrees(style.draft_rad):.3g} degrees, chamfer {style.chamfer_mm:g} mm"
-    )
-    ways = []
-    for sign in (-1, 1):
-        for steps in range(1, 13):
-            width = round(style.stroke_mm * (1 + sign * steps / 20), 2)
-            if width > 0 and works(replace(style, stroke_mm=width)):
-                ways.append(f"stroke to {width:g} mm")
-                break
-    for share in np.arange(0.95, 0.0, -0.05):
-        if works(replace(style, draft_rad=style.draft_rad * share)):
-            degrees = math.floor(math.degrees(style.draft_rad) * share * 10) / 10
-            ways.append(f"draft to {degrees:g} degrees or less")
-            break
-    for share in np.arange(0.95, -0.01, -0.05):
-        if style.chamfer_mm and works(replace(style, chamfer_mm=style.chamfer_mm * share)):
-            chamfer = math.floor(style.chamfer_mm * share * 100) / 100
-            ways.append(f"chamfer to {chamfer:g} mm or less")
-            break
-    if not ways:
-        ways.append("pitch to more, or height to less")
-    return AlphabetError(cause, fix="set " + ", or ".join(ways), place=place)

@@ -14,9 +14,19 @@ from dataclasses import replace
 import numpy as np
 
 from generator.alphabet.known import Alphabet
-from generator.alphabet.outline import SymbolStyle, Tiers, footprint_half_mm, outlines
+from generator.alphabet.outline import (
+    TIGHT_FIX,
+    SymbolStyle,
+    Tiers,
+    check_numbers,
+    footprint_half_mm,
+    outlines,
+)
 from generator.errors import AlphabetError
 from generator.printers import Printer
+
+# Numbers of a style that may mend it, and which way they go.
+WAYS = (("stroke", -1), ("stroke", 1), ("pitch", 1), ("draft", -1), ("chamfer", -1))
 
 
 def gap_inside_mm(tiers: Tiers) -> float:
@@ -51,80 +61,80 @@ def gap_between_mm(alphabet: Alphabet, style: SymbolStyle) -> float:
 def check_printable(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> None:
     """Refuse symbols that the printer would lose, by `AlphabetError`.
 
-    It names the number that is out of range, the printer's limit, and a stroke or pitch that works.
+    It names the number that is out of range, the limit, and for every number of the style that
+    mends it alone the nearest value; where none does, the limit to keep.
     """
-    found = _fault(alphabet, style, printer)
-    if found is not None:
-        cause, fix = found
-        raise AlphabetError(
-            cause,
-            fix=fix or _ways_out(alphabet, style, printer),
-            place=f"alphabet {alphabet.name}",
-        )
+    place = f"alphabet {alphabet.name}"
+    check_numbers(style, place)
+    try:
+        _check(alphabet, style, printer)
+    except AlphabetError as refused:
+        ways = _ways_out(alphabet, style, printer)
+        raise AlphabetError(refused.cause, fix=ways or refused.fix, place=place) from None
 
 
 def is_printable(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> bool:
     """Return whether `check_printable` lets symbols pass."""
     try:
-        return _fault(alphabet, style, printer) is None
-    except AlphabetError:  # of the footprint
+        _check(alphabet, style, printer)
+    except AlphabetError:
         return False
+    return True
 
 
-def _fault(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> tuple[str, str] | None:
-    """Return what the printer would lose, and what to do: empty where that takes a search."""
+def _check(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> None:
+    """Refuse what the printer would lose; the fix is the limit that was broken."""
+    least = f"{printer.stroke_min_mm:g} mm"
     if style.stroke_mm < printer.stroke_min_mm:
-        least = f"{printer.stroke_min_mm:g} mm"
-        return (
+        raise AlphabetError(
             f"stroke {style.stroke_mm:g} mm, but {printer.name} prints no stroke under {least}",
-            f"set stroke to {least} or more, or choose a finer printer",
+            fix=f"set stroke to {least} or more, or choose a finer printer",
         )
+    least = f"{printer.height_min_mm:g} mm"
     if style.height_mm < printer.height_min_mm:
-        least = f"{printer.height_min_mm:g} mm"
-        cause = (
+        raise AlphabetError(
             f"height {style.height_mm:g} mm, but under {least} a symbol printed by {printer.name} "
-            "cannot be felt"
+            "cannot be felt",
+            fix=f"set height to {least} or more",
         )
-        return cause, f"set height to {least} or more"
-    top = style.stroke_mm - 2 * style.chamfer_mm * (1 - math.tan(style.draft_rad))
-    if top < printer.stroke_min_mm / 2:
-        most = (style.stroke_mm - printer.stroke_min_mm / 2) / 2
-        cause = (
-            f"a chamfer of {style.chamfer_mm:g} mm leaves {max(top, 0.0):.2g} mm of the stroke's "
-            f"top, but {printer.name} needs {printer.stroke_min_mm / 2:g} mm"
+    least_mm = printer.stroke_min_mm / 2
+    top_mm = style.stroke_mm - 2 * style.chamfer_mm * (1 - math.tan(style.draft_rad))
+    if top_mm < least_mm:
+        most_mm = math.floor(50 * (style.stroke_mm - least_mm)) / 100
+        raise AlphabetError(
+            f"a chamfer of {style.chamfer_mm:g} mm leaves {max(top_mm, 0.0):.2g} mm of the "
+            f"stroke's top, but {printer.name} needs {least_mm:g} mm",
+            fix=f"set chamfer to {most_mm:g} mm or less",
         )
-        return cause, f"set chamfer to {math.floor(100 * most) / 100:g} mm or less"
     footprint_half_mm(alphabet, style)
     between = gap_between_mm(alphabet, style)
     if between < printer.gap_min_mm:
-        cause = (
+        raise AlphabetError(
             f"{between:.2g} mm between the feet of neighbouring symbols, but {printer.name} keeps "
-            f"no gap under {printer.gap_min_mm:g} mm open"
+            f"no gap under {printer.gap_min_mm:g} mm open",
+            fix=TIGHT_FIX,
         )
-        return cause, ""
     open_mm = printer.gap_inside_mm
     for glyph, tiers in zip(alphabet.glyphs, outlines(alphabet, style), strict=True):
         inside = gap_inside_mm(tiers)
         if inside < open_mm * (1 - 1e-9):
-            cause = (
+            raise AlphabetError(
                 f"{inside:.2g} mm between two strokes of symbol '{glyph.name}', but "
-                f"{printer.name} keeps no gap under {open_mm:g} mm open inside a symbol"
+                f"{printer.name} keeps no gap under {open_mm:g} mm open inside a symbol",
+                fix=TIGHT_FIX,
             )
-            return cause, ""
-    return None
 
 
 def _ways_out(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> str:
-    """Return the nearest strokes and pitches that pass, as an instruction."""
+    """Return the nearest values that pass, one number changed, as an instruction; empty if none."""
     ways = []
-    for name, direction in (("stroke", -1), ("stroke", 1), ("pitch", 1)):
-        field = f"{name}_mm"
-        given = getattr(style, field)
-        for steps in range(1, 16):  # of 5 %
+    for name, direction in WAYS:
+        unit, scale = ("degrees", math.degrees(1.0)) if name == "draft" else ("mm", 1.0)
+        field = "draft_rad" if name == "draft" else f"{name}_mm"
+        given = scale * getattr(style, field)
+        for steps in range(1, 21) if given else ():  # of 5 %
             value = round(given + direction * steps * 0.05 * given, 2)
-            if value <= 0:
+            if is_printable(alphabet, replace(style, **{field: value / scale}), printer):
+                ways.append(f"{name} to {value:g} {unit}")
                 break
-            if is_printable(alphabet, replace(style, **{field: value}), printer):
-                ways.append(f"{name} to {value:g} mm")
-                break
-    return "set " + ", or ".join(ways) if ways else "set draft or height to less, or pitch to more"
+    return "set " + ", or ".join(ways) if ways else ""

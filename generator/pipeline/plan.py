@@ -19,9 +19,9 @@ import numpy as np
 
 from generator.alphabet.known import Alphabet
 from generator.alphabet.outline import SymbolStyle, Tiers, footprint_half_mm, outlines
-from generator.alphabet.printable import check_printable
+from generator.alphabet.printable import check_printable, is_printable
 from generator.array import SymbolArray, array_from
-from generator.errors import GeneratorError, LayoutError, SolidError
+from generator.errors import LayoutError, SolidError
 from generator.layout.layout import Clearances, Outlines
 from generator.layout.recognition_rate import like_measured
 from generator.polyhedron import Polyhedron, dihedral, face_polygon
@@ -77,11 +77,7 @@ class ObjectPlan:
         style = self.spec.style
         stroke = round(style.stroke_mm * pitch_mm / style.pitch_mm, 2)
         style = replace(style, pitch_mm=pitch_mm, stroke_mm=stroke)
-        try:
-            check_printable(self.alphabet, style, self.printer)
-        except GeneratorError:
-            return None
-        return style
+        return style if is_printable(self.alphabet, style, self.printer) else None
 
     @property
     def meaning(self) -> dict[str, Any]:

@@ -116,15 +116,15 @@ def test_what_cannot_be_printed_is_refused_with_ways_out_that_work(style, words)
     with pytest.raises(AlphabetError, match=words) as caught:
         check_printable(DENSE, style, PRINTERS["fdm-0.4"])
     assert "set " in caught.value.fix
-    for name, value in re.findall(r"(stroke|pitch|draft|chamfer) to ([0-9.]+)", caught.value.fix):
+    for name, value in re.findall(r"(\w+) to ([0-9.]+) (?:mm|degrees)(?=,|$)", caught.value.fix):
         number = math.radians(float(value)) if name == "draft" else float(value)
         unit = "rad" if name == "draft" else "mm"
-        outlines(DENSE, replace(style, **{f"{name}_{unit}": number}))
+        check_printable(DENSE, replace(style, **{f"{name}_{unit}": number}), PRINTERS["fdm-0.4"])
 
 
 def test_a_chamfer_as_wide_as_the_stroke_is_refused():
     with pytest.raises(AlphabetError, match="a chamfer of 1 mm leaves"):
-        check_printable(DENSE, SymbolStyle(chamfer_mm=1.0), PRINTERS["fdm-0.4"])
+        check_printable(DENSE, SymbolStyle(height_mm=1.2, chamfer_mm=1.0), PRINTERS["fdm-0.4"])
 
 
 def test_rings_tell_crossings_and_points_inside():
