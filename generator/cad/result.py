@@ -14,7 +14,7 @@ from encoded_objects.base.errors import require
 from generator.cad.encode import EncodedSolid
 from generator.errors import SolidError
 from generator.export.step import step_chunks
-from generator.polyhedron.read.kernel import step_shape, sub_shapes
+from generator.polyhedron.read.brep import step_shape, sub_shapes
 from generator.solid import Part
 
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.errors import require
 from generator.errors import GeneratorError, SolidError
-from generator.polyhedron.read.kernel import step_shape, sub_shapes
+from generator.polyhedron.read.brep import step_shape, sub_shapes
 from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
 from generator.solid import Part, round_volume, volume
 from generator.solid.part import transform

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from generator.errors import ShapeError
-from generator.polyhedron.read.kernel import is_line, wires_of
+from generator.polyhedron.read.brep import is_line, wires_of
 from generator.polyhedron.read.soup import MOST_FACETS
 from generator.polyhedron.shapes import CHORD_ERROR_MM, FACETS
 

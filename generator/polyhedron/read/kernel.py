@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,8 @@ import numpy as np
 
 from encoded_objects.base.errors import install_line
 from generator.errors import ShapeError
+from generator.polyhedron.read.brep import is_line, step_shape, sub_shapes, wires_of
+from generator.polyhedron.read.curved import curved_faces
 
 PLANAR_MM = 1e-5  #: a spline surface this flat is a plane; kernel tolerances are smaller
 AGAIN = "export the model again; the file may be damaged"
@@ -81,18 +82,6 @@ def _content_of(shape: Any, solids: int) -> str:
     return "no faces: it may be an assembly whose parts are in other files"
 
 
-def step_shape(path: Path | str) -> Any:
-    """Return the kernel's shape of a STEP file; None where it finds no STEP data."""
-    from OCP.IFSelect import IFSelect_RetDone
-    from OCP.STEPControl import STEPControl_Reader
-
-    reader = STEPControl_Reader()
-    if reader.ReadFile(str(path)) != IFSelect_RetDone:
-        return None
-    reader.TransferRoots()
-    return reader.OneShape()
-
-
 def _scale(shape: Any, scale: float) -> Any:
     """Return a shape made larger about the origin, so that round faces are divided at that size."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
@@ -115,8 +104,6 @@ def _faces(solid: Any) -> dict[str, Any]:
     faces = [TopoDS.Face_s(face) for face in sub_shapes(solid, TopAbs_FACE)]
     kinds = [_kind(face) for face in faces]
     if set(kinds) != {"plane"}:
-        from generator.polyhedron.read.curved import curved_faces
-
         return curved_faces(solid, faces, kinds)
     numbers = TopTools_IndexedMapOfShape()
     TopExp.MapShapes_s(solid, TopAbs_VERTEX, numbers)
@@ -151,26 +138,6 @@ def _loops(face: Any, numbers: Any) -> list[list[int]]:
     return loops
 
 
-def wires_of(face: Any) -> Iterator[Iterator[tuple[Any, Any]]]:
-    """Yield the wires of a face, outer first: edges with their first vertices, material left."""
-    from OCP.BRepTools import BRepTools
-    from OCP.TopAbs import TopAbs_WIRE
-
-    outer = BRepTools.OuterWire_s(face)
-    for wire in sorted(sub_shapes(face, TopAbs_WIRE), key=lambda wire: not wire.IsSame(outer)):
-        yield _edges_of(wire, face)
-
-
-def _edges_of(wire: Any, face: Any) -> Iterator[tuple[Any, Any]]:
-    from OCP.BRepTools import BRepTools_WireExplorer
-    from OCP.TopoDS import TopoDS
-
-    walk = BRepTools_WireExplorer(TopoDS.Wire_s(wire), face)
-    while walk.More():
-        yield walk.Current(), walk.CurrentVertex()
-        walk.Next()
-
-
 def _refuse_bent(edge: Any) -> None:
     """Refuse an edge that leaves the straight line between its ends."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
@@ -190,26 +157,6 @@ def _refuse_bent(edge: Any) -> None:
             f"an edge at ({x:.6g}, {y:.6g}, {z:.6g}) is not straight",
             fix="leave out round parts: every edge joins two planar faces",
         )
-
-
-def is_line(edge: Any) -> bool:
-    """Whether the kernel has an edge as a straight line."""
-    from OCP.BRepAdaptor import BRepAdaptor_Curve
-    from OCP.GeomAbs import GeomAbs_Line
-
-    return bool(BRepAdaptor_Curve(edge).GetType() == GeomAbs_Line)
-
-
-def sub_shapes(shape: Any, kind: Any) -> list[Any]:
-    """Return the sub-shapes of one kind, each once, in the kernel's order; of None, none."""
-    from OCP.TopExp import TopExp
-    from OCP.TopTools import TopTools_IndexedMapOfShape
-
-    if shape is None or shape.IsNull():
-        return []
-    found = TopTools_IndexedMapOfShape()
-    TopExp.MapShapes_s(shape, kind, found)
-    return [found.FindKey(k + 1) for k in range(found.Extent())]
 
 
 if __name__ == "__main__":
