@@ -132,7 +132,8 @@ def _ways_out(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> str:
         unit, scale = ("degrees", math.degrees(1.0)) if name == "draft" else ("mm", 1.0)
         field = "draft_rad" if name == "draft" else f"{name}_mm"
         given = scale * getattr(style, field)
-        for steps in range(1, 21) if given else ():  # of 5 %
+        most = 40 if direction > 0 else 20  # up to three times as much, or down to nothing
+        for steps in range(1, most + 1) if given else ():  # of 5 %
             value = round(given + direction * steps * 0.05 * given, 2)
             if is_printable(alphabet, replace(style, **{field: value / scale}), printer):
                 ways.append(f"{name} to {value:g} {unit}")
