@@ -66,20 +66,27 @@ def check_printable(alphabet: Alphabet, style: SymbolStyle, printer: Printer) ->
     """
     place = f"alphabet {alphabet.name}"
     check_numbers(style, place)
-    try:
-        _check(alphabet, style, printer)
-    except AlphabetError as refused:
+    fault = printing_fault(alphabet, style, printer)
+    if fault is not None:
         ways = _ways_out(alphabet, style, printer)
-        raise AlphabetError(refused.cause, fix=ways or refused.fix, place=place) from None
+        raise AlphabetError(fault.cause, fix=ways or fault.fix, place=place)
 
 
 def is_printable(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> bool:
     """Return whether `check_printable` lets symbols pass."""
+    return printing_fault(alphabet, style, printer) is None
+
+
+def printing_fault(
+    alphabet: Alphabet, style: SymbolStyle, printer: Printer
+) -> AlphabetError | None:
+    """Return what `check_printable` would refuse, without its search for what mends it."""
     try:
+        check_numbers(style, f"alphabet {alphabet.name}")
         _check(alphabet, style, printer)
-    except AlphabetError:
-        return False
-    return True
+    except AlphabetError as fault:
+        return fault
+    return None
 
 
 def _check(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> None:

@@ -25,7 +25,7 @@ from encoded_objects.base.sensor_type import SENSOR_FILES, USUAL_SENSOR, SensorT
 from encoded_objects.base.yaml_tree import Tree, read_tree
 from generator.alphabet.known import ALPHABETS, Alphabet, alphabet_from
 from generator.alphabet.outline import SymbolStyle
-from generator.alphabet.printable import check_printable, is_printable
+from generator.alphabet.printable import check_printable, is_printable, printing_fault
 from generator.array.definition import array_from
 from generator.array.profiles import PROFILES, SMALLEST, smallest_profile
 from generator.errors import AlphabetError, ArrayError
@@ -343,6 +343,7 @@ def _printable_style(
     symbols = settings.symbols
     drafts = DRAFTS_RAD if symbols.draft is None else (symbols.draft,)
     usual = symbols.pitch or defaults.pitch_mm
+    refused: SymbolStyle | None = None
     fault: AlphabetError | None = None
     for pitch in (usual,) if symbols.pitch else (usual, *defaults.coarser_mm):
         for draft in drafts:
@@ -355,11 +356,12 @@ def _printable_style(
             )
             if is_printable(alphabet, style, printer):
                 return style, fault.cause if fault else ""
-        try:
-            if fault is None:
-                check_printable(alphabet, style, printer)
-        except AlphabetError as error:
-            fault = error
+        if refused is None:
+            refused, fault = style, printing_fault(alphabet, style, printer)
+    try:
+        check_printable(alphabet, refused or style, printer)
+    except AlphabetError as error:  # the same, with what mends it
+        fault = error
     assert fault is not None
     names = ("stroke", "pitch", "height", "draft", "chamfer")
     first = [name for name in names if re.match(rf"(a )?{name}\b", fault.cause)]
